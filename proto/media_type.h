@@ -7,10 +7,6 @@
 namespace terrace::proto {
 
 inline constexpr std::string_view kQuantizedMeshType = "application/vnd.quantized-mesh";
-inline constexpr std::string_view kJsonType = "application/json";
-inline constexpr std::string_view kProblemType = "application/problem+json";
-inline constexpr std::string_view kHtmlType = "text/html; charset=utf-8";
-inline constexpr std::string_view kTextType = "text/plain; charset=utf-8";
 
 // The extensions of quantized-mesh-1.0 that a client can ask for.
 struct TileExtensions {

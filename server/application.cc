@@ -5,8 +5,8 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <utility>
 
-#include "server/api/negotiate.h"
 #include "server/http/http_error.h"
+#include "server/routes.h"
 
 namespace terrace::server {
 namespace {
@@ -57,7 +57,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     if (admission.refusal) return admission;
     const RouteRow& row = *call_.route.row;
     admission.for_grant = gate.IsForGrant(call_);
-    if (row.takes_post()) admission.max_body_bytes = row.max_body_bytes(application_.max_locations());
+    if (row.takes_post()) admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
     return admission;
   }
 
@@ -160,11 +160,18 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
   application_.parts_.access_log.Write(record);
 }
 
-TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, HandlerOptions options)
-    : parts_(std::move(parts)), max_locations_(options.max_locations), opening_(catalog == nullptr) {
-  if (!catalog) catalog = std::make_shared<const Catalog>();
-  handlers_ = std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, options, *this);
-  deadline_.store(options.deadline);
+TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
+    : parts_(std::move(parts)),
+      max_locations_(config.max_locations),
+      deadline_(config.request_deadline),
+      opening_(catalog == nullptr) {
+  handlers_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
+}
+
+// Bodies are admitted by the number of locations at the start: it stays.
+TerrainApplication::HandlersPtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
+  config.max_locations = max_locations_;
+  return std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
 }
 
 std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::address& peer) {
@@ -176,10 +183,9 @@ std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
   return parts_.edge.gate.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
 }
 
-bool TerrainApplication::Replace(CatalogPtr catalog, HandlerOptions options) {
-  // The old handlers are destroyed after the lock is released.
-  auto handlers = std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, options, *this);
-  deadline_.store(options.deadline, std::memory_order_relaxed);
+bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {
+  HandlersPtr handlers = Make(std::move(catalog), config);  // the old ones are destroyed after the lock is released
+  deadline_.store(config.request_deadline, std::memory_order_relaxed);
   const std::lock_guard lock(mutex_);
   handlers_.swap(handlers);
   const bool is_first = opening_.exchange(false);

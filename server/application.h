@@ -13,12 +13,10 @@
 #include <string>
 
 #include "server/api/call.h"
-#include "server/api/gate.h"
-#include "server/documents/static_files.h"
-#include "server/edge.h"
-#include "server/handlers/state_handler.h"
+#include "server/edge/gate.h"
+#include "server/edge/edge.h"
+#include "server/handlers/handlers.h"
 #include "server/http/application.h"
-#include "server/routes.h"
 #include "server/telemetry/access_log.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_page.h"
@@ -44,13 +42,13 @@ struct ApplicationParts {
 class TerrainApplication final : public Application, public ProcessState {
  public:
   // Without a catalog (null) requests wait for the first Replace, except those about the process.
-  TerrainApplication(ApplicationParts parts, CatalogPtr catalog, HandlerOptions options);
+  TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config);
 
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;
   std::string ClientOf(const asio::ip::address& peer) const override;
 
   // New requests are answered from `catalog`. Returns true for the first one.
-  bool Replace(CatalogPtr catalog, HandlerOptions options);
+  bool Replace(CatalogPtr catalog, const config::Config& config);
 
   // Problems by dataset; "" is the configuration.
   void SetTroubles(std::map<std::string, std::string> troubles);
@@ -69,7 +67,7 @@ class TerrainApplication final : public Application, public ProcessState {
   bool draining() const override { return parts_.edge.connections.draining(); }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { return parts_.metrics_page.Get(); }
 
-  std::size_t max_locations() const { return max_locations_; }
+  HandlersPtr Make(CatalogPtr catalog, config::Config config) const;
   HandlersPtr Current() const;
   bool HasLastingTrouble(const std::string& dataset) const;
 

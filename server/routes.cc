@@ -1,104 +1,269 @@
 #include "server/routes.h"
 
+#include <algorithm>
 #include <utility>
+
+#include "proto/documents/implicit_tree.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
+
+tl::unexpected<Error> NotFound() {
+  return MakeError(ErrorCode::kNotFound, "no such URL; /datasets lists those of each dataset");
+}
+
+// A path without scheme and authority, or nothing.
+std::optional<std::string_view> OriginForm(std::string_view target) {
+  if (target.starts_with('/')) return target;
+  const std::optional<std::string_view> rest = AfterScheme(target);
+  if (!rest) return std::nullopt;
+  const std::size_t path = rest->find_first_of("/?");
+  if (path == std::string_view::npos) return "/";
+  return (*rest)[path] == '/' ? rest->substr(path) : std::optional<std::string_view>();
+}
+
+// One tile has one URL.
+std::optional<std::int64_t> TileNumber(std::string_view text) { return PlainDecimal(text, /*max_digits=*/9); }
+
+// Web Mercator has one root, TMS geodetic two side by side.
+bool IsInScheme(const geo::TileKey& key, bool is_mercator) {
+  return geo::IsValid(key) && (!is_mercator || key.x < geo::TileRows(key.level));
+}
+
+std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y, bool is_mercator) {
+  const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
+  if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
+  const geo::TileKey key{static_cast<int>(*level), *column, *row};
+  return IsInScheme(key, is_mercator) ? std::optional(key) : std::nullopt;
+}
+
+// "9-272-359": level, column and row of an implicit tree's root.
+std::optional<geo::TileKey> ParseRoot(std::string_view name) {
+  const std::size_t first = name.find('-'), second = name.find('-', first + 1);
+  if (first == std::string_view::npos || second == std::string_view::npos) return std::nullopt;
+  return ParseTileKey(name.substr(0, first), name.substr(first + 1, second - first - 1), name.substr(second + 1),
+                      /*is_mercator=*/false);
+}
+
+// Removes ".7.subtree" from the last segment of a subtree's URL and returns 7; nothing if the segment does not end like
+// this.
+std::optional<int> CutSubtreeLevels(std::string_view& row) {
+  constexpr std::string_view kSuffix = ".subtree";
+  if (!row.ends_with(kSuffix)) return std::nullopt;
+  const std::string_view rest = row.substr(0, row.size() - kSuffix.size());
+  const std::size_t dot = rest.find('.');
+  if (dot == std::string_view::npos) return std::nullopt;
+  const auto levels = TileNumber(rest.substr(dot + 1));
+  if (!levels || *levels < 1 || *levels > proto::kTallestSubtree) return std::nullopt;
+  row = rest.substr(0, dot);
+  return static_cast<int>(*levels);
+}
+
+// Reads a tile of the tree in segment 2, counted from the tree's root. `row`: segment 5 without its suffix.
+bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
+  const auto root = ParseRoot(segments[2]);
+  const auto level = TileNumber(segments[3]), x = TileNumber(segments[4]), y = TileNumber(row);
+  if (!root || !level || !x || !y || root->level + *level > geo::kMaxLevel) return false;
+  const std::int64_t side = std::int64_t{1} << *level;
+  if (*x >= side || *y >= side) return false;
+  route.root = *root;
+  route.key = {root->level + static_cast<int>(*level), root->x * side + *x, root->y * side + *y};
+  return true;
+}
+
+// RouteRow::read of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on; of implicit tiles and subtrees:
+// /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb and .{levels}.subtree, counted from the root; of the viewer's files.
+bool ReadTile(const Segments& segments, Route& route) {
+  std::string_view row = segments[3];
+  route.format = CutSuffix(row);
+  if (route.format == nullptr) return false;
+  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator);
+  if (!key) return false;
+  route.key = *key;
+  return true;
+}
+
+bool ReadImplicitTile(const Segments& segments, Route& route) {
+  std::string_view row = segments[5];
+  route.format = CutSuffix(row);
+  return route.format != nullptr && route.format->format == tiler::TileFormat::kGlb && ReadInTree(segments, row, route);
+}
+
+bool ReadSubtree(const Segments& segments, Route& route) {
+  std::string_view row = segments[5];
+  const std::optional<int> levels = CutSubtreeLevels(row);
+  if (!levels || !ReadInTree(segments, row, route)) return false;
+  route.subtree_levels = *levels;
+  return true;
+}
+
+bool ReadViewerFile(const Segments& segments, Route& route) {
+  for (std::size_t i = 1; i < segments.size(); ++i) route.file.append(i > 1 ? "/" : "").append(segments[i]);
+  if (route.file.empty()) route.file = "index.html";
+  return true;
+}
+
+// No parameter's name needs percent-encoding, and readers that do not decode it do not recognize the parameter: with
+// token%3D or %74oken=, logs and caches would store the token.
+bool HasEncodedName(std::string_view query) {
+  if (query.find('%') == std::string_view::npos) return false;
+  while (!query.empty()) {
+    const std::string_view piece = NextPiece(query, '&');
+    if (piece.substr(0, piece.find('=')).find('%') != std::string_view::npos) return true;
+  }
+  return false;
+}
+
+// The text that a pattern's segment requires; empty: any.
+std::string_view LiteralOf(std::string_view segment) {
+  return segment.find('{') == std::string_view::npos ? segment : std::string_view();
+}
 
 // Limit of a body with a list of locations: a fixed number of bytes, and this number per location: two numbers with all
 // digits, and three bytes per separator in a form.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
+// RouteRow::handle of documents.
+template <Described (*describe)(const Handlers&, const Call&)>
+Answer Write(const Handlers& from, const Call& call) {
+  return from.documents.Make(describe(from, call), call);
+}
+
 // Most frequent routes first.
 constexpr RouteRow kRows[] = {
-    {.label = "tile",
-     .pattern = "/{dataset}/{z}/{x}/{y}.{suffix}",
-     .handle = [](const Handlers& from, const Call& call) { return from.tiles.Handle(call); },
-     .read = ReadTile},
+    {.label = "tile", .pattern = "/{dataset}/{z}/{x}/{y}.{suffix}", .handle = AnswerTile, .read = ReadTile},
     {.label = "tile",
      .pattern = "/{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb",
-     .handle = [](const Handlers& from, const Call& call) { return from.tiles.Handle(call); },
+     .handle = AnswerTile,
      .read = ReadImplicitTile},
     {.label = "subtree",
      .pattern = "/{dataset}/3dtiles/{root}/{level}/{x}/{y}.{levels}.subtree",
-     .handle = [](const Handlers& from,
-                  const Call& call) { return from.documents.Make(from.tilesets.HandleSubtree(call), call); },
+     .handle = Write<DescribeSubtree>,
      .read = ReadSubtree},
-    {.label = "layer",
-     .pattern = "/{dataset}/layer.json",
-     .handle = [](const Handlers& from,
-                  const Call& call) { return from.documents.Make(from.layers.Handle(call), call); },
-     .has_templates = true},
-    {.label = "tileset",
-     .pattern = "/{dataset}/tileset.json",
-     .handle = [](const Handlers& from,
-                  const Call& call) { return from.documents.Make(from.tilesets.Handle(call), call); },
-     .has_templates = true},
-    {.label = "tilejson",
-     .pattern = "/{dataset}/tiles.json",
-     .handle = [](const Handlers& from, const Call& call) -> Answer { return from.tile_json.Handle(call); },
-     .has_templates = true},
-    {.label = "heights",
-     .pattern = "/{dataset}/heights",
-     .handle = [](const Handlers& from, const Call& call) { return from.heights.Handle(call); },
-     .max_body_bytes = MaxLocationsBytes},
-    {.label = "mesh",
-     .pattern = "/{dataset}/mesh",
-     .handle = [](const Handlers& from, const Call& call) { return from.areas.Handle(call); }},
-    {.label = "datasets",
-     .pattern = "/datasets",
-     .handle = [](const Handlers& from,
-                  const Call& call) { return from.documents.Make(from.viewer.Datasets(call), call); },
-     .shows = Shows::kSeenDatasets},
+    {.label = "layer", .pattern = "/{dataset}/layer.json", .handle = Write<DescribeLayer>, .has_templates = true},
+    {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
+    {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
+    {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
+    {.label = "mesh", .pattern = "/{dataset}/mesh", .handle = AnswerArea},
+    {.label = "datasets", .pattern = "/datasets", .handle = Write<DescribeDatasets>, .shows = Shows::kSeenDatasets},
     {.label = "viewer",
      .pattern = "/",
-     .handle = [](const Handlers& from, const Call& call) { return from.documents.Make(from.viewer.File(call), call); },
+     .handle = Write<DescribeViewerFile>,
      .read = ReadViewerFile,
      .shows = Shows::kNothing,
      .takes_any_query = true},
     {.label = "viewer",
      .pattern = "/viewer/{file}...",
-     .handle = [](const Handlers& from, const Call& call) { return from.documents.Make(from.viewer.File(call), call); },
+     .handle = Write<DescribeViewerFile>,
      .read = ReadViewerFile,
      .shows = Shows::kNothing,
      .takes_any_query = true},
     {.label = "livez",
      .pattern = "/livez",
-     .handle = [](const Handlers& from, const Call& call) -> Answer { return from.state.Live(call); },
+     .handle = AnswerLive,
      .shows = Shows::kNothing,
      .is_probe = true,
      .is_of_process = true},
     {.label = "readyz",
      .pattern = "/readyz",
-     .handle = [](const Handlers& from, const Call& call) -> Answer { return from.state.Ready(call); },
+     .handle = AnswerReady,
      .shows = Shows::kNothing,
      .is_probe = true,
      .is_of_process = true},
     {.label = "metrics",
      .pattern = "/metrics",
-     .handle = [](const Handlers& from, const Call& call) { return from.state.Metrics(call); },
+     .handle = AnswerMetrics,
      .shows = Shows::kAllDatasets,
      .is_of_process = true},
 };
 
 }  // namespace
 
-Handlers::Handlers(CatalogPtr c, TileService& tile_service, std::shared_ptr<const StaticFiles> files,
-                   const HandlerOptions& options, const ProcessState& process)
-    : catalog(std::move(c)),
-      tiles(catalog, tile_service, options),
-      heights(catalog, tile_service, options),
-      areas(catalog, tile_service, options),
-      layers(catalog->datasets),
-      tilesets(catalog->datasets, options.cache_control),
-      tile_json(catalog->datasets, options.origin_headers),
-      viewer(catalog->datasets, std::move(files)),
-      state(process),
-      documents(catalog, tile_service, options) {}
-
 const RouteTable& Routes() {
   static const RouteTable table(kRows);
   return table;
+}
+
+std::optional<Segments> Segments::Of(std::string_view path) {
+  constexpr std::size_t kUsual = 6;  // the longest of the fixed forms
+  Segments segments;
+  segments.pieces_.reserve(kUsual);
+  for (std::size_t at = 0; at != std::string_view::npos;) {
+    const std::size_t next = path.find('/', at + 1);
+    std::string_view piece = path.substr(at + 1, next == std::string_view::npos ? next : next - at - 1);
+    if (piece.find('%') != std::string_view::npos) {
+      std::optional<std::string> decoded = PercentDecode(piece);
+      if (!decoded) return std::nullopt;
+      piece = segments.decoded_.emplace_front(*std::move(decoded));
+    }
+    segments.pieces_.push_back(piece);
+    at = next;
+  }
+  return segments;
+}
+
+RouteTable::RouteTable(std::span<const RouteRow> rows) {
+  for (const RouteRow& row : rows) {
+    Entry entry{&row, {}};
+    std::string_view rest = row.pattern.substr(1);
+    if (rest.ends_with("...")) {
+      entry.has_rest = true;
+      rest.remove_suffix(3);
+    }
+    for (bool more = true; more;) {
+      const std::size_t slash = rest.find('/');
+      more = slash != std::string_view::npos;
+      entry.pattern.push_back(LiteralOf(rest.substr(0, slash)));
+      if (more) rest.remove_prefix(slash + 1);
+    }
+    entries_.push_back(std::move(entry));
+  }
+}
+
+bool RouteTable::Fits(const Entry& entry, const Segments& segments) {
+  const std::size_t size = entry.pattern.size();
+  if (segments.size() != size && (segments.size() < size || !entry.has_rest)) return false;
+  for (std::size_t i = 0; i < size; ++i) {
+    // The one URL with an empty segment is "/".
+    const bool is_any = entry.pattern[i].empty() && size > 1;
+    if (!is_any && entry.pattern[i] != segments[i]) return false;
+  }
+  return true;
+}
+
+bool RouteTable::IsReserved(std::string_view name) const {
+  return !name.empty() &&
+         std::ranges::any_of(entries_, [&](const Entry& entry) { return entry.pattern.front() == name; });
+}
+
+Result<Route> RouteTable::Match(std::string_view target) const {
+  const std::optional<std::string_view> origin = OriginForm(target);
+  if (!origin || origin->find('#') != std::string_view::npos) {
+    return MakeError(ErrorCode::kInvalidArgument, "malformed request target");
+  }
+  const std::size_t question = std::min(origin->find('?'), origin->size());
+  const std::optional<Segments> segments = Segments::Of(origin->substr(0, question));
+  if (!segments) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding in the path");
+
+  Route route;
+  for (const Entry& entry : entries_) {
+    if (!Fits(entry, *segments)) continue;
+    route = Route();
+    if (entry.pattern.size() > 1 && entry.pattern.front().empty()) route.dataset = (*segments)[0];
+    if (IsReserved(route.dataset)) continue;  // "viewer" is not a dataset
+    if (entry.row->read != nullptr && !entry.row->read(*segments, route)) continue;
+    route.row = entry.row;
+    break;
+  }
+  if (route.row == nullptr) return NotFound();
+  route.query = std::string(origin->substr(std::min(question + 1, origin->size())));
+  if (!route.row->takes_any_query && HasEncodedName(route.query)) {
+    return MakeError(ErrorCode::kInvalidArgument, "a parameter's name has a percent sign; write it plainly");
+  }
+  return route;
 }
 
 }  // namespace terrace::server

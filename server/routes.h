@@ -1,44 +1,61 @@
-// All URLs of the server, and their handlers.
+// All URLs of the server: the table of rows, the row for a request target, and what the target names. Pure; knows no
+// dataset.
 #pragma once
 
-#include <memory>
+#include <cstddef>
+#include <forward_list>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "server/api/handler_options.h"
-#include "server/api/router.h"
-#include "server/documents/document_maker.h"
-#include "server/documents/static_files.h"
-#include "server/handlers/area_handler.h"
-#include "server/handlers/heights_handler.h"
-#include "server/handlers/layer_handler.h"
-#include "server/handlers/state_handler.h"
-#include "server/handlers/tile_handler.h"
-#include "server/handlers/tile_json_handler.h"
-#include "server/handlers/tileset_handler.h"
-#include "server/handlers/viewer_handler.h"
-#include "server/tiles/catalog.h"
-#include "server/tiles/tile_service.h"
+#include "engine/core/result.h"
+#include "server/api/call.h"
 
 namespace terrace::server {
 
-// The handlers of one catalog. Thread-safe. A request keeps them alive until it is answered.
-struct Handlers {
-  // `tile_service` and `process` must outlive this.
-  Handlers(CatalogPtr c, TileService& tile_service, std::shared_ptr<const StaticFiles> files,
-           const HandlerOptions& options, const ProcessState& process);
+// The decoded segments of a path. An encoded '/' does not separate segments.
+class Segments {
+ public:
+  // Returns nothing if percent-encoding is malformed. `path` must outlive the segments.
+  static std::optional<Segments> Of(std::string_view path);
 
-  const CatalogPtr catalog;
-  const TileHandler tiles;
-  const HeightsHandler heights;
-  const AreaHandler areas;
-  const LayerHandler layers;
-  const TilesetHandler tilesets;
-  const TileJsonHandler tile_json;
-  const ViewerHandler viewer;
-  const StateHandler state;
-  const DocumentMaker documents;
+  std::size_t size() const { return pieces_.size(); }
+  std::string_view operator[](std::size_t i) const { return pieces_[i]; }
+
+ private:
+  std::vector<std::string_view> pieces_;
+  std::forward_list<std::string> decoded_;  // decoded copies, where needed; a list: they must not move
 };
 
-// The table of URLs.
+// Immutable.
+class RouteTable {
+ public:
+  // `rows` must outlive this object. The first row that matches is used.
+  explicit RouteTable(std::span<const RouteRow> rows);
+
+  // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
+  // kInvalidArgument: neither form, malformed percent-encoding, or percent-encoding in the name of a parameter.
+  // kNotFound: not a URL of the server. A tile number that is not a plain decimal number, or that is outside the tiling
+  // scheme, names no tile.
+  Result<Route> Match(std::string_view target) const;
+
+  // True for the first segments of URLs that do not begin with a dataset. No dataset may have such a name.
+  bool IsReserved(std::string_view name) const;
+
+ private:
+  struct Entry {
+    const RouteRow* row;
+    std::vector<std::string_view> pattern;  // segments; an empty one is any
+    bool has_rest = false;                  // more segments may follow
+  };
+
+  static bool Fits(const Entry& entry, const Segments& segments);
+
+  std::vector<Entry> entries_;
+};
+
 const RouteTable& Routes();
 
 }  // namespace terrace::server

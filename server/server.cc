@@ -17,10 +17,9 @@
 #include <thread>
 #include <utility>
 
-#include "server/api/tile_head.h"
+#include "server/api/tile_formats.h"
 #include "server/application.h"
-#include "server/documents/static_files.h"
-#include "server/edge.h"
+#include "server/edge/edge.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
 #include "server/net/io_threads.h"
@@ -52,60 +51,33 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   return {};
 }
 
-TileServiceOptions ServiceOptions(const ServerOptions& options) {
-  TileServiceOptions service;
-  service.worker_threads = options.config.worker_threads;
-  service.queue_length = options.config.queue_length;
-  service.cache_bytes = options.config.cache_bytes;
-  service.stores = options.tile_stores;
-  if (options.disk_cache && options.disk_cache->tiles() != nullptr) {
-    service.stores.emplace(service.stores.begin(), options.disk_cache, options.disk_cache->tiles());
-  }
-  service.write_head = MakeTileHead;
-  return service;
-}
-
-HandlerOptions ForHandlers(const config::Config& config, std::size_t max_locations) {
-  HandlerOptions handlers;
-  handlers.cache_control = config.cache_control;
-  if (!config.trusted_proxies.empty()) {
-    handlers.origin_headers = config.forwarded_header == config::ForwardedHeader::kForwarded
-                                  ? "Forwarded"
-                                  : "X-Forwarded-Host, X-Forwarded-Proto";
-  }
-  handlers.deadline = config.request_deadline;
-  handlers.max_locations = max_locations;
-  return handlers;
-}
-
-}  // namespace
-
 // Members are destroyed from the last to the first: the io_contexts, whose unfinished coroutines hold sessions, go
 // before everything a session refers to.
-class Server::Impl {
+class RunningServer final : public Server {
  public:
-  Impl(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge, ServerOptions options)
+  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge,
+                ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
         edge_(std::move(edge)),
-        tiles_(ServiceOptions(options_), std::bind_front(&Metrics::CountBuild, &metrics_)),
-        metrics_page_(
-            [this] { return metrics_.Text(tiles_.stats(), RefinementStats(), SourceNumbers(), CurrentState()); },
-            options_.metrics_age),
+        tiles_({options_.config.worker_threads, options_.config.queue_length, options_.config.cache_bytes,
+                options_.tile_stores, MakeTileHead},
+               std::bind_front(&Metrics::CountBuild, &metrics_)),
+        metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
         application_({*edge_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_trouble},
-                     std::move(catalog), ForHandlers(options_.config, options_.config.max_locations)),
+                     std::move(catalog), options_.config),
         io_(options_.config.io_threads),
         signals_(io_.first()) {}
 
-  ~Impl() {
+  ~RunningServer() override {
     if (!stopper_.joinable()) return;  // never started
     RequestStop();
     stopper_.join();
   }
 
-  Result<void> Start() {
+  Result<void> Run() {
     const config::ListenAddress& listen = options_.config.listen;
     Result<std::shared_ptr<Listener>> listener = options_.listen_socket >= 0
                                                      ? Listener::Adopt(io_, options_.listen_socket, Context())
@@ -122,29 +94,36 @@ class Server::Impl {
     return {};
   }
 
-  void Replace(CatalogPtr catalog, const config::Config& config) {
+  Result<void> Replace(CatalogPtr catalog, const config::Config& config) override {
+    if (Result<void> named = CheckNames(catalog->datasets); !named) return named;
     tiles_.SetCacheBytes(config.cache_bytes);
-    const bool is_first = application_.Replace(catalog, ForHandlers(config, options_.config.max_locations));
+    const bool is_first = application_.Replace(catalog, config);
     if (is_first && options_.listen_socket >= 0) listener_->Start();
     tiles_.RetainTilesOf(*catalog);
     metrics_.RetainDatasets(catalog->datasets);
+    return {};
   }
 
-  void SetTroubles(std::map<std::string, std::string> troubles) { application_.SetTroubles(std::move(troubles)); }
+  void SetTroubles(std::map<std::string, std::string> troubles) override {
+    application_.SetTroubles(std::move(troubles));
+  }
 
-  void ReopenAccessLog() { access_log_.Reopen(); }
+  void ReopenAccessLog() override { access_log_.Reopen(); }
 
-  std::uint16_t port() const { return listener_->port(); }
-  const std::string& host() const { return listener_->host(); }
-  bool is_tls() const { return edge_->tls != nullptr; }
+  std::uint16_t port() const override { return listener_->port(); }
+  std::string url() const override {
+    const std::string& host = listener_->host();
+    const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
+    return fmt::format("{}://{}:{}/", edge_->tls ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
+  }
 
-  void RequestStop() {
+  void RequestStop() override {
     const std::lock_guard lock(mutex_);
     stop_requested_ = true;
     changed_.notify_all();
   }
 
-  bool Wait() {
+  bool Wait() override {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [this] { return stopped_; });
     return drained_;
@@ -173,7 +152,9 @@ class Server::Impl {
         std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
     tiles_.CancelBuilds();
     // The time beyond the drain timeout is too short to wait for the disk.
-    if (!drained && options_.disk_cache) options_.disk_cache->Abandon();
+    if (!drained) {
+      for (tiler::StoreBase* store : Stores()) store->Abandon();
+    }
     if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
       spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());
       edge_->connections.AbortAll();
@@ -220,26 +201,27 @@ class Server::Impl {
     });
   }
 
+  // The tiers below memory.
+  std::vector<tiler::StoreBase*> Stores() const {
+    std::vector<tiler::StoreBase*> stores;
+    for (const auto& store : options_.tile_stores) stores.push_back(store.get());
+    if (options_.refinements && options_.refinements->below() != nullptr)
+      stores.push_back(options_.refinements->below());
+    return stores;
+  }
+
   Metrics::ServerState CurrentState() const {
     Metrics::ServerState state;
-    if (options_.disk_cache) state.disk = options_.disk_cache->stats();
+    if (options_.refinements) state.refinements = options_.refinements->stats();
+    state.stores = Stores();
+    state.tile_stores = options_.tile_stores.size();
     state.connections = edge_->connections.size();
     state.refused_connections = edge_->connections.refused();
     state.transfers = edge_->transfers.stats();
-    const CatalogPtr catalog = application_.catalog();
-    state.datasets = catalog->datasets.size();
-    for (const DatasetView& dataset : catalog->datasets) state.versions.emplace_back(dataset.name, dataset.version());
+    state.catalog = application_.catalog();
     state.troubles = application_.troubles().size();
     state.catalogs = application_.replaced();
     return state;
-  }
-
-  tiler::ByteCacheStats RefinementStats() const {
-    return options_.refinement_stats ? options_.refinement_stats() : tiler::ByteCacheStats{};
-  }
-  SourceStats SourceNumbers() const {
-    const CatalogPtr catalog = application_.catalog();
-    return catalog->source_stats ? catalog->source_stats() : SourceStats{};
   }
 
   std::shared_ptr<const SessionContext> Context() {
@@ -277,8 +259,7 @@ class Server::Impl {
   std::thread stopper_;
 };
 
-Server::Server(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-Server::~Server() = default;
+}  // namespace
 
 std::vector<Error> Server::TryFiles(const config::Config& config) {
   std::vector<Error> errors;
@@ -305,31 +286,10 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (!access_log) return tl::unexpected(access_log.error());
   Result<std::unique_ptr<Edge>> edge = Edge::Open(config);
   if (!edge) return tl::unexpected(edge.error());
-  auto impl = std::make_unique<Impl>(std::move(catalog), std::move(*viewer), std::move(*access_log), *std::move(edge),
-                                     std::move(options));
-  if (const Result<void> started = impl->Start(); !started) return tl::unexpected(started.error());
-  return std::unique_ptr<Server>(new Server(std::move(impl)));
+  auto server = std::make_unique<RunningServer>(std::move(catalog), std::move(*viewer), std::move(*access_log),
+                                                *std::move(edge), std::move(options));
+  if (const Result<void> started = server->Run(); !started) return tl::unexpected(started.error());
+  return server;
 }
-
-Result<void> Server::Replace(CatalogPtr catalog, const config::Config& config) {
-  if (const Result<void> named = CheckNames(catalog->datasets); !named) return tl::unexpected(named.error());
-  impl_->Replace(std::move(catalog), config);
-  return {};
-}
-
-void Server::ReopenAccessLog() { impl_->ReopenAccessLog(); }
-
-void Server::SetTroubles(std::map<std::string, std::string> troubles) { impl_->SetTroubles(std::move(troubles)); }
-
-std::uint16_t Server::port() const { return impl_->port(); }
-
-std::string Server::url() const {
-  const std::string& host = impl_->host();
-  const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
-  return fmt::format("{}://{}:{}/", impl_->is_tls() ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
-}
-
-void Server::RequestStop() { impl_->RequestStop(); }
-bool Server::Wait() { return impl_->Wait(); }
 
 }  // namespace terrace::server

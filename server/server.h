@@ -15,9 +15,9 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "server/store/disk_cache.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
+#include "tiler/store/refinement_cache.h"
 
 namespace terrace::server {
 
@@ -25,13 +25,13 @@ namespace terrace::server {
 struct ServerOptions {
   config::Config config;
   int listen_socket = -1;  // used instead of config.listen: a socket that another process keeps open as well
-  std::shared_ptr<DiskCache> disk_cache;                            // of finished tiles, below memory; may be null
-  std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};  // further tiers, below the disk
-  std::function<tiler::ByteCacheStats()> refinement_stats;          // of the refinement cache; may be empty
-  std::function<std::string()> cache_trouble = {};                  // why cache_dir is not used; "": it is; thread-safe
-  std::chrono::milliseconds metrics_age{1'000};                     // how long a text of /metrics is reused
-  std::chrono::milliseconds drain_grace{
-      500};                      // how long new requests are still served after a stop; part of drain_timeout
+  // Cache tiers of finished tiles below memory, the first asked first.
+  std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};
+  std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics and the stop; may be null
+  std::function<std::string()> cache_trouble = {};                // why cache_dir is not used; "": it is; thread-safe
+  std::chrono::milliseconds metrics_age{1'000};                   // how long a text of /metrics is reused
+  // How long new requests are still served after a stop; part of drain_timeout.
+  std::chrono::milliseconds drain_grace{500};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread when one of these signals arrives; must not block.
   std::map<int, std::function<void()>> on_signal;
@@ -58,32 +58,27 @@ class Server {
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.
   // kInvalidArgument: as above; nothing changes. May be called on any thread, but not concurrently.
-  Result<void> Replace(CatalogPtr catalog, const config::Config& config);
+  virtual Result<void> Replace(CatalogPtr catalog, const config::Config& config) = 0;
 
   // Requests a stop and waits for it.
-  ~Server();
+  virtual ~Server() = default;
 
   // Call it after a rotation of logs.
-  void ReopenAccessLog();
+  virtual void ReopenAccessLog() = 0;
 
   // Sets the problems that /readyz reports as "degraded" besides cache_trouble, by dataset; "" is the configuration.
   // Requests do not wait for a source with a problem.
-  void SetTroubles(std::map<std::string, std::string> troubles);
+  virtual void SetTroubles(std::map<std::string, std::string> troubles) = 0;
 
-  std::uint16_t port() const;
-  std::string url() const;  // "http://127.0.0.1:8080/"; https with a certificate
+  virtual std::uint16_t port() const = 0;
+  virtual std::string url() const = 0;  // "http://127.0.0.1:8080/"; https with a certificate
 
   // Begins to stop and returns at once. Thread-safe, may be called repeatedly; not from a signal handler.
-  void RequestStop();
+  virtual void RequestStop() = 0;
 
   // Blocks until a stop was requested and the server has stopped. Running jobs must end first, because a read of a
   // source cannot be cancelled. Returns false if requests were cut off because drain_timeout passed.
-  bool Wait();
-
- private:
-  class Impl;
-  explicit Server(std::unique_ptr<Impl> impl);
-  std::unique_ptr<Impl> impl_;
+  virtual bool Wait() = 0;
 };
 
 }  // namespace terrace::server

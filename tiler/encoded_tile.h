@@ -41,8 +41,8 @@ struct EncodedTile {
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement = RefinementUse::kMade;
-  bool from_disk = false;  // read from the disk cache
-  HeadLines head;          // see MakeTileHead
+  const char* store = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
+  HeadLines head;               // see MakeTileHead
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.head.text.size(); }

@@ -1,19 +1,15 @@
 #include "tiler/tile_pipeline.h"
 
 #include <algorithm>
+#include <chrono>
+#include <iterator>
 #include <utility>
 
+#include "engine/core/check.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
-#include "proto/mesh/quantized_mesh.h"
-#include "proto/mesh/skirt.h"
-#include "proto/mesh/tile_normals.h"
-#include "tiler/height_tile.h"
-#include "tiler/mesh/glb_mesher.h"
-#include "tiler/mesh/tile_mesher.h"
+#include "tiler/encoders.h"
 #include "tiler/strong_etag.h"
-#include "tiler/tile_extensions.h"
-#include "tiler/tile_texture.h"
 
 namespace terrace::tiler {
 namespace {
@@ -77,72 +73,24 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   return RefinedTilePtr(std::move(refined));
 }
 
-Result<void> TilePipeline::EncodeQuantizedMesh(const TileRequest& request, const RefinedTile& refined, double error_m,
-                                               EncodedTile& encoded, const std::stop_token& stop) const {
-  const Dataset& dataset = datasets_[request.dataset];
-  const Clock::time_point start = Clock::now();
-  const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
-  Result<MeshedTile> measured = MeshTile(*dataset.source, lattice, refined.refinement, dataset.rules, error_m, stop);
-  if (!measured) return tl::unexpected(std::move(measured).error());
-  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
-  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
-  if (!options) return tl::unexpected(options.error());
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
-  encoded.times.refine += measured->replayed;
-  encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
-  encoded.max_error_m = measured->max_error_m;
-  encoded.certified_error_m = measured->surface_error_m + refined.heights.source_error_m;
-  encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
-  encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
-  return {};
-}
-
-Result<void> TilePipeline::EncodeGlb(const TileRequest& request, const RefinedTile& refined, double error_m,
-                                     EncodedTile& encoded, const std::stop_token& stop) const {
-  const Dataset& dataset = datasets_[request.dataset];
-  const Clock::time_point start = Clock::now();
-  const proto::LatticeView lattice{request.key, refined.heights.lattice, refined.heights.heights};
-  const bool is_deepest = request.key.level == dataset.source->max_level();
-  const double skirt_error_m =
-      proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
-  const Result<MeshedGlb> meshed = MeshGlb(*dataset.source, lattice, refined.refinement, dataset.rules, error_m,
-                                           skirt_error_m, proto::WidthOf(request.compression), stop);
-  if (!meshed) return tl::unexpected(meshed.error());
-  proto::GlbOptions options = dataset.glb;
-  options.compression = request.compression;
-  options.copyright = dataset.attribution;
-  options.max_error_m = meshed->max_error_m;
-  options.certified_error_m = meshed->surface_error_m + refined.heights.source_error_m;
-  if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
-    return tl::unexpected(added.error());
-  }
-  Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
-  if (!glb) return tl::unexpected(std::move(glb).error());
-  encoded.bytes = std::move(glb->bytes);
-  encoded.times.refine += meshed->replayed;
-  encoded.times.encode = MicrosecondsSince(start) - meshed->replayed;
-  encoded.max_error_m = meshed->max_error_m;
-  encoded.certified_error_m = options.certified_error_m;
-  encoded.vertices = glb->vertices;
-  encoded.triangles = glb->triangles;
-  return {};
-}
-
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
   const Dataset& dataset = datasets_[request.dataset];
-  if (request.format == TileFormat::kHeightPng) return BuildHeightTile(*dataset.source, request, stop);
-  if (!dataset.source->IsAvailable(request.key)) {
-    return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
-  }
-  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  const auto* const encoder = std::ranges::find(kEncoders, request.format, &Encoder::format);
+  TERRACE_CHECK(encoder != std::end(kEncoders));
   EncodedTile encoded;
-  const Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
-  if (!refined) return tl::unexpected(refined.error());
-
-  const Result<void> done = request.format == TileFormat::kGlb
-                                ? EncodeGlb(request, **refined, error_m, encoded, stop)
-                                : EncodeQuantizedMesh(request, **refined, error_m, encoded, stop);
+  RefinedTilePtr refined;
+  double error_m = 0;
+  if (encoder->needs_refinement) {
+    if (!dataset.source->IsAvailable(request.key)) {
+      return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
+    }
+    error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    Result<RefinedTilePtr> made = Refine(dataset, request.key, error_m, encoded, stop);
+    if (!made) return tl::unexpected(std::move(made).error());
+    refined = *std::move(made);
+  }
+  const Result<void> done = encoder->encode({dataset, request, refined.get(), error_m}, encoded, stop);
   if (!done) return tl::unexpected(done.error());
 
   if (request.coding != Coding::kIdentity) {
@@ -153,6 +101,23 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
   }
   encoded.etag = StrongETag(encoded.bytes);
   return encoded;
+}
+
+Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                              dem::HeightDatum datum, std::stop_token stop) const {
+  std::vector<std::uint8_t> filled(points.size());
+  Result<std::vector<float>> heights = datasets_[dataset].source->ReadPoints(points, datum, std::move(stop), filled);
+  if (!heights) return tl::unexpected(std::move(heights).error());
+  return PointHeights{*std::move(heights), std::move(filled)};
+}
+
+Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {
+  return tiler::PlanArea(*datasets_[dataset].source, datasets_[dataset].error_fraction, area, max_samples);
+}
+
+Result<EncodedTile> TilePipeline::BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
+                                            std::stop_token stop) const {
+  return BuildAreaMesh(*datasets_[dataset].source, plan, area, std::move(stop));
 }
 
 }  // namespace terrace::tiler

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "engine/dem/image/water_raster.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
+#include "tiler/area/area_mesh.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/refinement_cache.h"
@@ -53,7 +55,14 @@ struct Dataset {
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
 };
 
-// Thread-safe: Build may run on any number of threads at once.
+// Heights of a dataset at points, NaN where it has none.
+struct PointHeights {
+  std::vector<float> heights;
+  std::vector<std::uint8_t> filled = {};  // by point: 1 where a void was filled in; empty: none was
+};
+
+// Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
+// that make answers are virtual for tests, which steer what a server serves.
 //
 // Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another error, format or
 // coding of a kept tile costs a replay and an encoding. The bytes of a tile do not depend on the cache.
@@ -64,24 +73,29 @@ class TilePipeline {
   // Uses a shared cache, which may outlive the catalog.
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
+  virtual ~TilePipeline() = default;
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
   // Reads, refines, quantizes, measures, encodes and compresses one tile. All formats share the refinement.
   // kNotFound: no such dataset or tile outside availability. kUnavailable: the source cannot be read now.
   // kCancelled: `stop` was requested.
-  Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
+  virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
+
+  // DemSource::ReadPoints.
+  virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
+                                          dem::HeightDatum datum, std::stop_token stop) const;
+
+  // PlanArea reads nothing and returns at once; BuildArea blocks (area_mesh.h).
+  virtual Result<AreaPlan> PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const;
+  virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
+                                        std::stop_token stop) const;
 
   ByteCacheStats refinements() const { return refinements_->stats(); }
 
  private:
   Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
-
-  Result<void> EncodeQuantizedMesh(const TileRequest& request, const RefinedTile& refined, double error_m,
-                                   EncodedTile& encoded, const std::stop_token& stop) const;
-  Result<void> EncodeGlb(const TileRequest& request, const RefinedTile& refined, double error_m, EncodedTile& encoded,
-                         const std::stop_token& stop) const;
 
   const std::vector<Dataset> datasets_;
   const std::shared_ptr<RefinementCache> refinements_;

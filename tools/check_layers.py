@@ -19,8 +19,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server (config knows VALUES as
 # well). In the server, asio.h stands below all, the files of the folder itself put the rooms together, and the command
 # line is above all:
-# net <- http, which know no product; jobs; store, jobs <- tiles; {http, tiles} <- {telemetry, query} <- api <- documents
-# <- handlers <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve, mesh, info} <- cli.
+# net <- http, which know no product; jobs; store, jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api};
+# {telemetry, api} <- edge; {query, api} <- documents <- handlers; {edge, handlers} <- server <- cli, and tiles <- reload
+# <- cli. In the command line common <- {serve, mesh, info} <- cli.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
@@ -39,8 +40,10 @@ DOORS = {front + "/" + name: front for front, names in {
 }.items() for name in names}
 # Plain values that the configuration holds as they are: of these rooms config may include nothing else.
 VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
-API = ENGINE + ["server/jobs", "server/net", "server/http", "server/store", "server/tiles", "server/telemetry", "server/query"]
-SERVER = API + ["server/api", "server/documents", "server/handlers"]
+HTTP = ["server/net", "server/http"]
+TILES = ENGINE + ["server/jobs", "server/tiles"]
+API = TILES + HTTP + ["server/api"]
+SERVER = API + ["server/store", "server/telemetry", "server/query", "server/edge", "server/documents", "server/handlers"]
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
@@ -60,12 +63,13 @@ ROOMS = {
     "server/net": ["engine/core", "server/asio.h"],
     "server/http": ["engine/core", "server/asio.h", "server/net"],
     "server/store": ["engine/core", "config", "tiler"],
-    "server/tiles": ENGINE + ["server/jobs", "server/store"],
-    "server/telemetry": ENGINE + ["server/net", "server/http", "server/tiles", "server/jobs", "server/store"],
+    "server/tiles": ENGINE + ["server/jobs"],
+    "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
-    "server/api": API,
-    "server/documents": API + ["server/api"],
-    "server/handlers": API + ["server/api", "server/documents"],
+    "server/api": TILES + HTTP,
+    "server/edge": API + ["server/telemetry"],
+    "server/documents": API,
+    "server/handlers": API + ["server/query", "server/documents"],
     "server/reload": ENGINE + ["server/tiles"],
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],

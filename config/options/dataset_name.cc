@@ -1,5 +1,3 @@
-#include "config/options/dataset_name.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 
 #include "config/config.h"
 #include "config/input/json_text.h"
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {

@@ -1,8 +1,5 @@
 // The table of options of one dataset.
-#include "config/options/dataset_name.h"
-#include "config/options/layer_options.h"
 #include "config/options/option_table.h"
-#include "config/options/source_options.h"
 
 namespace terrace::config {
 namespace {

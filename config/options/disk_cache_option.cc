@@ -1,20 +1,10 @@
-#include "config/options/disk_cache_option.h"
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {
 
 constexpr std::int64_t kMaxBytes = std::int64_t{1} << 40;
 constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // the smallest size for which a store has several files
-
-Codec<DiskCacheConfig> Directory() {
-  return {[](const Json& value, const Place& place, DiskCacheConfig& cache) {
-            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of a directory");
-            }
-            cache.directory = place.Resolve(value.get<std::string>());
-          },
-          [](const DiskCacheConfig& cache) { return Json(cache.directory); }, TextToJson, Json::parse(kNonEmptyText)};
-}
 
 Codec<DiskCacheConfig> FileBytes(std::size_t DiskCacheConfig::*member) {
   Codec<DiskCacheConfig> codec = Bytes(member, kMaxBytes);
@@ -36,7 +26,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
        .help = "Directory of the cache; one server at a time uses it",
        .details = "Made if it is missing; best one that holds nothing else. A second server that names it does not "
                   "start",
-       .codec = Directory(),
+       .codec = Path(&DiskCacheConfig::directory, "the path of a directory"),
        .missing = ": where the cache is kept"},
       {.key = "tile_bytes",
        .value = "BYTES",

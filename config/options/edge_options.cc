@@ -1,5 +1,3 @@
-#include "config/options/edge_options.h"
-
 #include <arpa/inet.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <string_view>
 
 #include "config/common/token_hash.h"
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {

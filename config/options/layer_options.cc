@@ -1,6 +1,6 @@
-#include "config/options/layer_options.h"
-
 #include <cmath>
+
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {
@@ -38,16 +38,6 @@ Json WriteWater(const DatasetConfig& dataset) {
   return dataset.water.mask.empty() ? Json() : Json{{"mask", dataset.water.mask}};
 }
 
-Codec<ImageryConfig> ImageryImage() {
-  return {[](const Json& value, const Place& place, ImageryConfig& imagery) {
-            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of an image");
-            }
-            imagery.image = place.Resolve(value.get<std::string>());
-          },
-          [](const ImageryConfig& imagery) { return Json(imagery.image); }, TextToJson, Json::parse(kNonEmptyText)};
-}
-
 constexpr const char* kWaterSchema = R"({
   "type": "object", "additionalProperties": false, "minProperties": 1, "maxProperties": 1,
   "properties": {"mask": {"type": "string", "minLength": 1}, "sea_level": {"type": "number"}},
@@ -67,7 +57,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
       {.key = "image",
        .value = "FILE",
        .help = "Georeferenced image that GDAL can read: grey, RGB or a palette",
-       .codec = ImageryImage(),
+       .codec = Path(&ImageryConfig::image, "the path of an image"),
        .missing = ": the path of an image"},
       {.key = "attribution",
        .value = "TEXT",

@@ -162,6 +162,17 @@ Codec<Target> Text(std::string Target::*member, const std::function<std::string(
           [=](const Target& target) { return Json(target.*member); }, TextToJson, std::move(schema)};
 }
 
+// `what`: "the path of a directory". A relative path begins at the file's folder.
+template <typename Target>
+Codec<Target> Path(std::string Target::*member, const char* what) {
+  return {[=](const Json& value, const Place& place, Target& target) {
+            if (!value.is_string() || value.get_ref<const std::string&>().empty()) return place.Expected(what);
+            target.*member = place.Resolve(value.get<std::string>());
+          },
+          [=](const Target& target) { return (target.*member).empty() ? Json() : Json(target.*member); }, TextToJson,
+          Json::parse(kNonEmptyText)};
+}
+
 template <typename Target>
 Codec<Target> OneLine(std::string Target::*member) {
   return Text(member, CheckOneLine, TextLike(kOneLinePattern));

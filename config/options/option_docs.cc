@@ -7,12 +7,8 @@
 #include <map>
 #include <vector>
 
-#include "config/options/disk_cache_option.h"
-#include "config/options/edge_options.h"
-#include "config/options/layer_options.h"
 #include "config/options/option_table.h"
 #include "config/options/options.h"
-#include "config/options/source_options.h"
 
 namespace terrace::config {
 namespace {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "config/options/unknown_key.h"
-
 namespace terrace::config {
 
 template <typename Target>

@@ -3,6 +3,7 @@
 // generated from them; a new option is one row (CONTRIBUTING.md). For this module only.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -58,5 +59,62 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 // Returns the JSON Schema of the object.
 template <typename Target>
 Json ObjectSchema(const std::vector<Option<Target>>& table);
+
+// dataset_name.cc
+// First path segments of the server's own URLs.
+std::span<const std::string_view> ReservedDatasetNames();
+
+// unknown_key.cc
+// Returns a sentence for the error at the key. `known`: the keys of its object. If another kind of object has the key,
+// the sentence says where it belongs; else it names similar keys. Empty: the key resembles no known one, and no message
+// may quote it.
+std::string ExplainKey(std::string_view key, std::span<const KnownName> known);
+
+// source_options.cc
+// ["dem.tif", {"path": "other.tif", "vertical": "egm96"}]
+Codec<DatasetConfig> SourcesCodec();
+
+// The options of an entry that is an object.
+const std::vector<Option<SourceConfig>>& SourceOptionTable();
+
+// "crs", "unknown", "ellipsoid", "egm96", "egm2008", "EPSG:5703", or the path of a grid.
+Codec<DatasetConfig> VerticalCodec();
+
+// "auto", "declared", a number or a list of numbers.
+Codec<DatasetConfig> NodataCodec();
+
+// A list of texts. `is_path`: the texts are paths, relative to the folder of the file. As a flag: texts separated by
+// commas.
+Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path);
+
+// layer_options.cc
+// {"mask": "water.tif"} or {"sea_level": 0}. As a flag: a number is a sea level, any other text the path of a mask.
+Codec<DatasetConfig> WaterCodec();
+
+// {"image": "photo.tif", "attribution": ..., ...}. As a flag: only the path.
+Codec<DatasetConfig> ImageryCodec();
+
+const std::vector<Option<ImageryConfig>>& ImageryOptionTable();
+
+// disk_cache_option.cc
+// {"directory": "/var/cache/terrace", "tile_bytes": ..., ...}. As a flag: only the directory.
+Codec<Config> DiskCacheOption();
+
+const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();
+
+// edge_options.cc
+// [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag, because command lines are not secret.
+Codec<Config> TokensCodec();
+
+const std::vector<Option<TokenConfig>>& TokenOptionTable();
+
+// {"certificate": "server.pem", "key": "server.key"}. As a flag: the two paths, separated by a comma.
+Codec<Config> TlsCodec();
+
+// ["https://maps.example"], ["*"] or []. As a flag: with commas between them.
+Codec<Config> OriginsCodec();
+
+// ["10.0.0.0/8", "::1"]. As a flag: with commas between them.
+Codec<Config> ProxiesCodec();
 
 }  // namespace terrace::config

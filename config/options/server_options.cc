@@ -1,10 +1,7 @@
 // The table of options at the top of the configuration file.
 #include <algorithm>
 
-#include "config/options/disk_cache_option.h"
-#include "config/options/edge_options.h"
 #include "config/options/option_table.h"
-#include "config/options/source_options.h"
 
 namespace terrace::config {
 namespace {
@@ -68,17 +65,6 @@ Codec<Config> CacheDir() {
           },
           [=](const Config& config) { return Json(config.cache_dir.empty() ? kNone : config.cache_dir); }, TextToJson,
           Json::parse(R"({"type": "string", "examples": ["/var/cache/terrace/sources", "default", "none"]})")};
-}
-
-Codec<Config> AccessLogFile() {
-  return {[](const Json& value, const Place& place, Config& config) {
-            if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-              return place.Expected("the path of a file");
-            }
-            config.access_log_file = place.Resolve(value.get<std::string>());
-          },
-          [](const Config& config) { return config.access_log_file.empty() ? Json() : Json(config.access_log_file); },
-          TextToJson, Json::parse(kNonEmptyText)};
 }
 
 Codec<Config> Datasets() {
@@ -402,7 +388,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "log",
        .help = "File that a combined or json access log is appended to; by default stderr",
        .details = "Relative to the folder of the configuration file. SIGHUP opens it anew",
-       .codec = AccessLogFile()},
+       .codec = Path(&Config::access_log_file, "the path of a file")},
   };
   return table;
 }

@@ -1,10 +1,9 @@
-#include "config/options/source_options.h"
-
 #include <algorithm>
 #include <array>
 #include <filesystem>
 
 #include "config/input/source_paths.h"
+#include "config/options/option_table.h"
 
 namespace terrace::config {
 namespace {

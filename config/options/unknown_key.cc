@@ -1,15 +1,10 @@
-#include "config/options/unknown_key.h"
 
 #include <fmt/format.h>
 
 #include <array>
 #include <vector>
 
-#include "config/options/disk_cache_option.h"
-#include "config/options/edge_options.h"
-#include "config/options/layer_options.h"
 #include "config/options/option_table.h"
-#include "config/options/source_options.h"
 
 namespace terrace::config {
 namespace {

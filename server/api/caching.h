@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 
 namespace terrace::server {
 

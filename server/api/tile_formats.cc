@@ -1,12 +1,20 @@
 #include "server/api/tile_formats.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
 #include <iterator>
+#include <limits>
+#include <utility>
 
 #include "engine/core/check.h"
-#include "proto/media_type.h"
+#include "engine/geo/error_ladder.h"
+#include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
-#include "server/api/negotiate.h"
-#include "server/query/query.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
@@ -85,13 +93,192 @@ constexpr TileFormat kFormats[] = {
     {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng},
 };
 
+// If `repeatable`, a parameter may be repeated with the same value.
+template <typename T>
+Result<void> SetOnce(std::optional<T>& to, T value, const char* name, bool repeatable) {
+  if (to && !(repeatable && *to == value)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
+  }
+  to = value;
+  return {};
+}
+
+Result<void> SetPositive(std::optional<double>& to, const char* name, std::string_view text, bool repeatable) {
+  const std::optional<double> value = PositiveNumber(text);
+  if (!value) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
+  return SetOnce(to, *value, name, repeatable);
+}
+
+Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
+  constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
+      {"draco", proto::GlbCompression::kDraco},
+      {"none", proto::GlbCompression::kNone},
+      {"quantized", proto::GlbCompression::kQuantized},
+      {"meshopt", proto::GlbCompression::kMeshopt}};
+  for (const auto& [name, compression] : kNames) {
+    if (text == name) return SetOnce(to, compression, "compression", /*repeatable=*/true);
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
+}
+
+Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
+  constexpr std::pair<std::string_view, proto::TextureFormat> kNames[] = {{"none", proto::TextureFormat::kNone},
+                                                                          {"jpeg", proto::TextureFormat::kJpeg},
+                                                                          {"webp", proto::TextureFormat::kWebp}};
+  for (const auto& [name, texture] : kNames) {
+    if (text == name) return SetOnce(to, texture, "texture", /*repeatable=*/true);
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
+}
+
+Result<void> CheckTogether(const RequestedError& requested) {
+  if (requested.error_m && requested.fraction) {
+    return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
+  }
+  if (requested.at_least && !requested.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  return {};
+}
+
+constexpr std::string_view kBlanksAndQuotes = " \t\"";
+
+// The coding of a name; nothing if it is not supported.
+std::optional<tiler::Coding> CodingOf(std::string_view name) {
+  if (EqualsIgnoringCase(name, "identity")) return tiler::Coding::kIdentity;
+  if (EqualsIgnoringCase(name, "x-gzip")) return tiler::Coding::kGzip;
+  for (const tiler::Coding coding : tiler::kCodings) {
+    if (EqualsIgnoringCase(name, tiler::NameOf(coding))) return coding;
+  }
+  return std::nullopt;
+}
+
+// A malformed quality, or one outside 0 .. 1, counts as 0.
+double Quality(std::string_view parameters) {
+  while (!parameters.empty()) {
+    const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
+    if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
+    double quality = 0;
+    const char* const last = parameter.data() + parameter.size();
+    const auto [end, error] = std::from_chars(parameter.data() + 2, last, quality, std::chars_format::fixed);
+    return error == std::errc() && end == last && quality >= 0 && quality <= 1 ? quality : 0;
+  }
+  return 1;
+}
+
 }  // namespace
 
-const TileFormat& RowOf(tiler::TileFormat format) {
-  for (const TileFormat& row : kFormats) {
-    if (row.format == format) return row;
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  TileParameters parameters;
+  RequestedError& requested = parameters.requested;
+  bool at_least_given = false;
+  const bool repeatable = allow_compression;
+  for (const auto& [name, value] : *sent) {
+    Result<void> set;
+    if (name == "v") continue;
+    if (name == "extensions") {
+      parameters.extensions.push_back(value);
+    } else if (name == "error") {
+      set = SetPositive(requested.error_m, "error", value, repeatable);
+    } else if (name == "fraction") {
+      set = SetPositive(requested.fraction, "fraction", value, repeatable);
+    } else if (name == "atleast" && allow_at_least) {
+      if (at_least_given) return MakeError(ErrorCode::kInvalidArgument, "atleast is given more than once");
+      if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
+      at_least_given = true;
+      requested.at_least = value == "1";
+    } else if (name == "compression" && allow_compression) {
+      set = SetCompression(parameters.compression, value);
+    } else if (name == "texture" && allow_compression) {
+      set = SetTexture(parameters.texture, value);
+    } else {
+      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
+                      allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression, texture" : "");
+    }
+    if (!set) return tl::unexpected(set.error());
   }
-  TERRACE_CHECK(false);
+  if (const Result<void> fits = CheckTogether(requested); !fits) return tl::unexpected(fits.error());
+  return parameters;
+}
+
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  std::optional<proto::HeightEncoding> encoding;
+  std::optional<int> size;
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    if (name == "encoding") {
+      if (encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding is given more than once");
+      if (value == "mapbox") encoding = proto::HeightEncoding::kMapbox;
+      if (value == "terrarium") encoding = proto::HeightEncoding::kTerrarium;
+      if (!encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding must be mapbox or terrarium");
+    } else if (name == "size") {
+      if (size) return MakeError(ErrorCode::kInvalidArgument, "size is given more than once");
+      if (value == "256") size = 256;
+      if (value == "512") size = 512;
+      if (!size) return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+    } else {
+      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are encoding, size");
+    }
+  }
+  HeightTileParameters parameters;
+  parameters.encoding = encoding.value_or(parameters.encoding);
+  parameters.size = size.value_or(parameters.size);
+  return parameters;
+}
+
+tiler::Coding NegotiateCoding(std::string_view accept_encoding, std::span<const tiler::Coding> offered) {
+  constexpr std::size_t kKnown = 1 + tiler::kCodings.size();
+  std::array<std::optional<double>, kKnown> named;  // qualities, by coding
+  std::optional<double> any;
+  while (!accept_encoding.empty()) {
+    std::string_view item = NextPiece(accept_encoding, ',', kBlanksAndQuotes);
+    const std::string_view name = NextPiece(item, ';', kBlanksAndQuotes);
+    const double quality = Quality(item);
+    if (name == "*") {
+      any = quality;
+    } else if (const std::optional<tiler::Coding> coding = CodingOf(name)) {
+      std::optional<double>& known = named[static_cast<std::size_t>(*coding)];
+      known = std::max(known.value_or(0), quality);
+    }
+  }
+  // Identity is acceptable if it is not mentioned, but only if no other coding is.
+  tiler::Coding best = tiler::Coding::kIdentity;
+  double most = named[static_cast<std::size_t>(tiler::Coding::kIdentity)].value_or(0);
+  for (const tiler::Coding coding : offered) {
+    const double quality = named[static_cast<std::size_t>(coding)].value_or(any.value_or(0));
+    if (quality <= 0 || quality < most || (quality == most && best != tiler::Coding::kIdentity)) continue;
+    best = coding;
+    most = quality;
+  }
+  return best;
+}
+
+proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions) {
+  proto::TileExtensions wanted = proto::ExtensionsInAccept(accept);
+  for (const std::string& names : query_extensions) wanted = wanted | proto::ParseExtensions(names);
+  return wanted;
+}
+
+int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction) {
+  if (requested.fraction) {
+    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
+    const double error_m = std::clamp(*requested.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
+                                      std::numeric_limits<double>::max());
+    return geo::SnapToLadder(level, error_m, error_fraction);
+  }
+  if (!requested.error_m) return 0;
+  const int step = geo::SnapToLadder(level, *requested.error_m, error_fraction);
+  // max(error, default): steps above 0 are finer than the default.
+  return requested.at_least && !is_deepest ? std::min(step, 0) : step;
+}
+
+Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    if (datasets[i].name == name) return static_cast<std::uint32_t>(i);
+  }
+  return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
 
 const TileFormat* CutSuffix(std::string_view& name) {
@@ -101,6 +288,40 @@ const TileFormat* CutSuffix(std::string_view& name) {
     return &row;
   }
   return nullptr;
+}
+
+Result<TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets) {
+  const Route& route = call.route;
+  const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
+  if (!dataset) return tl::unexpected(dataset.error());
+  TileRequest tile;
+  tile.dataset = *dataset;
+  tile.key = route.key;
+  tile.format = route.format->format;
+  if (Result<void> read = route.format->read(route.query, *call.request->fields, datasets[*dataset], tile); !read) {
+    return tl::unexpected(std::move(read.error()));
+  }
+  return tile;
+}
+
+tiler::HeadLines MakeTileHead(const TileRequest& request, const tiler::EncodedTile& tile) {
+  const auto* const row = std::ranges::find(kFormats, request.format, &TileFormat::format);
+  TERRACE_CHECK(row != std::end(kFormats));
+  tiler::HeadLines head;
+  const auto put = [to = std::back_inserter(head.text)](std::string_view name, const auto& value) {
+    fmt::format_to(to, "{}: {}\r\n", name, value);
+  };
+  put("Content-Type", row->media_type(request));
+  if (request.coding != tiler::Coding::kIdentity) put("Content-Encoding", tiler::NameOf(request.coding));
+  put("Content-Length", tile.bytes.size());
+  head.of_body = head.text.size();
+  if (!tile.etag.empty()) put("ETag", tile.etag);
+  put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
+  if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {
+    put("Terrain-Certified-Error", proto::FormatErrorUp(*tile.certified_error_m));
+  }
+  head.text.shrink_to_fit();
+  return head;
 }
 
 }  // namespace terrace::server

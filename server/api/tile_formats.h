@@ -1,15 +1,53 @@
-// The tile formats: one row each. tiler::TilePipeline builds and encodes tiles; it selects the encoder by the row's
-// `format`.
+// The tile formats, one row each: how a URL names one, what a request asks of it, and how a reply describes it. And
+// what all formats share: parameters, codings, errors. tiler::EncoderOf has the rows of how they are made.
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "engine/core/result.h"
-#include "server/http/request.h"
-#include "server/tiles/dataset_view.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
+#include "proto/media_type.h"
+#include "server/api/call.h"
+#include "server/tiles/catalog.h"
+#include "tiler/encoded_tile.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::server {
+
+// The geometric error that a client requests; all members are optional.
+struct RequestedError {
+  std::optional<double> error_m;   // finite, > 0
+  std::optional<double> fraction;  // of the level's error; finite, > 0
+  bool at_least = false;           // error_m is the minimum of the default errors
+};
+
+struct TileParameters {
+  RequestedError requested;
+  std::vector<std::string> extensions;  // every `extensions` value
+  std::optional<proto::GlbCompression> compression;
+  std::optional<proto::TextureFormat> texture;
+};
+
+// Parses the parameters of URLs of tiles (`allow_at_least`), of .glb tiles (`allow_compression`) and of layer.json. `v`
+// and `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
+// below it, so error, fraction, compression and texture may be repeated there with the same value. kInvalidArgument,
+// with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
+// or an invalid value.
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
+
+struct HeightTileParameters {
+  proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
+  int size = tiler::kHeightSizes[0];
+};
+
+// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 struct TileFormat {
   tiler::TileFormat format;
@@ -23,10 +61,33 @@ struct TileFormat {
                        tiler::TileRequest& tile);
 };
 
-const TileFormat& RowOf(tiler::TileFormat format);
-
 // Removes the suffix of a tile's URL from its last segment, and returns the row of the format; null if no suffix
 // matches.
 const TileFormat* CutSuffix(std::string_view& name);
+
+// From a route and a request's headers to a canonical request. kNotFound: no such dataset, or the tile lies outside
+// what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
+Result<tiler::TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets);
+
+// The dataset's index, or kNotFound.
+Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
+
+// The coding in `offered` with the highest quality, if that is at least the quality of identity; among equals the
+// first. Without Accept-Encoding: identity.
+tiler::Coding NegotiateCoding(std::string_view accept_encoding,
+                              std::span<const tiler::Coding> offered = tiler::kCodings);
+
+// The extensions named by `extensions=a-b` parameters anywhere in Accept and by the query's values. Unknown names are
+// ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
+proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
+
+// The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
+// of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
+int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
+
+// The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
+// Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is what answers
+// `request`.
+tiler::HeadLines MakeTileHead(const tiler::TileRequest& request, const tiler::EncodedTile& tile);
 
 }  // namespace terrace::server

@@ -3,10 +3,18 @@
 #include <utility>
 
 #include "proto/compress.h"
-#include "server/api/negotiate.h"
+#include "server/api/tile_formats.h"
+#include "server/http/http_error.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::server {
+namespace {
+
+tiler::Coding CodingFor(const Request& request) {
+  return NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly);
+}
+
+}  // namespace
 
 Document Document::Make(std::string bytes, std::string_view content_type, std::optional<std::string> gzipped) {
   Document document;
@@ -20,8 +28,7 @@ Document Document::Make(std::string bytes, std::string_view content_type, std::o
 }
 
 Response Serve(const Document& document, const Request& request, std::string_view cache_control) {
-  const bool gzip =
-      document.gzip && NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly) == tiler::Coding::kGzip;
+  const bool gzip = document.gzip && CodingFor(request) == tiler::Coding::kGzip;
   Response response;
   response.content_type = document.content_type;
   response.content_encoding = gzip ? tiler::NameOf(tiler::Coding::kGzip) : std::string_view();
@@ -30,6 +37,59 @@ Response Serve(const Document& document, const Request& request, std::string_vie
   response.cache_control = cache_control;
   if (document.gzip) response.vary = "Accept-Encoding";
   return Conditional(std::move(response), request);
+}
+
+Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop) {
+  std::string bytes = write(stop);
+  MadeDocument made;
+  if (coding == tiler::Coding::kGzip) {
+    std::string compressed = proto::Gzip(bytes, proto::kGzipLevel, stop);
+    if (compressed.size() < bytes.size()) {
+      made.coding = tiler::Coding::kGzip;
+      bytes = std::move(compressed);
+    }
+  }
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the document any more");
+  made.etag = tiler::StrongETag(bytes);
+  made.body = std::make_shared<const std::string>(std::move(bytes));
+  return made;
+}
+
+Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request) {
+  Response response;
+  response.content_type = plan.content_type;
+  response.content_encoding = tiler::NameOf(made.coding);
+  response.body = made.body;
+  response.etag = made.etag;
+  response.cache_control = plan.cache_control;
+  response.vary = "Accept-Encoding";
+  response.for_grant = plan.for_grant;
+  return Conditional(std::move(response), request);
+}
+
+DocumentMaker::DocumentMaker(CatalogPtr catalog, TileService& workers, std::chrono::milliseconds deadline)
+    : catalog_(std::move(catalog)), workers_(workers), deadline_(deadline) {}
+
+Answer DocumentMaker::Make(Described described, const Call& call) const {
+  auto* plan = std::get_if<DocumentPlan>(&described);
+  if (plan == nullptr) return std::get<Response>(std::move(described));
+  const tiler::Coding coding = CodingFor(*call.request);
+  if (const auto kept = kept_.Find(Key{plan->key, coding})) return Serve(*kept, *plan, *call.request);
+  return MakeAside(std::move(*plan), coding, call);
+}
+
+asio::awaitable<Response> DocumentMaker::MakeAside(DocumentPlan plan, tiler::Coding coding, const Call& call) const {
+  // The waiting request may end before the worker does.
+  Work<MadeDocument> work = [catalog = catalog_, write = plan.write, coding](const std::stop_token& stop) {
+    return MakeDocument(write, coding, stop);
+  };
+  const auto deadline = TileService::Clock::now() + deadline_;
+  Result<MadeDocument> document =
+      co_await workers_.Run(std::move(work), TileService::Length::kShort, deadline, call.request->client);
+  if (!document) co_return co_await BackendFailure(document.error(), call.request->id);
+  const auto made = std::make_shared<const MadeDocument>(*std::move(document));
+  kept_.Insert(Key{plan.key, coding}, made);
+  co_return Serve(*made, plan, *call.request);
 }
 
 }  // namespace terrace::server

@@ -1,12 +1,28 @@
-// A document that is prepared in advance, in both codings, with its ETags: layer.json, /datasets, the viewer's files.
+// Documents in two forms. Those prepared in advance have both codings and their ETags: layer.json, /datasets, the
+// viewer's files. Those that depend on a request's parameters are made on a worker, because even short ones may take
+// longer than a cached tile (a subtree needs the heights of hundreds of tiles), and cached for a while.
 #pragma once
 
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
+#include <variant>
 
+#include "engine/core/result.h"
+#include "server/api/call.h"
+#include "server/asio.h"
+#include "server/http/application.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
+#include "server/tiles/catalog.h"
+#include "server/tiles/tile_service.h"
+#include "tiler/store/byte_cache.h"
 
 namespace terrace::server {
 
@@ -22,5 +38,69 @@ struct Document {
 
 // Returns the document in the coding that the request prefers; 304 if the client already has it.
 Response Serve(const Document& document, const Request& request, std::string_view cache_control);
+
+struct DocumentPlan {
+  // Called on any thread. Refers only to the catalog and to its own captures. Long writers check the stop token; the
+  // result is discarded after a stop.
+  using Write = std::function<std::string(const std::stop_token&)>;
+
+  std::string key;                 // equal only for equal documents of one catalog; contains no token
+  std::string_view content_type;   // a literal
+  std::string_view cache_control;  // outlives the request
+  bool for_grant = false;          // as in Response
+  Write write;
+};
+
+// The result of a handler of documents: a reply, or a plan to make one.
+using Described = std::variant<Response, DocumentPlan>;
+
+// A document in one coding.
+struct MadeDocument {
+  Body body;
+  tiler::Coding coding = tiler::Coding::kIdentity;
+  std::string etag;
+};
+inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
+
+// `coding`: kGzip falls back to identity if that is not larger. Bytes and ETag are equal to those of a Document with
+// the same text. kCancelled: a stop was requested.
+Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop);
+
+// Like Serve for a Document.
+Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);
+
+// Thread-safe.
+class DocumentMaker {
+ public:
+  // Size of the cache. The least recently used documents are evicted first.
+  static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
+
+  // `workers` must outlive this object. All plans refer to `catalog`. `deadline`: of making a document.
+  DocumentMaker(CatalogPtr catalog, TileService& workers, std::chrono::milliseconds deadline);
+
+  // Returns cached documents at once. This object and `call` must outlive the answer.
+  Answer Make(Described described, const Call& call) const;
+
+ private:
+  struct Key {
+    std::string text;
+    tiler::Coding coding = tiler::Coding::kIdentity;
+    std::uint64_t generation = 0;  // all documents belong to one catalog
+
+    friend bool operator==(const Key&, const Key&) = default;
+  };
+  struct KeyHash {
+    std::size_t operator()(const Key& key) const noexcept {
+      return std::hash<std::string>{}(key.text) ^ static_cast<std::size_t>(key.coding);
+    }
+  };
+
+  asio::awaitable<Response> MakeAside(DocumentPlan plan, tiler::Coding coding, const Call& call) const;
+
+  const CatalogPtr catalog_;
+  TileService& workers_;
+  const std::chrono::milliseconds deadline_;
+  mutable tiler::ByteCache<Key, KeyHash, MadeDocument> kept_{kKeptBytes};
+};
 
 }  // namespace terrace::server

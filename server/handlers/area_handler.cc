@@ -1,5 +1,3 @@
-#include "server/handlers/area_handler.h"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -10,14 +8,11 @@
 #include <utility>
 
 #include "proto/error_text.h"
-#include "server/api/backend_failure.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
-#include "server/api/tile_head.h"
-#include "server/handlers/tile_handler.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
-#include "server/query/query.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::server {
@@ -99,6 +94,35 @@ std::string FormatOrigin(const dem::GeoPosition& centre) {
   return fmt::format("{},{},0", centre.latitude, longitude);
 }
 
+// `response`: complete except for what depends on the mesh.
+asio::awaitable<Response> BuildArea(const Handlers& from, const Call& call, std::uint32_t dataset,
+                                    tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
+                                    Response response) {
+  Work<tiler::EncodedTile> work = [catalog = from.catalog, dataset, area, plan, coding,
+                                   asked =
+                                       TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
+    const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
+    Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
+    if (!mesh) return mesh;
+    mesh->times.queue = queued;
+    if (coding == tiler::Coding::kIdentity) return mesh;
+    mesh->bytes = tiler::Compress(std::move(mesh->bytes), coding, stop);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
+    return mesh;
+  };
+  const auto deadline = from.Deadline();
+  Result<tiler::EncodedTile> mesh =
+      co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, call.request->client);
+  if (!mesh) co_return co_await BackendFailure(mesh.error(), call.request->id);
+  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
+  if (area.coordinates == tiler::AreaCoordinates::kEnu) {
+    response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));
+  }
+  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", mesh->times));
+  response.body = std::make_shared<const std::string>(std::move(mesh->bytes));
+  co_return response;
+}
+
 }  // namespace
 
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
@@ -127,55 +151,25 @@ Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
   return area;
 }
 
-AreaHandler::AreaHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
-    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
-
-Answer AreaHandler::Handle(const Call& call) const {
+Answer AnswerArea(const Handlers& from, const Call& call) {
   const Request& request = *call.request;
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, catalog_->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<tiler::AreaRequest> area = ParseAreaRequest(call.route.query);
   if (!area) return ClientErrorResponse(area.error(), request.id);
-  const Result<tiler::AreaPlan> plan = catalog_->area_mesher.plan(*dataset, *area);
+  const Result<tiler::AreaPlan> plan = from.catalog->pipeline->PlanArea(*dataset, *area, from.max_mesh_samples);
   if (!plan) return ClientErrorResponse(plan.error(), request.id);
 
-  const DatasetView& view = catalog_->datasets[*dataset];
+  const DatasetView& view = from.catalog->datasets[*dataset];
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
   response.content_encoding = tiler::NameOf(coding);
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, call.route.query, coding);
-  response.cache_control = CacheControlOf(call.route.query, view, options_.cache_control);
+  response.cache_control = CacheControlOf(call.route.query, view, from.cache_control);
   response.vary = "Accept-Encoding";
   if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
-  return Build(call, *dataset, *area, *plan, coding, std::move(response));
-}
-
-// `response`: complete except for what depends on the mesh.
-asio::awaitable<Response> AreaHandler::Build(const Call& call, std::uint32_t dataset, tiler::AreaRequest area,
-                                             tiler::AreaPlan plan, tiler::Coding coding, Response response) const {
-  Work<tiler::EncodedTile> work = [catalog = catalog_, dataset, area, plan, coding, asked = TileService::Clock::now()](
-                                      std::stop_token stop) -> Result<tiler::EncodedTile> {
-    const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
-    Result<tiler::EncodedTile> mesh = catalog->area_mesher.build(dataset, plan, area, stop);
-    if (!mesh) return mesh;
-    mesh->times.queue = queued;
-    if (coding == tiler::Coding::kIdentity) return mesh;
-    mesh->bytes = tiler::Compress(std::move(mesh->bytes), coding, stop);
-    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
-    return mesh;
-  };
-  const auto deadline = TileService::Clock::now() + options_.deadline;
-  Result<tiler::EncodedTile> mesh =
-      co_await tiles_.Run(std::move(work), TileService::Length::kLong, deadline, call.request->client);
-  if (!mesh) co_return co_await BackendFailure(mesh.error(), call.request->id, options_.refusal_delay);
-  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
-  if (area.coordinates == tiler::AreaCoordinates::kEnu) {
-    response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));
-  }
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, mesh->times));
-  response.body = std::make_shared<const std::string>(std::move(mesh->bytes));
-  co_return response;
+  return BuildArea(from, call, *dataset, *area, *plan, coding, std::move(response));
 }
 
 }  // namespace terrace::server

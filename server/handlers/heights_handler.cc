@@ -1,23 +1,36 @@
-#include "server/handlers/heights_handler.h"
-
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <span>
+#include <stop_token>
 #include <utility>
+#include <vector>
 
 #include "proto/error_text.h"
-#include "server/api/backend_failure.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
-#include "server/handlers/tile_handler.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::server {
 namespace {
+
+// A point on the edge between two tiles belongs to the eastern and to the northern tile.
+geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
+  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+  const auto number = [side](double degrees, std::int64_t count) {
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(degrees / side)), 0, count - 1);
+  };
+  const double longitude = point.longitude == 180 ? -180 : point.longitude;
+  return {level, number(longitude + 180, geo::TileColumns(level)), number(point.latitude + 90, geo::TileRows(level))};
+}
 
 // Thousands of points, and geodesics between them, take a tenth of a second, which would block the io thread. A query
 // of at most this many bytes has a few points and is parsed in microseconds.
@@ -30,24 +43,15 @@ constexpr std::size_t kShortList = 1000;
 // Points written between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 1024;
 
-}  // namespace
+// The result of a job.
+struct Made {
+  std::string bytes;  // in the reply's coding
+  tiler::StageTimes times;
+};
 
-HeightsHandler::HeightsHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
-    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
-
-Answer HeightsHandler::Handle(const Call& call) const {
-  const Request& request = *call.request;
-  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
-    return ProblemResponse(415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded",
-                           request.id);
-  }
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, catalog_->datasets);
-  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  return Read(call, *dataset);
-}
-
-asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Call& call,
-                                                                 TileService::Clock::time_point deadline) const {
+// Parses on a worker, unless the input is small.
+asio::awaitable<Result<HeightsQuery>> ParseAside(const Handlers& from, const Call& call,
+                                                 TileService::Clock::time_point deadline) {
   const Request& request = *call.request;
   const std::string& query = call.route.query;
   const bool is_post = request.method == Method::kPost;
@@ -55,23 +59,52 @@ asio::awaitable<Result<HeightsQuery>> HeightsHandler::ParseAside(const Call& cal
   const bool may_be_path = query.find("path") != std::string::npos;
   if (!is_post && query.size() <= kQuickQuery && !may_be_path) {
     const HeightsInput input{query, {}, {}};
-    co_return ParseHeights(input, options_.max_locations);
+    co_return ParseHeights(input, from.max_locations);
   }
   const std::string_view type = is_post ? request.fields->content_type : std::string_view();
   Work<HeightsQuery> parse = [query, type = std::string(type), body = request.body,
-                              most = options_.max_locations](const std::stop_token& stop) {
+                              most = from.max_locations](const std::stop_token& stop) {
     return ParseHeights({query, type, body}, most, stop);
   };
-  co_return co_await tiles_.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
+  co_return co_await from.tiles.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
 }
 
-asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t dataset) const {
+asio::awaitable<Result<ServedTile>> TileOf(const Handlers& from, tiler::TileRequest tile,
+                                           TileService::Clock::time_point deadline, std::uint64_t client) {
+  if (std::optional<ServedTile> found = from.tiles.Find(*from.catalog, tile)) co_return *std::move(found);
+  co_return co_await from.tiles.Build(from.catalog, tile, deadline, client);
+}
+
+// Gets the certified errors of the points' tiles one after the other, from the cache or by building the tiles.
+asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& from, std::uint32_t dataset, const HeightsQuery& query,
+                                                 TileService::Clock::time_point deadline, std::uint64_t client) {
+  // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
+  Work<CertifiedPoints> find = [catalog = from.catalog, dataset, wanted = query.points,
+                                level = *query.certify_level](const std::stop_token& stop) {
+    return TilesOf(catalog->datasets[dataset], wanted, level, stop);
+  };
+  Result<CertifiedPoints> points =
+      co_await from.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
+  if (!points) co_return points;
+  for (std::size_t i = 0; i < points->tiles.size(); ++i) {
+    tiler::TileRequest tile;
+    tile.dataset = dataset;
+    tile.key = points->tiles[i];
+    tile.coding = tiler::Coding::kGzip;  // the format that is most probably cached
+    const Result<ServedTile> served = co_await TileOf(from, tile, deadline, client);
+    if (!served) co_return tl::unexpected(served.error());
+    points->errors_m[i] = served->tile->certified_error_m;
+  }
+  co_return points;
+}
+
+asio::awaitable<Response> ReadHeights(const Handlers& from, const Call& call, std::uint32_t dataset) {
   const Request& request = *call.request;
-  const DatasetView& view = catalog_->datasets[dataset];
-  const auto deadline = TileService::Clock::now() + options_.deadline;
-  Result<HeightsQuery> parsed = co_await ParseAside(call, deadline);
+  const DatasetView& view = from.catalog->datasets[dataset];
+  const auto deadline = from.Deadline();
+  Result<HeightsQuery> parsed = co_await ParseAside(from, call, deadline);
   if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
-    co_return co_await BackendFailure(parsed.error(), request.id, options_.refusal_delay);
+    co_return co_await BackendFailure(parsed.error(), request.id);
   }
   if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
   if (parsed->datum == dem::HeightDatum::kOrthometric && !view.has_datum) {
@@ -91,7 +124,7 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
     // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
     response.cache_control =
-        is_versioned ? CacheControlOf(call.route.query, view, options_.cache_control) : options_.cache_control;
+        is_versioned ? CacheControlOf(call.route.query, view, from.cache_control) : from.cache_control;
     // Certified errors depend on the program, not only on the data.
     if (!parsed->certify_level) {
       response.etag = tiler::RequestETag("heights", view.name, view.generation, call.route.query, coding);
@@ -101,21 +134,22 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
 
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> known = co_await Certify(dataset, *parsed, deadline, request.client);
+    Result<CertifiedPoints> known = co_await Certify(from, dataset, *parsed, deadline, request.client);
     if (!known && known.error().code == ErrorCode::kInvalidArgument) {
       co_return ClientErrorResponse(known.error(), request.id);
     }
-    if (!known) co_return co_await BackendFailure(known.error(), request.id, options_.refusal_delay);
+    if (!known) co_return co_await BackendFailure(known.error(), request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const auto length = parsed->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  Work<Made> work = [catalog = catalog_, dataset, coding, query, certified,
+  Work<Made> work = [catalog = from.catalog, dataset, coding, query, certified,
                      asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<Made> {
     Made made;
     made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
-    const Result<PointHeights> heights = catalog->read_points(dataset, query->points, query->datum, stop);
+    const Result<tiler::PointHeights> heights =
+        catalog->pipeline->ReadPoints(dataset, query->points, query->datum, stop);
     if (!heights) return tl::unexpected(heights.error());
     made.times.read = tiler::MicrosecondsSince(begun);
     made.bytes = HeightsJson(*query, *heights, catalog->datasets[dataset].name, certified.get(), stop);
@@ -123,43 +157,27 @@ asio::awaitable<Response> HeightsHandler::Read(const Call& call, std::uint32_t d
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
-  Result<Made> made = co_await tiles_.Run(std::move(work), length, deadline, request.client);
-  if (!made) co_return co_await BackendFailure(made.error(), request.id, options_.refusal_delay);
+  Result<Made> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  if (!made) co_return co_await BackendFailure(made.error(), request.id);
   response.body = std::make_shared<const std::string>(std::move(made->bytes));
-  response.headers.emplace_back("Server-Timing", FormatServerTiming(CacheStatus::kMiss, made->times));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
   co_return response;
 }
 
-asio::awaitable<Result<CertifiedPoints>> HeightsHandler::Certify(std::uint32_t dataset, const HeightsQuery& query,
-                                                                 TileService::Clock::time_point deadline,
-                                                                 std::uint64_t client) const {
-  // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
-  Work<CertifiedPoints> find = [catalog = catalog_, dataset, wanted = query.points,
-                                level = *query.certify_level](const std::stop_token& stop) {
-    return TilesOf(catalog->datasets[dataset], wanted, level, stop);
-  };
-  Result<CertifiedPoints> points = co_await tiles_.Run(std::move(find), TileService::Length::kShort, deadline, client);
-  if (!points) co_return points;
-  for (std::size_t i = 0; i < points->tiles.size(); ++i) {
-    tiler::TileRequest tile;
-    tile.dataset = dataset;
-    tile.key = points->tiles[i];
-    tile.coding = tiler::Coding::kGzip;  // the format that is most probably cached
-    const Result<ServedTile> served = co_await TileOf(tile, deadline, client);
-    if (!served) co_return tl::unexpected(served.error());
-    points->errors_m[i] = served->tile->certified_error_m;
+}  // namespace
+
+Answer AnswerHeights(const Handlers& from, const Call& call) {
+  const Request& request = *call.request;
+  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
+    return ProblemResponse(415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded",
+                           request.id);
   }
-  co_return points;
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  return ReadHeights(from, call, *dataset);
 }
 
-asio::awaitable<Result<ServedTile>> HeightsHandler::TileOf(tiler::TileRequest tile,
-                                                           TileService::Clock::time_point deadline,
-                                                           std::uint64_t client) const {
-  if (std::optional<ServedTile> found = tiles_.Find(*catalog_, tile)) co_return *std::move(found);
-  co_return co_await tiles_.Build(catalog_, tile, deadline, client);
-}
-
-std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, std::string_view dataset,
+std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified, const std::stop_token& stop) {
   const std::vector<float>& heights = known.heights;
   const std::string name = nlohmann::json(dataset).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
@@ -190,6 +208,30 @@ std::string HeightsJson(const HeightsQuery& query, const PointHeights& known, st
   }
   if (query.datum == dem::HeightDatum::kOrthometric) return json + "],\"datum\":\"orthometric\",\"status\":\"OK\"}";
   return json + "],\"status\":\"OK\"}";
+}
+
+Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
+                                const std::stop_token& stop) {
+  CertifiedPoints certified;
+  for (const dem::GeoPosition& point : points) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the tiles any more");
+    int level = std::min(deepest, dataset.max_level());
+    geo::TileKey key = TileAt(point, level);
+    while (level > 0 && !IsAvailable(dataset, key)) key = TileAt(point, --level);
+    auto known = std::ranges::find(certified.tiles, key);
+    if (known == certified.tiles.end()) {
+      if (certified.tiles.size() == kMaxCertifiedTiles) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "certify: the points lie in more than {} tiles, which is the most this server certifies at "
+                         "once; ask for fewer points, or for a shallower level",
+                         kMaxCertifiedTiles);
+      }
+      known = certified.tiles.insert(certified.tiles.end(), key);
+    }
+    certified.tile_of_point.push_back(static_cast<std::size_t>(known - certified.tiles.begin()));
+  }
+  certified.errors_m.resize(certified.tiles.size());
+  return certified;
 }
 
 }  // namespace terrace::server

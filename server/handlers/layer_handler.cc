@@ -1,19 +1,16 @@
-#include "server/handlers/layer_handler.h"
-
 #include <fmt/format.h>
 
 #include <utility>
 
 #include "proto/documents/layer_json.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
-#include "server/handlers/datasets_handler.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
-
-constexpr std::string_view kJson = "application/json";
 
 std::string Print(double value) {
   std::string text = fmt::format("{}", value);
@@ -55,24 +52,21 @@ std::string WithToken(std::string query, const Call& call) {
   return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(call.token);
 }
 
-LayerHandler::LayerHandler(std::span<const DatasetView> datasets) : datasets_(datasets) {
-  for (const DatasetView& dataset : datasets_) plain_.push_back(Document::Make(WriteLayer(dataset, ""), kJson));
-}
+Document PlainLayer(const DatasetView& dataset) { return Document::Make(WriteLayer(dataset, ""), "application/json"); }
 
-Described LayerHandler::Handle(const Call& call) const {
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, datasets_);
+Described DescribeLayer(const Handlers& from, const Call& call) {
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
   const Result<TileParameters> parameters = ParseTileParameters(call.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), call);
-  if (tile_query.empty()) return Serve(plain_[*dataset], *call.request, kRevalidate);
+  if (tile_query.empty()) return Serve(from.of_datasets[*dataset].layer, *call.request, kRevalidate);
   DocumentPlan plan;
   plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(call)));
-  plan.content_type = kJson;
+  plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = datasets_[*dataset], tile_query = std::move(tile_query)](const std::stop_token& stop) {
-    return WriteLayer(view, tile_query, stop);
-  };
+  plan.write = [&view = from.catalog->datasets[*dataset], tile_query = std::move(tile_query)](
+                   const std::stop_token& stop) { return WriteLayer(view, tile_query, stop); };
   return plan;
 }
 

@@ -1,11 +1,10 @@
-#include "server/handlers/state_handler.h"
-
 #include <fmt/format.h>
 
 #include <utility>
 
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
-#include "server/query/query.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
@@ -24,25 +23,30 @@ Response PlainState(int status, std::string text) {
   return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
 }
 
+asio::awaitable<Response> WriteMetrics(const ProcessState& process) {
+  std::shared_ptr<const std::string> text = co_await process.MetricsText();
+  co_return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", std::move(text));
+}
+
 }  // namespace
 
-Response StateHandler::Live(const Call& call) const {
+Answer AnswerLive(const Handlers&, const Call& call) {
   const Result<void> none = RefuseParameters(call.route.query);
   return none ? PlainState(200, "ok\n") : ClientErrorResponse(none.error(), call.request->id);
 }
 
 // The first word is the state. A degraded server still answers, so it should stay in service. Reasons contain file
 // names and go only to the log. Datasets are named only to clients that may see all of them.
-Response StateHandler::Ready(const Call& call) const {
+Answer AnswerReady(const Handlers& from, const Call& call) {
   if (const Result<void> none = RefuseParameters(call.route.query); !none) {
     return ClientErrorResponse(none.error(), call.request->id);
   }
-  if (state_.draining() || state_.opening()) {
-    Response response = PlainState(503, state_.draining() ? "draining\n" : "opening\n");
+  if (from.process.draining() || from.process.opening()) {
+    Response response = PlainState(503, from.process.draining() ? "draining\n" : "opening\n");
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }
-  const std::map<std::string, std::string> troubles = state_.troubles();
+  const std::map<std::string, std::string> troubles = from.process.troubles();
   std::string text = troubles.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : troubles) {
     if (dataset == kCacheTrouble) {
@@ -58,16 +62,11 @@ Response StateHandler::Ready(const Call& call) const {
   return PlainState(200, std::move(text));
 }
 
-Answer StateHandler::Metrics(const Call& call) const {
+Answer AnswerMetrics(const Handlers& from, const Call& call) {
   if (const Result<void> none = RefuseParameters(call.route.query); !none) {
     return ClientErrorResponse(none.error(), call.request->id);
   }
-  return WriteMetrics();
-}
-
-asio::awaitable<Response> StateHandler::WriteMetrics() const {
-  std::shared_ptr<const std::string> text = co_await state_.MetricsText();
-  co_return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", std::move(text));
+  return WriteMetrics(from.process);
 }
 
 }  // namespace terrace::server

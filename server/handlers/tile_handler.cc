@@ -1,5 +1,3 @@
-#include "server/handlers/tile_handler.h"
-
 #include <fmt/format.h>
 
 #include <iterator>
@@ -7,20 +5,20 @@
 #include <optional>
 #include <utility>
 
-#include "server/api/backend_failure.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 
 namespace terrace::server {
 namespace {
 
-std::string_view Name(CacheStatus cache) {
-  switch (cache) {
+std::string_view Name(const ServedTile& served) {
+  switch (served.cache) {
     case CacheStatus::kHit:
       return "hit";
-    case CacheStatus::kDisk:
-      return "disk";
+    case CacheStatus::kStore:
+      return served.tile->store;
     case CacheStatus::kMiss:
       return "miss";
     case CacheStatus::kJoined:
@@ -29,37 +27,18 @@ std::string_view Name(CacheStatus cache) {
   return "join";
 }
 
-}  // namespace
-
-TileHandler::TileHandler(CatalogPtr catalog, TileService& tiles, HandlerOptions options)
-    : catalog_(std::move(catalog)), tiles_(tiles), options_(std::move(options)) {}
-
-Answer TileHandler::Handle(const Call& call) const {
-  const Result<tiler::TileRequest> tile = Negotiate(call, catalog_->datasets);
-  if (!tile) return ClientErrorResponse(tile.error(), call.request->id);
-  if (const std::optional<ServedTile> found = tiles_.Find(*catalog_, *tile)) return Reply(*tile, *found, call);
-  return Build(call, *tile);
-}
-
-asio::awaitable<Response> TileHandler::Build(const Call& call, tiler::TileRequest tile) const {
-  const auto deadline = TileService::Clock::now() + options_.deadline;
-  const Result<ServedTile> served = co_await tiles_.Build(catalog_, tile, deadline, call.request->client);
-  if (served) co_return Reply(tile, *served, call);
-  co_return co_await BackendFailure(served.error(), call.request->id, options_.refusal_delay);
-}
-
-Response TileHandler::Reply(const tiler::TileRequest& tile, const ServedTile& served, const Call& call) const {
+Response Reply(const Handlers& from, const tiler::TileRequest& tile, const ServedTile& served, const Call& call) {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
   response.lines_of_body = served.tile->head.of_body;
-  response.cache_control = CacheControlOf(call.route.query, catalog_->datasets[tile.dataset], options_.cache_control);
+  response.cache_control = CacheControlOf(call.route.query, from.catalog->datasets[tile.dataset], from.cache_control);
   response.vary = call.route.format->vary(tile);
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {
-    response.headers.emplace_back("Server-Timing", FormatServerTiming(served.cache, served.tile->times));
+    response.headers.emplace_back("Server-Timing", FormatServerTiming(Name(served), served.tile->times));
   }
-  response.labels.cache = Name(served.cache);
+  response.labels.cache = Name(served);
   if (MatchesEtag(call.request->fields->if_none_match, served.tile->etag)) {
     response.status = 304;
   } else {
@@ -68,9 +47,25 @@ Response TileHandler::Reply(const tiler::TileRequest& tile, const ServedTile& se
   return response;
 }
 
-std::string FormatServerTiming(CacheStatus cache, const tiler::StageTimes& times) {
-  std::string text = fmt::format("cache;desc={}", Name(cache));
-  if (cache == CacheStatus::kHit) return text;
+asio::awaitable<Response> BuildTile(const Handlers& from, const Call& call, tiler::TileRequest tile) {
+  const Result<ServedTile> served =
+      co_await from.tiles.Build(from.catalog, tile, from.Deadline(), call.request->client);
+  if (served) co_return Reply(from, tile, *served, call);
+  co_return co_await BackendFailure(served.error(), call.request->id);
+}
+
+}  // namespace
+
+Answer AnswerTile(const Handlers& from, const Call& call) {
+  const Result<tiler::TileRequest> tile = Negotiate(call, from.catalog->datasets);
+  if (!tile) return ClientErrorResponse(tile.error(), call.request->id);
+  if (const std::optional<ServedTile> found = from.tiles.Find(*from.catalog, *tile))
+    return Reply(from, *tile, *found, call);
+  return BuildTile(from, call, *tile);
+}
+
+std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times) {
+  std::string text = fmt::format("cache;desc={}", cache);
   const std::pair<const char*, std::chrono::microseconds> steps[] = {{"queue", times.queue},
                                                                      {"read", times.read},
                                                                      {"refine", times.refine},

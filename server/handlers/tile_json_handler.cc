@@ -1,17 +1,14 @@
-#include "server/handlers/tile_json_handler.h"
-
 #include <fmt/format.h>
 
 #include <utility>
 
 #include "proto/documents/tile_json.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
+#include "server/api/tile_formats.h"
 #include "server/documents/document.h"
-#include "server/handlers/datasets_handler.h"
-#include "server/handlers/layer_handler.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
-#include "server/query/query.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
@@ -26,17 +23,21 @@ std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParamete
   return query;
 }
 
+// "http://host:port" under which the client addressed this server or the proxy in front of it; empty without a Host
+// header.
+std::string OriginOf(const Request& request) {
+  if (request.fields->host.empty()) return {};
+  return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
+}
+
 }  // namespace
 
-TileJsonHandler::TileJsonHandler(std::span<const DatasetView> datasets, std::string_view origin_headers)
-    : datasets_(datasets), origin_headers_(origin_headers) {}
-
-Response TileJsonHandler::Handle(const Call& call) const {
-  const Result<std::uint32_t> index = FindDataset(call.route.dataset, datasets_);
+Answer AnswerTileJson(const Handlers& from, const Call& call) {
+  const Result<std::uint32_t> index = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), call.request->id);
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(call.route.query);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
-  const DatasetView& dataset = datasets_[*index];
+  const DatasetView& dataset = from.catalog->datasets[*index];
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
@@ -52,13 +53,8 @@ Response TileJsonHandler::Handle(const Call& call) const {
   tiles.north = dataset.north;
   Response response =
       Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, kRevalidate);
-  response.vary_too = origin_headers_;
+  response.vary_too = from.origin_headers;
   return response;
-}
-
-std::string OriginOf(const Request& request) {
-  if (request.fields->host.empty()) return {};
-  return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
 }
 
 }  // namespace terrace::server

@@ -1,25 +1,57 @@
-#include "server/handlers/tileset_handler.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
+#include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
 #include "proto/documents/subtree.h"
 #include "proto/documents/tileset.h"
+#include "proto/height_span.h"
+#include "proto/mesh/skirt.h"
 #include "server/api/caching.h"
-#include "server/api/negotiate.h"
-#include "server/handlers/layer_handler.h"
-#include "server/handlers/tile_heights.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
+#include "server/http/text.h"
+#include "server/tiles/catalog.h"
 
 namespace terrace::server {
 namespace {
 
-constexpr std::string_view kJsonType = "application/json";
+dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key) {
+  if (dataset.range_bound) return dataset.range_bound(key);
+  return {std::min(dataset.min_height_m, dataset.floor_m), std::max(dataset.max_height_m, dataset.floor_m)};
+}
+
+double SkirtDepth(const DatasetView& dataset, const RequestedError& requested, int level) {
+  const bool is_deepest = level == dataset.max_level();
+  const int step = ErrorStep(requested, level, is_deepest, dataset.error_fraction);
+  return proto::SkirtDepth(level, proto::SkirtError(level, step, is_deepest, dataset.error_fraction));
+}
+
+// Returns a range that contains the heights of all vertices, including skirts, of the tile and its descendants at this
+// error. It is the bound on the tile's samples, widened by skirts and rounding, and then outwards to multiples of a
+// power of two, which is at most a quarter of the error and at least 2^-6 m: such numbers are short and often equal.
+// Reads no raster. Thread-safe. Precondition: a valid key.
+proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key) {
+  const bool is_deepest = key.level == dataset.max_level();
+  const int step = ErrorStep(requested, key.level, is_deepest, dataset.error_fraction);
+  const double error_m = geo::LadderError(key.level, step, dataset.error_fraction);
+  // Skirts are shorter on each deeper level, except on the deepest level at a small `fraction`.
+  const double skirt_m =
+      std::max(SkirtDepth(dataset, requested, key.level), SkirtDepth(dataset, requested, dataset.max_level()));
+  // Positions are rounded to a grid of at most a 32nd of the error; the lower rims of skirts are rounded twice.
+  const double rounding_m = error_m / 32;
+  const dem::HeightRange range = RangeOf(dataset, key);
+  constexpr int kFinestStep = -6;
+  const double unit_m = std::ldexp(1, std::max(std::ilogb(error_m / 4), kFinestStep));
+  return {std::floor((range.min - skirt_m - 2 * rounding_m) / unit_m) * unit_m,
+          std::ceil((range.max + rounding_m) / unit_m) * unit_m};
+}
 
 // The query of the content templates for a request. The values of `compression` and `texture` have been checked.
 std::string ContentQuery(const RequestedError& requested, std::string_view query) {
@@ -87,45 +119,41 @@ std::string WriteSubtree(const DatasetView& dataset, const RequestedError& reque
 
 }  // namespace
 
-TilesetHandler::TilesetHandler(std::span<const DatasetView> datasets, std::string cache_control)
-    : datasets_(datasets), cache_control_(std::move(cache_control)) {
-  for (const DatasetView& dataset : datasets_) {
-    const std::vector<geo::TileKey> roots = proto::ImplicitRoots(TilesWithData(dataset));
-    roots_.push_back(
-        std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available, roots)));
-    plain_.push_back(Document::Make(WriteTileset(dataset, *roots_.back(), {}, "", ""), kJsonType));
-  }
+void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
+  const std::vector<geo::TileKey> roots = proto::ImplicitRoots(TilesWithData(dataset));
+  made.roots = std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available, roots));
+  made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
 }
 
-Described TilesetHandler::Handle(const Call& call) const {
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, datasets_);
+Described DescribeTileset(const Handlers& from, const Call& call) {
+  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
   const Result<TileParameters> parameters =
       ParseTileParameters(call.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, call.route.query);
   std::string content_query = WithToken(content_parameters, call);
-  if (content_query.empty()) return Serve(plain_[*dataset], *call.request, kRevalidate);
+  if (content_query.empty()) return Serve(from.of_datasets[*dataset].tileset, *call.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), call);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(call)));
-  plan.content_type = kJsonType;
+  plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = datasets_[*dataset], roots = roots_[*dataset], requested = parameters->requested,
-                content_query = std::move(content_query),
+  plan.write = [&view = from.catalog->datasets[*dataset], roots = from.of_datasets[*dataset].roots,
+                requested = parameters->requested, content_query = std::move(content_query),
                 subtree_query = std::move(subtree_query)](const std::stop_token&) {
     return WriteTileset(view, *roots, requested, content_query, subtree_query);
   };
   return plan;
 }
 
-Described TilesetHandler::HandleSubtree(const Call& call) const {
-  const Result<std::uint32_t> index = FindDataset(call.route.dataset, datasets_);
+Described DescribeSubtree(const Handlers& from, const Call& call) {
+  const Result<std::uint32_t> index = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), call.request->id);
   const Result<TileParameters> parameters =
       ParseTileParameters(call.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
-  const DatasetView& dataset = datasets_[*index];
+  const DatasetView& dataset = from.catalog->datasets[*index];
   if (!IsAvailable(dataset, call.route.key) ||
       (call.route.key.level - call.route.root.level) % call.route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin",
@@ -136,7 +164,7 @@ Described TilesetHandler::HandleSubtree(const Call& call) const {
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(call.route.key), call.route.subtree_levels,
                          TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
-  plan.cache_control = CacheControlOf(call.route.query, dataset, cache_control_);
+  plan.cache_control = CacheControlOf(call.route.query, dataset, from.cache_control);
   plan.write = [&dataset, requested, top = call.route.key, levels = call.route.subtree_levels](const std::stop_token&) {
     return WriteSubtree(dataset, requested, top, levels);
   };

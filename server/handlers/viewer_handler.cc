@@ -1,57 +1,132 @@
-#include "server/handlers/viewer_handler.h"
-
 #include <fmt/format.h>
 
+#include <iterator>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "server/api/caching.h"
+#include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
-#include "server/query/query.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
+namespace {
 
-ViewerHandler::ViewerHandler(std::span<const DatasetView> datasets, std::shared_ptr<const StaticFiles> files)
-    : datasets_(datasets),
-      files_(std::move(files)),
-      list_(Document::Make(DatasetsJson(datasets_), "application/json")),
-      index_(Document::Make(IndexHtml(datasets_), "text/html; charset=utf-8")) {}
-
-Described ViewerHandler::Datasets(const Call& call) const {
-  if (const Result<void> none = RefuseParameters(call.route.query); !none) {
-    return ClientErrorResponse(none.error(), call.request->id);
-  }
-  if (call.sees_all()) return Serve(list_, *call.request, kRevalidate);
-  return PlanOfSeen(list_, call, DatasetsJson);
-}
-
-// Pages keep their state in the query, so any query is allowed.
-Described ViewerHandler::File(const Call& call) const {
-  if (const Document* file = files_->Find(call.route.file)) return Serve(*file, *call.request, kRevalidate);
-  if (files_->empty() && call.route.file == "index.html") {
-    if (call.sees_all()) {
-      Response index = Serve(index_, *call.request, kRevalidate);
-      index.for_grant = call.grant != nullptr;
-      return index;
+std::string EscapeHtml(std::string_view text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
     }
-    DocumentPlan index = PlanOfSeen(index_, call, IndexHtml);
-    index.for_grant = true;
-    return index;
   }
-  return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", call.request->id);
+  return escaped;
 }
+
+using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&);
 
 // A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets.
-DocumentPlan ViewerHandler::PlanOfSeen(const Document& all, const Call& call, WriteDatasets write) const {
+DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const Call& call, WriteDatasets write) {
   DocumentPlan plan;
   // Each token has one Grant as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(call.grant.get()));
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
-  plan.write = [datasets = datasets_, grant = call.grant, write](const std::stop_token& stop) {
+  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), grant = call.grant,
+                write](const std::stop_token& stop) {
     return write(
         datasets, [&](const DatasetView& view) { return grant->Sees(view.name); }, stop);
   };
   return plan;
+}
+
+}  // namespace
+
+std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
+  using Json = nlohmann::ordered_json;
+  Json list = Json::array();
+  for (const DatasetView& dataset : datasets) {
+    if (stop.stop_requested()) return {};
+    if (is_seen && !is_seen(dataset)) continue;
+    const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
+    Json entry;
+    entry["name"] = dataset.name;
+    entry["version"] = dataset.version();
+    entry["attribution"] = dataset.attribution;
+    entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
+    const dem::GeoBounds finest = FinestBounds(dataset);
+    entry["finest_bounds"] = {finest.west, finest.south, finest.east, finest.north};
+    entry["sources"] = dataset.sources;
+    entry["min_level"] = 0;
+    entry["max_level"] = dataset.max_level();
+    entry["heights"]["min"] = dataset.min_height_m;
+    entry["heights"]["max"] = dataset.max_height_m;
+    entry["urls"]["layer"] = base + "/layer.json";
+    entry["urls"]["tileset"] = base + "/tileset.json";
+    entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
+    entry["urls"]["tiles_json"] = base + "/tiles.json";
+    entry["urls"]["heights"] = base + "/heights";
+    entry["urls"]["mesh"] = base + "/mesh";
+    list.push_back(std::move(entry));
+  }
+  Json document;
+  document["datasets"] = std::move(list);
+  if (is_seen) document["more_with_token"] = true;
+  // Attributions are the operator's text: invalid UTF-8 must not make the whole list fail.
+  return document.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
+  std::string items;
+  for (const DatasetView& dataset : datasets) {
+    if (stop.stop_requested()) return {};
+    if (is_seen && !is_seen(dataset)) continue;
+    fmt::format_to(std::back_inserter(items),
+                   "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "
+                   "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",
+                   PercentEncode(dataset.name), EscapeHtml(dataset.name));
+  }
+  return fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title></head>\n"
+      "<body><h1>terrace</h1>\n<p>Terrain as quantized-mesh, 3D Tiles and raster-dem. Datasets "
+      "(<a href=\"/datasets\">as JSON</a>):</p>\n<ul>\n{}</ul>\n</body></html>\n",
+      items);
+}
+
+Described DescribeDatasets(const Handlers& from, const Call& call) {
+  if (const Result<void> none = RefuseParameters(call.route.query); !none) {
+    return ClientErrorResponse(none.error(), call.request->id);
+  }
+  if (call.sees_all()) return Serve(from.list, *call.request, kRevalidate);
+  return PlanOfSeen(from, from.list, call, DatasetsJson);
+}
+
+// Pages keep their state in the query, so any query is allowed.
+Described DescribeViewerFile(const Handlers& from, const Call& call) {
+  if (const Document* file = from.viewer->Find(call.route.file)) return Serve(*file, *call.request, kRevalidate);
+  if (from.viewer->empty() && call.route.file == "index.html") {
+    if (call.sees_all()) {
+      Response index = Serve(from.index, *call.request, kRevalidate);
+      index.for_grant = call.grant != nullptr;
+      return index;
+    }
+    DocumentPlan index = PlanOfSeen(from, from.index, call, IndexHtml);
+    index.for_grant = true;
+    return index;
+  }
+  return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", call.request->id);
 }
 
 }  // namespace terrace::server

@@ -3,6 +3,9 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
 #include <iterator>
 #include <string>
 
@@ -135,6 +138,14 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   if (status == 503) response.headers.emplace_back("Retry-After", RetryAfter(error.code));
   response.try_again = code == ErrorCode::kChanged;
   return response;
+}
+
+asio::awaitable<Response> BackendFailure(Error error, RequestId request_id) {
+  if (error.code == ErrorCode::kOverloaded) {
+    asio::steady_timer delay(co_await asio::this_coro::executor, kRefusalDelay);
+    co_await delay.async_wait(asio::use_awaitable);
+  }
+  co_return BackendErrorResponse(error, request_id);
 }
 
 }  // namespace terrace::server

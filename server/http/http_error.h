@@ -2,9 +2,11 @@
 // actual cause is logged under the same id.
 #pragma once
 
+#include <chrono>
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "server/asio.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 
@@ -24,5 +26,12 @@ Response ClientErrorResponse(const Error& error, std::string_view request_id);
 
 // For failures behind the HTTP side: fixed text for the client, the message for the log.
 Response BackendErrorResponse(const Error& error, std::string_view request_id);
+
+// Delay of a refusal for overload or for a client's rate. A client that is refused at once retries at once, and
+// answering tens of thousands of refusals a second would take time from the workers.
+inline constexpr std::chrono::milliseconds kRefusalDelay{200};
+
+// BackendErrorResponse; a refusal for overload is delayed.
+asio::awaitable<Response> BackendFailure(Error error, RequestId request_id);
 
 }  // namespace terrace::server

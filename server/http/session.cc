@@ -24,7 +24,6 @@
 #include "server/net/address.h"
 #include "server/net/client_watch.h"
 #include "server/net/stream.h"
-#include "server/net/waits.h"
 
 namespace terrace::server {
 namespace {
@@ -122,9 +121,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ReceiveBody();
   asio::awaitable<void> RefuseUpload();
   asio::awaitable<void> DelayRefusal();
+  asio::awaitable<std::monostate> Sleep(std::chrono::milliseconds time);
   asio::awaitable<bool> GiveUp();
   Answer Handle();
-  asio::awaitable<std::optional<Response>> WhileConnected(asio::awaitable<Response> answer);
+  template <typename T>
+  asio::awaitable<std::optional<T>> WhileConnected(asio::awaitable<T> waited);
   asio::awaitable<Response> Await(asio::awaitable<Response> answer);
   Response Failed(const std::exception& exception) const;
   asio::awaitable<void> Interrupted();
@@ -202,7 +203,7 @@ asio::awaitable<bool> Session::ServeOne() {
   if (!admission.refusal) admission.refusal = WhyNoBody(request, admission.max_body_bytes);
   if (admission.delays_refusal) {
     co_await DelayRefusal();
-  } else if (admission.wait.count() > 0 && !co_await SleepWhileConnected(stream_, admission.wait)) {
+  } else if (admission.wait.count() > 0 && !co_await WhileConnected(Sleep(admission.wait))) {
     co_return false;
   }
   displaced_ = has_upload_ = false;
@@ -214,7 +215,7 @@ asio::awaitable<bool> Session::ServeOne() {
   if (request.content_length > 0 && !co_await ReceiveBody()) co_return false;
   Answer answer = Handle();
   if (auto* later = std::get_if<asio::awaitable<Response>>(&answer)) {
-    std::optional<Response> response = co_await WhileConnected(std::move(*later));
+    std::optional<Response> response = co_await WhileConnected(Await(std::move(*later)));
     if (!response) co_return co_await GiveUp();
     answer = *std::move(response);
   }
@@ -249,13 +250,12 @@ asio::awaitable<bool> Session::ReceiveBody() {
     ask.bytes = request.content_length;
     ask.client = request.client;
     ask.holder = weak_from_this();
-    std::optional<TransferBudget::Hold> room =
-        co_await HoldWhileConnected(stream_, *context_->transfers, std::move(ask), Deadline());
-    if (!room) {
+    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(ask), Deadline()));
+    if (!room || !*room) {
       co_await RefuseUpload();
       co_return false;
     }
-    body->room = *std::move(room);
+    body->room = **std::move(room);
     has_upload_ = true;
     if (!displaced_) {
       body->text.reserve(request.content_length);
@@ -287,16 +287,23 @@ asio::awaitable<void> Session::RefuseUpload() {
 
 asio::awaitable<void> Session::DelayRefusal() {
   stream_.ExpiresNever();
-  asio::steady_timer delay(stream_.socket().get_executor(), context_->options.refusal_delay);
-  co_await delay.async_wait(asio::use_awaitable);
+  co_await Sleep(kRefusalDelay);
+}
+
+asio::awaitable<std::monostate> Session::Sleep(std::chrono::milliseconds time) {
+  asio::steady_timer timer(stream_.socket().get_executor(), time);
+  co_await timer.async_wait(asio::use_awaitable);
+  co_return std::monostate();
 }
 
 // Returns nothing if the client is gone, or if others get the request's memory. Most answers are ready at once, and
-// then neither a timer nor a second coroutine watches the client.
-asio::awaitable<std::optional<Response>> Session::WhileConnected(asio::awaitable<Response> answer) {
+// then neither a timer nor a second coroutine watches the client. `waited` must not throw, so that the race always has
+// a winner.
+template <typename T>
+asio::awaitable<std::optional<T>> Session::WhileConnected(asio::awaitable<T> waited) {
   using asio::experimental::awaitable_operators::operator||;
-  stream_.ExpiresNever();  // handlers have their own deadlines
-  std::variant<Response, std::monostate> first = co_await (Await(std::move(answer)) || Interrupted());
+  stream_.ExpiresNever();  // `waited` has its own deadline
+  std::variant<T, std::monostate> first = co_await (std::move(waited) || Interrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
 }
@@ -317,7 +324,6 @@ Answer Session::Handle() {
   }
 }
 
-// Never throws, so that the race above always has a winner.
 asio::awaitable<Response> Session::Await(asio::awaitable<Response> answer) {
   try {
     co_return co_await std::move(answer);
@@ -353,7 +359,6 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
 // occupy the memory that it waits for. Returns nothing if there was no memory before the deadline, or if the client is
 // gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
-  using asio::experimental::awaitable_operators::operator||;
   for (;;) {
     TransferBudget::Ask ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
@@ -361,14 +366,12 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     Response bare;  // its lines share ownership with the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    stream_.ExpiresNever();
-    std::variant<std::optional<TransferBudget::Hold>, std::monostate> first =
-        co_await (context_->transfers->HoldWhenRoom(std::move(ask), Deadline()) || Interrupted());
-    if (first.index() == 1 || !std::get<0>(first)) co_return std::nullopt;
-    std::optional<TransferBudget::Hold> room = std::move(std::get<0>(first));
+    auto waited = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(ask), Deadline()));
+    if (!waited || !*waited) co_return std::nullopt;
+    std::optional<TransferBudget::Hold> room = *std::move(waited);
     Answer again = Handle();
     if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {
-      std::optional<Response> made = co_await WhileConnected(std::move(*later));
+      std::optional<Response> made = co_await WhileConnected(Await(std::move(*later)));
       if (!made) co_return std::nullopt;
       again = *std::move(made);
     }

@@ -28,7 +28,6 @@ struct SessionOptions {
   // In which the client takes no byte, and before min_rate applies.
   std::chrono::milliseconds write_timeout{20'000};
   std::size_t min_rate = 4096;                   // average bytes per second that a client must take; 0: any
-  std::chrono::milliseconds refusal_delay{200};  // before a 429: clients refused at once retry at once
   std::chrono::milliseconds drain_grace{0};      // how long a draining connection waits for another request
 };
 

@@ -1,8 +1,11 @@
 #include "server/http/text.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 
 namespace terrace::server {
 namespace {
@@ -69,6 +72,64 @@ std::optional<std::int64_t> PlainDecimal(std::string_view text, std::size_t max_
     number = number * 10 + (c - '0');
   }
   return number;
+}
+
+std::optional<std::string> PercentDecode(std::string_view text) {
+  std::string decoded;
+  decoded.reserve(text.size());
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      decoded += text[i];
+      continue;
+    }
+    if (text.size() - i < 3) return std::nullopt;
+    const int high = HexDigit(text[i + 1]), low = HexDigit(text[i + 2]);
+    if (high < 0 || low < 0) return std::nullopt;
+    const int byte = high * 16 + low;
+    if (byte < 0x20 || byte == 0x7f) return std::nullopt;
+    decoded += static_cast<char>(byte);
+    i += 2;
+  }
+  return decoded;
+}
+
+std::string PercentEncode(std::string_view text) {
+  constexpr std::string_view kPlain = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~";
+  std::string encoded;
+  for (const char c : text) {
+    if (kPlain.find(c) != std::string_view::npos) {
+      encoded += c;
+    } else {
+      fmt::format_to(std::back_inserter(encoded), "%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return encoded;
+}
+
+Result<QueryParameters> ParseQuery(std::string_view query) {
+  QueryParameters parameters;
+  while (!query.empty()) {
+    const std::string_view piece = NextPiece(query, '&', "");
+    if (piece.empty()) continue;
+    const std::size_t equals = std::min(piece.find('='), piece.size());
+    const std::string_view name = piece.substr(0, equals);
+    if (name.find('%') != std::string_view::npos) {
+      return MakeError(ErrorCode::kInvalidArgument, "a parameter's name has a percent sign; write it plainly");
+    }
+    std::optional<std::string> value = PercentDecode(piece.substr(std::min(equals + 1, piece.size())));
+    if (!value) return MakeError(ErrorCode::kInvalidArgument, "malformed percent-encoding of a parameter");
+    parameters.emplace_back(name, *std::move(value));
+  }
+  return parameters;
+}
+
+Result<void> RefuseParameters(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  for (const auto& [name, value] : *sent) {
+    if (name != "v") return MakeError(ErrorCode::kInvalidArgument, "this URL takes no parameters");
+  }
+  return {};
 }
 
 }  // namespace terrace::server

@@ -28,7 +28,6 @@
 
 #include "engine/core/result.h"
 #include "server/asio.h"
-#include "server/jobs/waiter.h"
 #include "server/jobs/worker_pool.h"
 
 namespace terrace::server {

@@ -8,6 +8,7 @@
 
 #include <atomic>
 #include <boost/asio/redirect_error.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <condition_variable>
@@ -26,9 +27,15 @@
 #include "engine/core/result.h"
 #include "server/asio.h"
 #include "server/jobs/fair_queue.h"
-#include "server/jobs/waiter.h"
 
 namespace terrace::server {
+
+// A timer that expires at the waiter's deadline and is cancelled by Wake. It belongs to the thread of its executor.
+using WaiterPtr = std::shared_ptr<asio::steady_timer>;
+
+// Ends the wait, on the waiter's own thread. The coroutine suspends in its wait before its thread runs anything else,
+// so the cancellation always meets a wait. From any thread; never throws. Null: nothing to do.
+void Wake(WaiterPtr waiter);
 
 // Runs on a worker and may block. Its stop token is stopped when nobody waits for the result.
 template <typename T>

@@ -15,21 +15,36 @@
 #include <system_error>
 #include <utility>
 
+#include "server/store/disk_store.h"
 #include "tiler/build_id.h"
 #include "tiler/store/tile_record.h"
 
 namespace terrace::server {
 namespace {
 
-constexpr const char *kTiles = "tiles", *kRefinements = "refinements";  // the stores' directories
-
 std::string SystemMessage() { return std::system_category().message(errno); }
 
-// Returns false if the disk does not accept it.
-bool SetSize(int file, off_t size) { return ftruncate(file, size) == 0; }
-
 // The lock ends with the process, however it ends.
-Result<int> LockDirectory(const std::filesystem::path& directory) {
+class DirectoryLock {
+ public:
+  explicit DirectoryLock(int file) : file_(file) {}
+  ~DirectoryLock() { close(file_); }
+  DirectoryLock(const DirectoryLock&) = delete;
+  DirectoryLock& operator=(const DirectoryLock&) = delete;
+
+  off_t size() const {
+    struct stat status {};
+    return fstat(file_, &status) == 0 ? status.st_size : 0;
+  }
+  // Returns false if the disk does not accept it.
+  bool SetSize(off_t size) const { return ftruncate(file_, size) == 0; }
+
+ private:
+  const int file_;
+};
+using LockPtr = std::shared_ptr<const DirectoryLock>;
+
+Result<LockPtr> LockDirectory(const std::filesystem::path& directory) {
   const std::filesystem::path path = directory / "lock";
   int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (file < 0) {
@@ -50,19 +65,7 @@ Result<int> LockDirectory(const std::filesystem::path& directory) {
                      "disk_cache: {} is used by another process; give each server a directory of its own",
                      directory.string());
   }
-  return file;
-}
-
-DiskStoreOptions OptionsOf(const std::filesystem::path& directory, std::size_t bytes, std::size_t open_files,
-                           const char* name, bool compress, bool anew) {
-  DiskStoreOptions options;
-  options.db.directory = directory / name;
-  options.db.capacity_bytes = std::max(bytes, RecordDb::kMinCapacity);
-  options.db.compress = compress;
-  options.db.open_files = open_files;
-  options.name = name;
-  if (anew) static_cast<void>(RecordDb::Destroy(options.db));  // opening reports what is wrong
-  return options;
+  return std::make_shared<const DirectoryLock>(file);
 }
 
 template <typename Key>
@@ -82,36 +85,47 @@ Result<tiler::RefinedTile> Parse(const tiler::RefinedTileKey& /*key*/, const std
   return tiler::ParseRefinedTile(bytes);
 }
 
-}  // namespace
-
 template <typename Key, typename Value>
-class DiskCache::Tier : public tiler::Store<Key, Value> {
+class DiskTier final : public tiler::Store<Key, Value> {
  public:
-  explicit Tier(DiskStoreOptions options) : store_(std::move(options)) {}
+  DiskTier(LockPtr lock, const DiskStoreOptions& options) : lock_(std::move(lock)) {
+    if (options.db.capacity_bytes > 0) store_.emplace(options);
+  }
+
+  const char* name() const override { return "disk"; }
+  tiler::StoreStats stats() const override { return store_ ? store_->stats() : tiler::StoreStats(); }
+  void Abandon() override {
+    if (store_) store_->Abandon();
+  }
 
   std::optional<Value> Find(const Key& key) override {
+    if (!store_) return std::nullopt;
     const std::string store_key = StoreKey(key);
-    const std::optional<std::string> bytes = store_.Find(store_key);
+    const std::optional<std::string> bytes = store_->Find(store_key);
     if (!bytes) return std::nullopt;
     Result<Value> value = Parse(key, *bytes);
     if (value) return *std::move(value);
-    store_.Forget(store_key);
+    store_->Forget(store_key);
     return std::nullopt;
   }
 
   void Insert(const Key& key, std::shared_ptr<const Value> value) override {
+    if (!store_) return;
     const std::size_t charge = BytesOf(*value);
-    store_.Keep(
+    store_->Keep(
         StoreKey(key), [value = std::move(value)] { return Serialize(*value); }, charge);
   }
 
-  DiskStore& store() { return store_; }
-
  private:
-  DiskStore store_;
+  const LockPtr lock_;  // given up after the store
+  std::optional<DiskStore> store_;
 };
 
-Result<std::shared_ptr<DiskCache>> DiskCache::Open(const config::DiskCacheConfig& config, std::size_t open_files) {
+}  // namespace
+
+// Debian's build of RocksDB asserts, and so ends the process, on some kinds of damage when it opens a store. The lock
+// file counts unfinished openings: after two, the stores are deleted. Other files in the directory are never deleted.
+Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size_t open_files) {
   tiler::BuildId();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
   std::filesystem::create_directories(config.directory, failed);
@@ -120,64 +134,36 @@ Result<std::shared_ptr<DiskCache>> DiskCache::Open(const config::DiskCacheConfig
                      "disk_cache: {} cannot be made: {}; name a directory that the server may write to",
                      config.directory, failed.message());
   }
-  const Result<int> lock = LockDirectory(config.directory);
-  if (!lock) return tl::unexpected(lock.error());
-  return std::shared_ptr<DiskCache>(new DiskCache(config, open_files, *lock));
-}
+  const Result<LockPtr> locked = LockDirectory(config.directory);
+  if (!locked) return tl::unexpected(locked.error());
+  const LockPtr& lock = *locked;
 
-DiskCache::DiskCache(const config::DiskCacheConfig& config, std::size_t open_files, int lock) : lock_(lock) {
-  OpenStores(config, open_files);
-}
-
-// Debian's build of RocksDB asserts, and so ends the process, on some kinds of damage when it opens a store. The lock
-// file counts unfinished openings: after two, the stores are deleted. Other files in the directory are never deleted.
-void DiskCache::OpenStores(const config::DiskCacheConfig& config, std::size_t open_files) {
   constexpr off_t kMaxUnfinished = 2;
-  struct stat status {};
-  off_t unfinished = fstat(lock_, &status) == 0 ? status.st_size : 0;
+  off_t unfinished = lock->size();
   const bool anew = unfinished >= kMaxUnfinished;
   if (anew) {
     spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk", config.directory,
                  unfinished);
     unfinished = 0;
   }
-  SetSize(lock_, unfinished + 1);
-  if (config.tile_bytes > 0) {  // compressed already, or not compressible
-    tiles_ = std::make_unique<Tier<tiler::CacheKey, tiler::EncodedTile>>(
-        OptionsOf(config.directory, config.tile_bytes, open_files, kTiles, false, anew));
-  }
-  if (config.refinement_bytes > 0) {
-    refinements_ = std::make_unique<Tier<tiler::RefinedTileKey, tiler::RefinedTile>>(
-        OptionsOf(config.directory, config.refinement_bytes, open_files, kRefinements, true, anew));
-  }
-  SetSize(lock_, 0);
-}
-
-tiler::TileStore* DiskCache::tiles() { return tiles_.get(); }
-
-tiler::RefinementStore* DiskCache::refinements() { return refinements_.get(); }
-
-DiskCache::~DiskCache() {
-  tiles_.reset();
-  refinements_.reset();
-  close(lock_);
-}
-
-void DiskCache::Flush() {
-  if (tiles_) tiles_->store().Flush();
-  if (refinements_) refinements_->store().Flush();
-}
-
-void DiskCache::Abandon() {
-  if (tiles_) tiles_->store().Abandon();
-  if (refinements_) refinements_->store().Abandon();
-}
-
-DiskCacheStats DiskCache::stats() const {
-  DiskCacheStats stats;
-  if (tiles_) stats.tiles = tiles_->store().stats();
-  if (refinements_) stats.refinements = refinements_->store().stats();
-  return stats;
+  lock->SetSize(unfinished + 1);
+  const auto options_of = [&](const char* name, std::size_t bytes, bool compress) {
+    DiskStoreOptions options;
+    options.db.directory = std::filesystem::path(config.directory) / name;
+    options.db.capacity_bytes = bytes > 0 ? std::max(bytes, RecordDb::kMinCapacity) : 0;
+    options.db.compress = compress;
+    options.db.open_files = open_files;
+    options.name = name;
+    if (anew && bytes > 0) static_cast<void>(RecordDb::Destroy(options.db));  // opening reports what is wrong
+    return options;
+  };
+  DiskCache cache;
+  cache.tiles = std::make_shared<DiskTier<tiler::CacheKey, tiler::EncodedTile>>(
+      lock, options_of("tiles", config.tile_bytes, /*compress=*/false));  // compressed already, or not compressible
+  cache.refinements = std::make_shared<DiskTier<tiler::RefinedTileKey, tiler::RefinedTile>>(
+      lock, options_of("refinements", config.refinement_bytes, /*compress=*/true));
+  lock->SetSize(0);
+  return cache;
 }
 
 }  // namespace terrace::server

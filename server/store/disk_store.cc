@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "tiler/store/seal.h"
+#include "tiler/store/tile_record.h"
 
 namespace terrace::server {
 namespace {
@@ -234,8 +234,8 @@ void DiskStore::Open() {
   writing_ = true;
 }
 
-DiskStoreStats DiskStore::stats() const {
-  DiskStoreStats stats;
+tiler::StoreStats DiskStore::stats() const {
+  tiler::StoreStats stats;
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
   stats.errors = errors_.load(std::memory_order_relaxed);

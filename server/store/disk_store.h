@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "server/store/record_db.h"
+#include "tiler/store/tile_store.h"
 
 namespace terrace::server {
 
@@ -27,16 +28,6 @@ struct DiskStoreOptions {
   std::string name;                                 // in the log: "tiles"
   std::size_t queue_bytes = std::size_t{16} << 20;  // memory of values that wait to be written; more are dropped
   std::chrono::milliseconds retry_after{2'000};
-};
-
-struct DiskStoreStats {
-  std::uint64_t hits = 0, misses = 0;
-  std::uint64_t errors = 0;   // reads and writes that failed
-  std::uint64_t damaged = 0;  // records with a wrong checksum, which were erased
-  std::uint64_t written = 0;
-  std::uint64_t dropped = 0;           // values not written because the disk failed or the queue was full
-  std::size_t entries = 0, bytes = 0;  // approximate, as of the last write
-  bool on = false;                     // both reading and writing
 };
 
 class DiskStore {
@@ -62,7 +53,7 @@ class DiskStore {
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();
 
-  DiskStoreStats stats() const;
+  tiler::StoreStats stats() const;
 
   // One write of the database: few enough that erasing and closing do not wait long, many enough that small tiles do
   // not cost a call each.

@@ -20,6 +20,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/dem/gdal/gdal_runtime.h"
+
 namespace terrace::server {
 namespace {
 
@@ -44,73 +46,52 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
   return family;
 }
 
-// One family by tier and kind, with a value for each cache.
-class CacheFamily {
- public:
-  CacheFamily(prometheus::MetricType type, const char* name, const char* help) {
-    family_.name = name;
-    family_.help = help;
-    family_.type = type;
-  }
-  CacheFamily& Add(const char* tier, const char* kind, std::uint64_t value) {
-    prometheus::ClientMetric metric;
-    metric.label = {{"tier", tier}, {"kind", kind}};
-    (family_.type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
-        static_cast<double>(value);
-    family_.metric.push_back(std::move(metric));
-    return *this;
-  }
-  prometheus::MetricFamily Take() { return std::move(family_); }
-
- private:
-  prometheus::MetricFamily family_;
+struct CacheTier {
+  const char *name, *kind;
+  tiler::StoreStats stats;
 };
 
-void AddCaches(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
-               const std::optional<DiskCacheStats>& disk_cache, std::vector<prometheus::MetricFamily>& all) {
+// A family for each number, with a value for each tier and kind. Memory, the first `in_memory` tiers, has no writes.
+void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::vector<prometheus::MetricFamily>& all) {
+  const auto add = [&](prometheus::MetricType type, const char* name, const char* help, auto member,
+                       std::size_t first) {
+    if (first == tiers.size()) return;
+    prometheus::MetricFamily family{name, help, type, {}};
+    for (std::size_t i = first; i < tiers.size(); ++i) {
+      prometheus::ClientMetric& metric = family.metric.emplace_back();
+      metric.label = {{"tier", tiers[i].name}, {"kind", tiers[i].kind}};
+      (type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
+          static_cast<double>(tiers[i].stats.*member);
+    }
+    all.push_back(std::move(family));
+  };
+  using Stats = tiler::StoreStats;
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
-  const auto both_tiers = [&](prometheus::MetricType type, const char* name, const char* help, auto memory, auto disk) {
-    CacheFamily family(type, name, help);
-    family.Add("memory", "tiles", tiles.cache.*memory).Add("memory", "refinements", refinements.*memory);
-    if (disk_cache) {
-      family.Add("disk", "tiles", disk_cache->tiles.*disk).Add("disk", "refinements", disk_cache->refinements.*disk);
-    }
-    all.push_back(family.Take());
-  };
-  both_tiers(kCounter, "terrace_cache_hits_total", "Found in a cache", &tiler::ByteCacheStats::hits,
-             &DiskStoreStats::hits);
-  both_tiers(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found",
-             &tiler::ByteCacheStats::misses, &DiskStoreStats::misses);
-  both_tiers(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &tiler::ByteCacheStats::entries,
-             &DiskStoreStats::entries);
-  both_tiers(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files",
-             &tiler::ByteCacheStats::bytes, &DiskStoreStats::bytes);
-  if (!disk_cache) return;
-  const auto disk_tier = [&](prometheus::MetricType type, const char* name, const char* help, auto member) {
-    all.push_back(CacheFamily(type, name, help)
-                      .Add("disk", "tiles", disk_cache->tiles.*member)
-                      .Add("disk", "refinements", disk_cache->refinements.*member)
-                      .Take());
-  };
-  disk_tier(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed",
-            &DiskStoreStats::errors);
-  disk_tier(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased",
-            &DiskStoreStats::damaged);
-  disk_tier(kCounter, "terrace_cache_written_total", "Values written", &DiskStoreStats::written);
-  disk_tier(kCounter, "terrace_cache_dropped_total", "Values not written, as the disk failed or was behind",
-            &DiskStoreStats::dropped);
-  disk_tier(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off",
-            &DiskStoreStats::on);
+  add(kCounter, "terrace_cache_hits_total", "Found in a cache", &Stats::hits, 0);
+  add(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &Stats::misses, 0);
+  add(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &Stats::entries, 0);
+  add(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files", &Stats::bytes, 0);
+  add(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed", &Stats::errors,
+      in_memory);
+  add(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased", &Stats::damaged,
+      in_memory);
+  add(kCounter, "terrace_cache_written_total", "Values written", &Stats::written, in_memory);
+  add(kCounter, "terrace_cache_dropped_total", "Values not written, as the disk failed or was behind", &Stats::dropped,
+      in_memory);
+  add(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off", &Stats::on,
+      in_memory);
 }
 
-prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::SampleCounts>>& datasets) {
+prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
   prometheus::MetricFamily family;
   family.name = "terrace_source_samples_total";
   family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
   family.type = prometheus::MetricType::Counter;
-  for (const auto& [dataset, counts] : datasets) {
-    const auto add = [&family, &name = dataset](const char* kind, std::uint64_t value) {
+  if (pipeline == nullptr) return family;
+  for (const tiler::Dataset& dataset : pipeline->datasets()) {
+    const dem::SampleCounts counts = dataset.source->CountSamples();
+    const auto add = [&family, &name = dataset.name](const char* kind, std::uint64_t value) {
       prometheus::ClientMetric& metric = family.metric.emplace_back();
       metric.label = {{"dataset", name}, {"kind", kind}};
       metric.counter.value = static_cast<double>(value);
@@ -122,14 +103,14 @@ prometheus::MetricFamily Samples(const std::vector<std::pair<std::string, dem::S
   return family;
 }
 
-prometheus::MetricFamily Versions(const std::vector<std::pair<std::string, std::string>>& datasets) {
+prometheus::MetricFamily Versions(const std::vector<DatasetView>& datasets) {
   prometheus::MetricFamily family;
   family.name = "terrace_dataset_info";
   family.help = "1 for each dataset, with the version that it is served in";
   family.type = prometheus::MetricType::Gauge;
-  for (const auto& [dataset, version] : datasets) {
+  for (const DatasetView& dataset : datasets) {
     prometheus::ClientMetric& metric = family.metric.emplace_back();
-    metric.label = {{"dataset", dataset}, {"version", version}};
+    metric.label = {{"dataset", dataset.name}, {"version", dataset.version()}};
     metric.gauge.value = 1;
   }
   return family;
@@ -306,15 +287,20 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   }
 }
 
-std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
-                          const SourceStats& sources, const ServerState& state) const {
+std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& state) const {
   constexpr auto kCounter = prometheus::MetricType::Counter;
   constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
     all.push_back(Value(type, name, help, static_cast<double>(value)));
   };
-  AddCaches(tiles, refinements, state.disk, all);
+  std::vector<CacheTier> tiers = {{"memory", "tiles", {tiles.cache}}, {"memory", "refinements", {state.refinements}}};
+  const std::size_t in_memory = tiers.size();
+  for (std::size_t i = 0; i < state.stores.size(); ++i) {
+    const tiler::StoreBase& store = *state.stores[i];
+    tiers.push_back({store.name(), i < state.tile_stores ? "tiles" : "refinements", store.stats()});
+  }
+  AddCaches(tiers, in_memory, all);
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
@@ -327,14 +313,16 @@ std::string Metrics::Text(const TileService::Stats& tiles, const tiler::ByteCach
       state.transfers.refused);
   add(kCounter, "terrace_http_transfers_cut_total",
       "Replies cut off and uploads displaced because others needed their room", state.transfers.cut);
-  add(kGauge, "terrace_datasets", "Datasets served", state.datasets);
+  add(kGauge, "terrace_datasets", "Datasets served", state.catalog->datasets.size());
   add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
+  all.push_back(Versions(state.catalog->datasets));
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
-  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", sources.gdal.errors);
-  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", sources.gdal.warnings);
-  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", sources.gdal.cache_bytes);
-  all.push_back(Samples(sources.samples));
-  all.push_back(Versions(state.versions));
+  const tiler::TilePipeline* const pipeline = state.catalog->pipeline.get();
+  const dem::GdalCounts gdal = pipeline != nullptr ? dem::CountGdalErrors() : dem::GdalCounts();
+  add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", gdal.errors);
+  add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", gdal.warnings);
+  add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", gdal.cache_bytes);
+  all.push_back(Samples(pipeline));
   return prometheus::TextSerializer().Serialize(all);
 }
 

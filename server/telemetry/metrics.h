@@ -4,16 +4,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "server/net/transfer_budget.h"
-#include "server/store/disk_cache.h"
 #include "server/telemetry/access_log.h"
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
+#include "tiler/store/tile_store.h"
 
 namespace terrace::server {
 
@@ -30,17 +29,19 @@ class Metrics {
   void RetainDatasets(const std::vector<DatasetView>& datasets);
 
   struct ServerState {
+    tiler::ByteCacheStats refinements;  // in memory
+    // The tiers below memory: `tile_stores` of tiles, then those of refinements.
+    std::vector<tiler::StoreBase*> stores;
+    std::size_t tile_stores = 0;
     std::size_t connections = 0;  // open
     std::uint64_t refused_connections = 0;
     TransferBudget::Stats transfers;
-    std::size_t datasets = 0, troubles = 0;
-    std::vector<std::pair<std::string, std::string>> versions = {};  // name and version of each dataset
-    std::uint64_t catalogs = 0;                                      // replaced so far
-    std::optional<DiskCacheStats> disk = {};                         // nothing: no disk cache
+    CatalogPtr catalog;  // never null
+    std::size_t troubles = 0;
+    std::uint64_t catalogs = 0;  // that have replaced one another
   };
   // Returns the text of all counters and of the given state.
-  std::string Text(const TileService::Stats& tiles, const tiler::ByteCacheStats& refinements,
-                   const SourceStats& sources, const ServerState& state) const;
+  std::string Text(const TileService::Stats& tiles, const ServerState& state) const;
 
  private:
   struct Families;

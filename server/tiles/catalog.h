@@ -1,70 +1,72 @@
-// What is served at one moment: the datasets, and the functions that make answers from them.
+// What is served at one moment: the datasets, and the pipeline that makes their answers.
 //
-// Immutable. A request uses the catalog it began with until its end, and so does a build that it starts: answers never
-// mix two catalogs.
+// Immutable, so any thread reads it without a lock. A request uses the catalog it began with until its end, and so does
+// a build that it starts: answers never mix two catalogs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <span>
-#include <stop_token>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/gdal/gdal_runtime.h"
-#include "server/tiles/dataset_view.h"
-#include "tiler/area/area_mesh.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/tile_request.h"
+#include "engine/geo/error_ladder.h"
+#include "engine/geo/tile_key.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
+#include "tiler/encoder_version.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::server {
 
-// Blocking; called on many threads at once. An exception counts as kUnavailable. TileRequest::dataset is an index into
-// the catalog's datasets.
-using TileBuilder = std::function<Result<tiler::EncodedTile>(const tiler::TileRequest&, std::stop_token)>;
+// A dataset as requests and documents see it: its name, its extent and the tiles that exist. Its index in the catalog's
+// list is TileRequest::dataset.
+struct DatasetView {
+  std::string name;
+  std::string attribution;
+  double error_fraction = geo::kDefaultErrorFraction;
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
+  std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
+  std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
+  double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
+  double min_height_m = 0, max_height_m = 0;                // of the data
+  double floor_m = 0;                                       // height where there is no data
+  // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
+  // above holds for all tiles.
+  std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
+  bool has_datum = true;                        // the vertical datum of its heights is known
+  std::size_t sources = 1;                      // rasters that the heights come from
+  bool has_water = false;                       // tiles have a water mask
+  std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
+  int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
+  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
 
-// Heights of a dataset at points, NaN where it has none.
-struct PointHeights {
-  PointHeights() = default;
-  // Heights of which none was filled in. Implicit on purpose.
-  PointHeights(std::vector<float> measured) : heights(std::move(measured)) {}  // NOLINT(google-explicit-constructor)
-
-  std::vector<float> heights;
-  std::vector<std::uint8_t> filled;  // by point: 1 where a void was filled in; empty: none was
+  // The version in URLs; changes with the generation.
+  std::string version() const { return tiler::VersionText(generation); }
+  int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 
-// Blocking; called on many threads at once.
-using PointReader = std::function<Result<PointHeights>(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
-                                                       dem::HeightDatum, std::stop_token)>;
-
-// Statistics of reading sources: GDAL's since the start; those of datasets, by name, since they were opened.
-struct SourceStats {
-  std::vector<std::pair<std::string, dem::SampleCounts>> samples;
-  dem::GdalCounts gdal;
-};
-
-// Makes meshes of areas, by the dataset's index. `plan` refuses areas that are too large; it reads nothing and returns
-// at once. `build` blocks. Both are called on many threads at once.
-struct AreaMesher {
-  std::function<Result<tiler::AreaPlan>(std::uint32_t dataset, const tiler::AreaRequest&)> plan;
-  std::function<Result<tiler::EncodedTile>(std::uint32_t dataset, const tiler::AreaPlan&, const tiler::AreaRequest&,
-                                           std::stop_token)>
-      build;
-};
-
-// The functions keep alive what they need.
 struct Catalog {
   std::vector<DatasetView> datasets;
-  TileBuilder build;
-  PointReader read_points;
-  AreaMesher area_mesher;
-  std::function<SourceStats()> source_stats = {};  // may be empty
+  std::shared_ptr<const tiler::TilePipeline> pipeline;
 };
-
 using CatalogPtr = std::shared_ptr<const Catalog>;
+
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline);
+
+// Also false for keys outside the tiling scheme.
+bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
+
+// Returns the bounds of the largest connected group of ranges of the deepest tiles, clipped to the dataset's bounds.
+// Degrees; west > east: across the antimeridian.
+dem::GeoBounds FinestBounds(const DatasetView& dataset);
+
+// Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the
+// dataset's bounds. Also false for keys outside the scheme.
+bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
+int MaxHeightLevel(const DatasetView& dataset, int size);
 
 }  // namespace terrace::server

@@ -62,7 +62,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   Flights::Landing landing = co_await flights_.Join(key, NameOf(request), std::move(build), order);
   if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!landing.value) co_return tl::unexpected(std::move(landing.value.error()));
-  const CacheStatus found = (*landing.value)->from_disk ? CacheStatus::kDisk : CacheStatus::kMiss;
+  const CacheStatus found = (*landing.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*landing.value), landing.joined ? CacheStatus::kJoined : found);
 }
 
@@ -81,12 +81,12 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
   for (const auto& store : stores_) {
     std::optional<tiler::EncodedTile> kept = store->Find(key);
     if (!kept) continue;
-    kept->from_disk = true;
+    kept->store = store->name();
     tiler::TilePtr tile = Finish(request, *std::move(kept));
     cache_.Insert(key, tile);
     return tile;
   }
-  const Work<tiler::EncodedTile> work = [&](std::stop_token token) { return catalog.build(request, std::move(token)); };
+  const Work<tiler::EncodedTile> work = [&](std::stop_token token) { return catalog.pipeline->Build(request, std::move(token)); };
   Result<tiler::EncodedTile> built = Outcome(NameOf(request), work, std::move(stop));
   Result<tiler::TilePtr> tile;
   if (built) {

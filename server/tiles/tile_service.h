@@ -1,7 +1,6 @@
 // Gets tiles for requests: from memory, from a build in progress, or on the worker pool from disk or a new build.
-// Thread-safe. The catalog builds tiles; this class depends on neither elevation models nor codecs. Cached tiles
-// outlive their catalog: a new catalog finds the tiles of datasets that stay in the same generation. The pool also runs
-// work for single requests (heights, meshes of areas, documents).
+// Thread-safe. Cached tiles outlive their catalog: a new catalog finds the tiles of datasets that stay in the same
+// generation. The pool also runs work for single requests (heights, meshes of areas, documents).
 #pragma once
 
 #include <atomic>
@@ -18,7 +17,6 @@
 #include "server/jobs/worker_pool.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoded_tile.h"
-#include "tiler/store/tile_cache.h"
 #include "tiler/store/tile_store.h"
 #include "tiler/tile_request.h"
 
@@ -40,7 +38,7 @@ struct TileServiceOptions {
   HeadWriter write_head = nullptr;  // null: heads are left empty
 };
 
-enum class CacheStatus { kHit, kDisk, kMiss, kJoined };
+enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: EncodedTile::store
 
 struct ServedTile {
   ServedTile() = default;
@@ -60,7 +58,7 @@ class TileService {
   // Returns the tile if it is in the cache, and counts a hit. May be called on any thread.
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
 
-  // For tiles that Find has not found: joins a flight, or starts one. Errors: those of the catalog's builder, and
+  // For tiles that Find has not found: joins a flight, or starts one. Errors: those of TilePipeline::Build, and
   // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
   // single thread. `client`: as in JobOrder. Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request, Clock::time_point deadline,

@@ -9,7 +9,6 @@
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/test_fields.h"
 #include "tests/fuzz/fuzz_input.h"
-#include "tiler/store/seal.h"
 #include "tiler/store/tile_record.h"
 
 namespace terrace::fuzz {

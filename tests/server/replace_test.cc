@@ -18,7 +18,7 @@ CatalogPtr CatalogOf(std::uint64_t generation, TileBuilder builder, const char* 
   catalog->datasets[0].name = name;
   catalog->datasets[0].generation = generation;
   catalog->datasets[0].available = {{{0, 0, 1, 0}}};
-  catalog->build = std::move(builder);
+  catalog->pipeline = std::make_shared<FakePipeline>(std::move(builder));
   return catalog;
 }
 

@@ -53,7 +53,8 @@ CatalogPtr ServerFixture::MakeCatalog() const {
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   std::vector<DatasetView> datasets = more_datasets_;
   datasets.insert(datasets.begin(), maui);
-  return std::make_shared<const Catalog>(Catalog{std::move(datasets), builder_, read_points_, area_mesher_});
+  return std::make_shared<const Catalog>(
+      Catalog{std::move(datasets), std::make_shared<FakePipeline>(builder_, read_points_, area_mesher_)});
 }
 
 std::string ServerFixture::BodyOf(const tiler::TileRequest& request) {

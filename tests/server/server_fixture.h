@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "server/server.h"
+#include "tests/server/fake_pipeline.h"
 #include "tests/server/raw_client.h"
 
 namespace terrace::server {

@@ -43,7 +43,7 @@ TEST_F(ServerTest, TellsHowLongRepliesMayBeKept) {
   more_datasets_.emplace_back().name = "oahu";
   more_datasets_.back().available = {{{0, 0, 1, 0}}};
   read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token) {
-    return Result<PointHeights>(std::vector<float>(points.size(), 7.0f));
+    return Result<std::vector<float>>(std::vector<float>(points.size(), 7.0f));
   };
   Start();
   const std::string v = std::string("v=") + kMauiVersion, other = "v=0a1b2c3d4e50";
@@ -438,10 +438,10 @@ TEST_F(ServerTest, RefusesNamesThatItsUrlsNeed) {
   DatasetView dataset;
   for (const char* name : {"metrics", "viewer", "", "a/b"}) {
     dataset.name = name;
-    EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset}, builder_, {}, {}}), {})) << name;
+    EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset}, nullptr}), {})) << name;
   }
   dataset.name = "maui";
-  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset, dataset}, builder_, {}, {}}), {}));
+  EXPECT_FALSE(Server::Start(std::make_shared<const Catalog>(Catalog{{dataset, dataset}, nullptr}), {}));
 }
 
 }  // namespace

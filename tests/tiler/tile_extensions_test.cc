@@ -1,5 +1,4 @@
 // The extensions of quantized-mesh tiles, built from the shipped global relief and decoded.
-#include "tiler/tile_extensions.h"
 
 #include <gtest/gtest.h>
 

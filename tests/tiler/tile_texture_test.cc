@@ -1,5 +1,4 @@
 // Textures of GLB tiles from an image to what a client decodes.
-#include "tiler/tile_texture.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

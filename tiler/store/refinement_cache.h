@@ -29,6 +29,7 @@ class RefinementCache {
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }
   // Of the memory tier.
   ByteCacheStats stats() const;
+  StoreBase* below() const { return below_.get(); }  // may be null
 
  private:
   ByteCache<RefinedTileKey, RefinedTileKeyHash, RefinedTile> memory_;

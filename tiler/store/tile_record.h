@@ -1,16 +1,17 @@
 // Serialization for stores that outlive the process: keys, encoded tiles, refined tiles.
 //
 // A key holds everything that its value depends on within one build of the program: the dataset's generation, which
-// identifies the dataset, and the request. seal.h detects damage, not forgery: trust the store.
+// identifies the dataset, and the request. Seal detects damage, not forgery: trust the store.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "engine/core/result.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/store/refined_tile.h"
-#include "tiler/store/tile_cache.h"
+#include "tiler/store/tile_store.h"
 
 namespace terrace::tiler {
 
@@ -25,5 +26,11 @@ Result<EncodedTile> ParseTile(std::string_view bytes);
 std::string SerializeRefinedTile(const RefinedTile& tile);
 // kInvalidArgument: not written by SerializeRefinedTile.
 Result<RefinedTile> ParseRefinedTile(std::string_view bytes);
+
+// Values of a store with a checksum over key and value, so that a damaged or misplaced value is detected.
+std::string Seal(std::string_view key, std::string value);
+
+// The value within `sealed`, or nothing if its bits, length or key differ (with a probability of 1 - 2^-64).
+std::optional<std::string_view> Unseal(std::string_view key, std::string_view sealed);
 
 }  // namespace terrace::tiler

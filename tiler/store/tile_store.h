@@ -1,23 +1,61 @@
-// The interface of a cache tier for tiles and refinements.
+// The interface of a cache tier for tiles and refinements. A tier is a class that implements it and a row where the
+// program lists its tiers; look-ups, metrics and the stop go through the list.
 //
-// Implementations are thread-safe. Find may block on a disk or a network. Insert returns at once.
+// Implementations are thread-safe. Find may block on a disk or a network. The others return at once.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <vector>
 
+#include "tiler/encoded_tile.h"
+#include "tiler/store/byte_cache.h"
 #include "tiler/store/refined_tile.h"
-#include "tiler/store/tile_cache.h"
+#include "tiler/tile_request.h"
 
 namespace terrace::tiler {
 
-template <typename Key, typename Value>
-class Store {
- public:
-  virtual ~Store() = default;
+// A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
+// generation identifies the dataset: keys stay valid while other datasets are added or removed.
+struct CacheKey {
+  TileRequest request;  // its `dataset` is 0
+  std::uint64_t generation = 0;
 
+  friend bool operator==(const CacheKey&, const CacheKey&) = default;
+};
+
+struct CacheKeyHash {
+  std::size_t operator()(const CacheKey& key) const noexcept {
+    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation);
+  }
+};
+
+// The tier in memory.
+using TileCache = ByteCache<CacheKey, CacheKeyHash, EncodedTile>;
+
+struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
+  std::uint64_t errors = 0;           // reads and writes that failed
+  std::uint64_t damaged = 0;          // records with a wrong checksum, which were erased
+  std::uint64_t written = 0;
+  std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
+  bool on = false;            // both reading and writing
+};
+
+class StoreBase {
+ public:
+  virtual ~StoreBase() = default;
+
+  // A literal: what metrics and Server-Timing call the tier.
+  virtual const char* name() const = 0;
+  virtual StoreStats stats() const = 0;
+
+  // Drops values that wait to be written, and accepts no more: the process ends, and has no time left.
+  virtual void Abandon() = 0;
+};
+
+template <typename Key, typename Value>
+class Store : public StoreBase {
+ public:
   // Returns a copy, or nothing if the key is absent.
   virtual std::optional<Value> Find(const Key& key) = 0;
 

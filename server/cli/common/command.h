@@ -1,6 +1,9 @@
 // One subcommand of `terrace`: adds its flags to the parser, and runs.
 #pragma once
 
+#include <cstdio>
+#include <string>
+
 namespace CLI {
 class App;
 }
@@ -13,6 +16,19 @@ inline constexpr int kExitFailure = 1;  // the work could not be done
 inline constexpr int kExitUsage = 2;    // the command line or the configuration is wrong
 
 inline constexpr const char* kCommands = "Commands";  // heading in the help
+
+// Prints "terrace: MESSAGE" on stderr; returns the exit code.
+inline int Fail(const std::string& message, int code) {
+  std::fprintf(stderr, "terrace: %s\n", message.c_str());
+  return code;
+}
+
+// Flushes stdout. Returns `code`, or kExitFailure if stdout could not be written.
+inline int FinishOutput(int code) {
+  if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return code;
+  std::perror("terrace: stdout cannot be written");
+  return code == kExitOk ? kExitFailure : code;
+}
 
 // Each adds its subcommand to `app`. If the user selects it, the parser's callback runs it and stores the exit code in
 // `exit_code`.

@@ -23,7 +23,6 @@
 #include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/error_ladder.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/fail.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"

@@ -6,13 +6,19 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <exception>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -21,14 +27,15 @@
 #include "engine/dem/gdal/source_policy.h"
 #include "engine/dem/sources/read_raster.h"
 #include "engine/tin/decimate/drop_pass.h"
+#include "engine/tin/extended/block_joiner.h"
 #include "engine/tin/extended/field_cut.h"
 #include "engine/tin/greedy.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/mesh_error.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/fail.h"
 #include "server/cli/common/progress.h"
-#include "server/cli/mesh/mesh_blocks.h"
 #include "server/cli/mesh/mesh_color.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
@@ -36,6 +43,48 @@
 
 namespace terrace::cli {
 namespace {
+
+// Returns the joined mesh of all blocks. It does not depend on `threads`, which is at least 1. Shows the number of
+// finished blocks. If a thread throws, stops the others and rethrows.
+tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut, double max_error_m,
+                        const tin::GreedyOptions& options, int threads) {
+  std::atomic<std::size_t> next = 0;
+  std::stop_source failed;
+
+  std::mutex mutex;  // guards everything below
+  Progress progress("meshing");
+  tin::BlockJoiner joiner(cut);
+  std::vector<std::optional<tin::TinMesh>> waiting(cut.size());  // for an earlier block
+  std::size_t done = 0;
+  std::exception_ptr failure;
+
+  const auto mesh_blocks = [&] {
+    try {
+      for (std::size_t i = next++; i < cut.size(); i = next++) {
+        std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options, failed.get_token());
+        if (!mesh) return;
+        const std::lock_guard lock(mutex);
+        waiting[i] = std::move(mesh);
+        while (joiner.added() < cut.size() && waiting[joiner.added()]) {
+          joiner.Add(*std::exchange(waiting[joiner.added()], std::nullopt));
+        }
+        progress.Update(static_cast<double>(++done) / static_cast<double>(cut.size()));
+      }
+    } catch (...) {
+      failed.request_stop();
+      const std::lock_guard lock(mutex);
+      failure = std::current_exception();
+    }
+  };
+  {
+    std::vector<std::jthread> others;
+    const std::size_t most = std::min(static_cast<std::size_t>(threads), cut.size());
+    while (others.size() + 1 < most) others.emplace_back(mesh_blocks);
+    mesh_blocks();
+  }
+  if (failure) std::rethrow_exception(failure);
+  return std::move(joiner).Take();
+}
 
 using Clock = std::chrono::steady_clock;
 

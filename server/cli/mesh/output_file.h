@@ -9,9 +9,23 @@
 #include <string>
 
 #include "engine/core/result.h"
-#include "server/cli/mesh/unfinished_file.h"
 
 namespace terrace::cli {
+
+// At most one at a time. The destructor removes the file; so do SIGINT, SIGTERM and SIGHUP before they end the process.
+// Ignored signals stay ignored. If the process ends in another way, the file stays.
+class UnfinishedFile {
+ public:
+  explicit UnfinishedFile(std::string path);
+  UnfinishedFile(const UnfinishedFile&) = delete;
+  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
+  ~UnfinishedFile();
+
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
 
 class OutputFile {
  public:

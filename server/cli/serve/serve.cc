@@ -6,16 +6,20 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -27,7 +31,6 @@
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/statistics/cache_folder.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/fail.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
@@ -36,13 +39,12 @@
 #include "server/cli/serve/descriptor_plan.h"
 #include "server/cli/serve/log.h"
 #include "server/cli/serve/service_manager.h"
-#include "server/cli/serve/stop_limit.h"
 #include "server/cli/serve/try_start.h"
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
 #include "server/store/disk_cache.h"
-#include "server/tiles/pipeline_catalog.h"
+#include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
 #include "tiler/tile_pipeline.h"
@@ -204,6 +206,29 @@ config::Config WithViewer(config::Config config) {
 // The time that stopping may take beyond the drain timeout.
 constexpr std::chrono::seconds kStopTime{1};
 
+// Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
+// returns, and its thread cannot be joined.
+class StopLimit {
+ public:
+  // Ends the process with status 1 after `limit`, whatever its threads do. Call once.
+  void Begin(std::chrono::milliseconds limit) {
+    thread_ = std::jthread([limit](const std::stop_token& stop) {
+      std::mutex mutex;
+      std::unique_lock lock(mutex);
+      std::condition_variable_any().wait_for(lock, stop, limit, [] { return false; });
+      if (stop.stop_requested()) return;
+      spdlog::error(
+          "stopped: threads that still worked {} s after the signal were cut off; look whether a source can be read",
+          std::chrono::duration<double>(limit).count());
+      spdlog::default_logger()->flush();
+      std::_Exit(kExitFailure);
+    });
+  }
+
+ private:
+  std::jthread thread_;  // ends with this object
+};
+
 // Signals that the running server handles, except those that end it.
 const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
 
@@ -264,14 +289,13 @@ int Serve(const ServeArguments& arguments) {
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
   StopLimit stop_limit;  // first, because it limits how long the others take to end
-  Result<std::shared_ptr<server::DiskCache>> disk(nullptr);
-  if (!config.disk_cache.directory.empty()) disk = server::DiskCache::Open(config.disk_cache, budget->store_files);
+  Result<server::DiskCache> disk;
+  if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
-  const auto refinements = std::make_shared<tiler::RefinementCache>(
-      config.refinement_cache_bytes,
-      *disk ? std::shared_ptr<tiler::RefinementStore>(*disk, (*disk)->refinements()) : nullptr);
-  options.disk_cache = *std::move(disk);
-  options.refinement_stats = [refinements] { return refinements->stats(); };
+  if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
+  options.refinements =
+      std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
+  const auto refinements = options.refinements;
   const dem::RasterCache cache = OpenCache(config);
   options.cache_trouble = [folder = cache.folder] { return folder ? folder->trouble() : std::string(); };
   std::unique_ptr<server::Reloader> reloader;  // once there are datasets to watch
@@ -301,8 +325,8 @@ int Serve(const ServeArguments& arguments) {
   if (!are_open) return kExitFailure;
   if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
   std::atomic<std::size_t> count = datasets.size();
-  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, const config::Config& now) {
-    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), now.max_mesh_samples);
+  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served) {
+    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements));
   };
   const auto served_text = [&] {
     const std::size_t datasets_served = count;
@@ -327,7 +351,7 @@ int Serve(const ServeArguments& arguments) {
   hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
     refinements->SetCapacity(now.refinement_cache_bytes);
-    if (const Result<void> replaced = server->Replace(catalog_of(served, now), now); !replaced) {
+    if (const Result<void> replaced = server->Replace(catalog_of(served), now); !replaced) {
       spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
     } else {
       count = served.size();
@@ -342,7 +366,7 @@ int Serve(const ServeArguments& arguments) {
   };
   hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
   reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
-  if (const Result<void> served = server->Replace(catalog_of(datasets, config), config); !served) {
+  if (const Result<void> served = server->Replace(catalog_of(datasets), config); !served) {
     return Fail(served.error());
   }
   datasets.clear();  // replaced files must not stay open

@@ -1,5 +1,3 @@
-#include "server/api/access.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +5,7 @@
 #include <string>
 
 #include "config/common/token_hash.h"
+#include "server/edge/gate.h"
 
 namespace terrace::server {
 namespace {

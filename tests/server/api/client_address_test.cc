@@ -1,4 +1,4 @@
-#include "server/api/client_address.h"
+#include "server/edge/client_address.h"
 
 #include <gtest/gtest.h>
 

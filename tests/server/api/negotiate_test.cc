@@ -1,5 +1,3 @@
-#include "server/api/negotiate.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -9,6 +7,7 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/mesh/skirt.h"
+#include "server/api/tile_formats.h"
 #include "tests/server/test_call.h"
 
 namespace terrace::server {

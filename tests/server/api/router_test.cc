@@ -1,5 +1,3 @@
-#include "server/api/router.h"
-
 #include <gtest/gtest.h>
 
 #include <string>

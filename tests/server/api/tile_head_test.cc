@@ -1,11 +1,11 @@
-#include "server/api/tile_head.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <random>
+
+#include "server/api/tile_formats.h"
 
 namespace terrace::server {
 namespace {

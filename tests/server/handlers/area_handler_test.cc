@@ -1,6 +1,6 @@
-#include "server/handlers/area_handler.h"
-
 #include <gtest/gtest.h>
+
+#include "server/handlers/handlers.h"
 
 namespace terrace::server {
 namespace {

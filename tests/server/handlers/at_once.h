@@ -1,13 +1,44 @@
-// What handlers of documents answer, with documents made in place.
+// Handlers of made-up datasets, and what those of documents answer, with documents made in place.
 #pragma once
 
+#include <map>
+#include <memory>
+#include <string>
 #include <utility>
+#include <vector>
 
-#include "server/api/negotiate.h"
-#include "server/documents/document_maker.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "tests/server/test_call.h"
 
 namespace terrace::server {
+
+class TestHandlers : private ProcessState {
+ public:
+  explicit TestHandlers(CatalogPtr catalog)
+      : tiles_({.worker_threads = 1}),
+        all(std::move(catalog), tiles_, std::make_shared<const StaticFiles>(), Configured(), *this) {}
+  explicit TestHandlers(std::vector<DatasetView> datasets)
+      : TestHandlers(std::make_shared<const Catalog>(Catalog{std::move(datasets), nullptr})) {}
+
+ private:
+  static config::Config Configured() {
+    config::Config config;
+    config.cache_control = "max-age=1";
+    config.trusted_proxies = {"127.0.0.1"};
+    config.forwarded_header = config::ForwardedHeader::kForwarded;
+    return config;
+  }
+  bool draining() const override { return false; }
+  bool opening() const override { return false; }
+  std::map<std::string, std::string> troubles() const override { return {}; }
+  asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { co_return nullptr; }
+
+  TileService tiles_;
+
+ public:
+  const Handlers all;
+};
 
 inline Response AtOnce(Described described, const Request& request) {
   const auto* plan = std::get_if<DocumentPlan>(&described);

@@ -1,9 +1,9 @@
-#include "server/handlers/datasets_handler.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <nlohmann/json.hpp>
+
+#include "server/handlers/handlers.h"
 
 namespace terrace::server {
 namespace {

@@ -1,10 +1,9 @@
-#include "server/handlers/layer_handler.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "server/handlers/handlers.h"
 #include "tests/server/handlers/at_once.h"
 
 namespace terrace::server {
@@ -19,16 +18,16 @@ class LayerHandlerTest : public testing::Test {
     datasets_[0].available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}}};
     datasets_[0].west = 170;
     datasets_[0].east = -170;
-    handler_.emplace(datasets_);
+    handlers_.emplace(datasets_);
   }
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return AtOnce(handler_->Handle(TestCall(target, request).call), request);
+    return AtOnce(DescribeLayer(handlers_->all, TestCall(target, request).call), request);
   }
 
-  std::array<DatasetView, 1> datasets_;
-  std::optional<LayerHandler> handler_;
+  std::vector<DatasetView> datasets_{1};
+  std::optional<TestHandlers> handlers_;
 };
 
 TEST_F(LayerHandlerTest, DescribesTheDataset) {

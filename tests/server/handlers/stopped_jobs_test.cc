@@ -6,10 +6,8 @@
 #include <vector>
 
 #include "proto/documents/layer_json.h"
-#include "server/documents/document_maker.h"
-#include "server/handlers/certified_points.h"
-#include "server/handlers/datasets_handler.h"
-#include "server/handlers/heights_handler.h"
+#include "server/documents/document.h"
+#include "server/handlers/handlers.h"
 #include "tests/server/handlers/allocations.h"
 
 namespace terrace::server {
@@ -64,7 +62,7 @@ TEST(StoppedJobs, DocumentsAreNotCompressed) {
 TEST(StoppedJobs, HeightsEnd) {
   HeightsQuery query;
   query.points.resize(200'000);
-  const std::vector<float> heights(query.points.size(), 1.5F);
+  const tiler::PointHeights heights{std::vector<float>(query.points.size(), 1.5F)};
   const StopAtAllocation stop(kMiddle);
   EXPECT_EQ(HeightsJson(query, heights, "maui", nullptr, stop.token()), "");
   EXPECT_TRUE(stop.happened());

@@ -1,12 +1,11 @@
-#include "server/handlers/tile_json_handler.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "tests/server/test_call.h"
+#include "server/handlers/handlers.h"
+#include "tests/server/handlers/at_once.h"
 
 namespace terrace::server {
 namespace {
@@ -16,17 +15,19 @@ class TileJsonHandlerTest : public testing::Test {
   TileJsonHandlerTest() {
     datasets_[0].name = "a b";
     datasets_[0].generation = 0x0a1b2c3d4e5f6789;
+    datasets_[0].available = {{{0, 0, 1, 0}}};
     datasets_[0].max_mercator_depth = 12;
   }
   Response Get(const char* target, const char* host = "example.test:8080", bool is_https = false) {
     Request request;
     request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
-    return TileJsonHandler(datasets_, "Forwarded").Handle(TestCall(target, request).call);
+    const TestHandlers handlers(datasets_);
+    return std::get<Response>(AnswerTileJson(handlers.all, TestCall(target, request).call));
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 
-  std::array<DatasetView, 1> datasets_;
+  std::vector<DatasetView> datasets_{1};
 };
 
 TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {

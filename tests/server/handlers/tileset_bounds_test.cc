@@ -12,9 +12,9 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/height_span.h"
-#include "server/api/negotiate.h"
-#include "server/handlers/tileset_handler.h"
-#include "server/tiles/pipeline_catalog.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
+#include "server/tiles/catalog.h"
 #include "tests/proto/glb_decoder.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"
@@ -35,8 +35,7 @@ CatalogPtr Mosaic() {
   tiler::Dataset dataset;
   dataset.name = "earth";
   dataset.source = *std::move(source);
-  return MakeCatalog(std::make_shared<const tiler::TilePipeline>(std::vector<tiler::Dataset>{std::move(dataset)}),
-                     1 << 20);
+  return MakeCatalog(std::make_shared<const tiler::TilePipeline>(std::vector<tiler::Dataset>{std::move(dataset)}));
 }
 
 struct Geodetic {
@@ -62,14 +61,15 @@ class TilesetBoundsTest : public testing::Test {
     static const CatalogPtr mosaic = Mosaic();
     catalog_ = mosaic;
     ASSERT_NE(catalog_, nullptr);
-    handler_.emplace(catalog_->datasets, "no-cache");
+    handlers_.emplace(catalog_);
   }
 
   std::string Get(const std::string& target) {
     const TestCall sent("/earth/" + target);
     const bool is_subtree = sent.call.route.row->label == "subtree";
+    const Handlers& from = handlers_->all;
     const Response response =
-        AtOnce(is_subtree ? handler_->HandleSubtree(sent.call) : handler_->Handle(sent.call), sent.request);
+        AtOnce(is_subtree ? DescribeSubtree(from, sent.call) : DescribeTileset(from, sent.call), sent.request);
     EXPECT_EQ(response.status, 200) << target;
     return *response.body;
   }
@@ -77,7 +77,7 @@ class TilesetBoundsTest : public testing::Test {
   proto::DecodedGlb Glb(const std::string& target) {
     const Result<tiler::TileRequest> tile = Negotiate(TestCall("/earth/" + target).call, catalog_->datasets);
     EXPECT_TRUE(tile) << target;
-    const auto built = catalog_->build(*tile, {});
+    const auto built = catalog_->pipeline->Build(*tile, {});
     EXPECT_TRUE(built) << target;
     auto glb = proto::DecodeGlb(built->bytes);
     EXPECT_TRUE(glb) << target;
@@ -106,7 +106,7 @@ class TilesetBoundsTest : public testing::Test {
   HeightSpan CheckTile(const Json& tile, bool builds);
 
   CatalogPtr catalog_;
-  std::optional<TilesetHandler> handler_;
+  std::optional<TestHandlers> handlers_;
   int checked_ = 0, named_ = 0, trees_ = 0;
   double flattest_tree_m = 1e9;
 };

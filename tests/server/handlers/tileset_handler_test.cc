@@ -1,5 +1,3 @@
-#include "server/handlers/tileset_handler.h"
-
 #include <gtest/gtest.h>
 
 #include <array>
@@ -7,7 +5,8 @@
 
 #include "engine/geo/error_ladder.h"
 #include "proto/mesh/skirt.h"
-#include "server/api/negotiate.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
 #include "tests/proto/subtree_reader.h"
 #include "tests/server/handlers/at_once.h"
 
@@ -33,19 +32,20 @@ class TilesetHandlerTest : public testing::Test {
       maui.available[static_cast<std::size_t>(level)] = {{512 >> up, 1024 >> up, 551 >> up, 1047 >> up}};
     }
     maui.available[0] = {{0, 0, 1, 0}};
-    handler_.emplace(datasets_, "max-age=1");
+    handlers_.emplace(datasets_);
   }
   Response Get(const std::string& target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
     const TestCall sent(target, request);
     const bool is_subtree = sent.call.route.row->label == "subtree";
-    return AtOnce(is_subtree ? handler_->HandleSubtree(sent.call) : handler_->Handle(sent.call), request);
+    return AtOnce(is_subtree ? DescribeSubtree(handlers_->all, sent.call) : DescribeTileset(handlers_->all, sent.call),
+                  request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
 
-  std::array<DatasetView, 1> datasets_;
-  std::optional<TilesetHandler> handler_;
+  std::vector<DatasetView> datasets_{1};
+  std::optional<TestHandlers> handlers_;
 };
 
 TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
@@ -73,7 +73,7 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMa
     range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
   }
   const auto roots = [&] {
-    handler_.emplace(datasets_, "max-age=1");
+    handlers_.emplace(datasets_);
     const Json root = Tileset().at("root");
     std::vector<std::string> uris;
     for (const Json& tree : root.at("children")) uris.push_back(tree.at("content").at("uri"));
@@ -146,7 +146,7 @@ TEST_F(TilesetHandlerTest, EveryRootHasTheHeightsOfItsOwnTile) {
   datasets_[0].range_bound = [](const geo::TileKey& key) {
     return dem::HeightRange{static_cast<double>(-key.x), 1000.0 * static_cast<double>(key.x - 15)};
   };
-  handler_.emplace(datasets_, "max-age=1");
+  handlers_.emplace(datasets_);
   const Json root = Tileset("?fraction=0.05").at("root");
   const auto region = [](const Json& tile) { return tile.at("boundingVolume").at("region"); };
   const double error_m = geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7)));
@@ -167,6 +167,7 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
   datasets_[0].range_bound = [](const geo::TileKey& key) {
     return dem::HeightRange{-10.0 * key.level, static_cast<double>(key.x % 4)};
   };
+  handlers_.emplace(datasets_);
   for (const std::string_view query : {"", "?error=600&atleast=1", "?fraction=0.02"}) {
     const Result<proto::ReadSubtree> read =
         proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree").append(query)).body, 6);

@@ -7,7 +7,7 @@
 #include <stop_token>
 #include <string>
 
-#include "server/handlers/heights_handler.h"
+#include "server/handlers/handlers.h"
 #include "server/query/heights_parameters.h"
 
 namespace terrace::server {
@@ -245,7 +245,7 @@ TEST(HeightsQuery, IsCancelledWhileItReadsAndWalks) {
 TEST(HeightsJson, IsWhatOpenTopoDataSends) {
   HeightsQuery query;
   query.points = {{8.5, 46.5}, {-170, 0}};
-  const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN()};
+  const tiler::PointHeights heights{{1473.25f, std::numeric_limits<float>::quiet_NaN()}};
   EXPECT_EQ(HeightsJson(query, heights, "alps"),
             R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"dataset":"alps"},)"
             R"({"elevation":null,"location":{"lat":0,"lng":-170},"dataset":"alps"}],"status":"OK"})");
@@ -258,7 +258,7 @@ TEST(HeightsJson, IsWhatOpenTopoDataSends) {
 TEST(HeightsJson, SaysWhatWasFilledIn) {
   HeightsQuery query;
   query.points = {{8.5, 46.5}, {8.6, 46.5}, {-170, 0}};
-  PointHeights heights(std::vector<float>{1473.25f, 1500, std::numeric_limits<float>::quiet_NaN()});
+  tiler::PointHeights heights{std::vector<float>{1473.25f, 1500, std::numeric_limits<float>::quiet_NaN()}};
   heights.filled = {1, 0, 1};
   EXPECT_EQ(HeightsJson(query, heights, "a"),
             R"({"results":[{"elevation":1473.25,"location":{"lat":46.5,"lng":8.5},"filled":true,"dataset":"a"},)"
@@ -276,7 +276,7 @@ TEST(HeightsJson, SaysWhatWasFilledIn) {
 TEST(HeightsJson, SaysWhichTileIsHowFarOff) {
   HeightsQuery query;
   query.points = {{8.5, 46.5}, {-170, 0}, {8.6, 46.5}};
-  const std::vector<float> heights = {1473.25f, std::numeric_limits<float>::quiet_NaN(), 1500};
+  const tiler::PointHeights heights{{1473.25f, std::numeric_limits<float>::quiet_NaN(), 1500}};
   CertifiedPoints certified;
   certified.tiles = {{12, 4289, 3105}, {0, 0, 0}, {12, 4291, 3105}};
   certified.tile_of_point = {0, 1, 2};

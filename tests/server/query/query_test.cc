@@ -1,6 +1,7 @@
-#include "server/query/query.h"
-
 #include <gtest/gtest.h>
+
+#include "server/api/tile_formats.h"
+#include "server/http/text.h"
 
 namespace terrace::server {
 namespace {

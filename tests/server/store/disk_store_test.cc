@@ -105,7 +105,7 @@ TEST_F(DiskStoreTest, FindsWhatWasKeptAndAfterARestart) {
     store.Flush();
     EXPECT_EQ(FoundRight(store, 200), 200);
     EXPECT_FALSE(store.Find("another key"));
-    const DiskStoreStats stats = store.stats();
+    const tiler::StoreStats stats = store.stats();
     EXPECT_EQ(stats.hits, 200u);
     EXPECT_EQ(stats.misses, 1u);
     EXPECT_EQ(stats.written, 200u);
@@ -206,7 +206,7 @@ TEST_F(DiskStoreTest, DropsWhatItCannotWriteInTime) {
   go = true;
   store.Flush();
   EXPECT_EQ(store.Find("slow"), "slow");
-  const DiskStoreStats stats = store.stats();
+  const tiler::StoreStats stats = store.stats();
   EXPECT_EQ(stats.written + stats.dropped, 101u);
 }
 

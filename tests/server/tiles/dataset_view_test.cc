@@ -1,4 +1,4 @@
-#include "server/tiles/dataset_view.h"
+#include "server/tiles/catalog.h"
 
 #include <gtest/gtest.h>
 

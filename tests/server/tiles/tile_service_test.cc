@@ -10,6 +10,8 @@
 #include <optional>
 #include <thread>
 
+#include "tests/server/fake_pipeline.h"
+
 namespace terrace::server {
 namespace {
 
@@ -18,7 +20,7 @@ std::shared_ptr<Catalog> CatalogOf(TileBuilder builder) {
   auto catalog = std::make_shared<Catalog>();
   catalog->datasets.resize(1);
   catalog->datasets[0].generation = 1;
-  catalog->build = std::move(builder);
+  catalog->pipeline = std::make_shared<FakePipeline>(std::move(builder));
   return catalog;
 }
 

@@ -1,9 +1,9 @@
-#include "tiler/store/tile_cache.h"
-
 #include <gtest/gtest.h>
 
 #include <thread>
 #include <vector>
+
+#include "tiler/store/tile_store.h"
 
 namespace terrace::tiler {
 namespace {

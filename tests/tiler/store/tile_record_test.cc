@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "engine/tin/greedy.h"
-#include "tiler/store/seal.h"
 
 namespace terrace::tiler {
 namespace {

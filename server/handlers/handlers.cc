@@ -1,0 +1,41 @@
+#include "server/handlers/handlers.h"
+
+#include <utility>
+
+namespace terrace::server {
+namespace {
+
+std::string_view OriginHeaders(const config::Config& config) {
+  if (config.trusted_proxies.empty()) return {};
+  return config.forwarded_header == config::ForwardedHeader::kForwarded ? "Forwarded"
+                                                                        : "X-Forwarded-Host, X-Forwarded-Proto";
+}
+
+std::vector<Handlers::OfDataset> MakeOfDatasets(const std::vector<DatasetView>& datasets) {
+  std::vector<Handlers::OfDataset> made(datasets.size());
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    made[i].layer = PlainLayer(datasets[i]);
+    AddTileset(datasets[i], made[i]);
+  }
+  return made;
+}
+
+}  // namespace
+
+Handlers::Handlers(CatalogPtr c, TileService& t, std::shared_ptr<const StaticFiles> v, const config::Config& config,
+                   const ProcessState& p)
+    : catalog(std::move(c)),
+      tiles(t),
+      process(p),
+      viewer(std::move(v)),
+      cache_control(config.cache_control),
+      origin_headers(OriginHeaders(config)),
+      deadline(config.request_deadline),
+      max_locations(config.max_locations),
+      max_mesh_samples(config.max_mesh_samples),
+      of_datasets(MakeOfDatasets(catalog->datasets)),
+      list(Document::Make(DatasetsJson(catalog->datasets), "application/json")),
+      index(Document::Make(IndexHtml(catalog->datasets), "text/html; charset=utf-8")),
+      documents(catalog, tiles, deadline) {}
+
+}  // namespace terrace::server

@@ -1,0 +1,169 @@
+// The handlers, one function for each kind of URL (server/routes.cc), and what they answer from.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "engine/geo/tile_key.h"
+#include "proto/documents/implicit_tree.h"
+#include "server/api/call.h"
+#include "server/api/tile_formats.h"
+#include "server/asio.h"
+#include "server/documents/document.h"
+#include "server/documents/static_files.h"
+#include "server/http/application.h"
+#include "server/query/heights_query.h"
+#include "server/tiles/catalog.h"
+#include "server/tiles/tile_service.h"
+#include "tiler/area/area_mesh.h"
+
+namespace terrace::server {
+
+// The key of the statistics cache's folder among the problems. No dataset has such a name.
+inline constexpr const char* kCacheTrouble = "/cache_dir";
+
+// The current state of the process. Thread-safe.
+class ProcessState {
+ public:
+  virtual ~ProcessState() = default;
+  virtual bool draining() const = 0;
+  virtual bool opening() const = 0;  // the first catalog has not been opened yet
+  // Problems by dataset; "" is the configuration, kCacheTrouble the cache folder.
+  virtual std::map<std::string, std::string> troubles() const = 0;
+  virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
+};
+
+// One for each catalog. Thread-safe. A request keeps it alive until it is answered.
+struct Handlers {
+  // `tiles`: its workers do work that takes long. `tiles` and `process` must outlive this object.
+  Handlers(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
+           const config::Config& config, const ProcessState& process);
+
+  // The deadline of a request that begins now.
+  TileService::Clock::time_point Deadline() const { return TileService::Clock::now() + deadline; }
+
+  const CatalogPtr catalog;
+  TileService& tiles;
+  const ProcessState& process;
+  const std::shared_ptr<const StaticFiles> viewer;
+
+  // From the configuration.
+  const std::string cache_control;  // for requests without a version
+  // A literal: the headers in which a trusted proxy reports the origin; empty: no proxy is trusted.
+  const std::string_view origin_headers;
+  const std::chrono::milliseconds deadline;  // of an answer that has to be made
+  const std::size_t max_locations, max_mesh_samples;
+
+  // Documents for requests without parameters.
+  struct OfDataset {
+    Document layer, tileset;
+    std::shared_ptr<const std::vector<proto::TreeRoot>> roots;  // of its implicit trees
+  };
+  const std::vector<OfDataset> of_datasets;  // by index
+  const Document list, index;                // of all datasets: /datasets, and `/` without a viewer
+
+  const DocumentMaker documents;
+};
+
+// GET /{dataset}/{z}/{x}/{y}.terrain, .glb and .png. Replies that need no build (refusals and cached tiles) are
+// returned at once. Precondition: the route has a format.
+Answer AnswerTile(const Handlers& from, const Call& call);
+// "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
+std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times);
+
+// GET and POST /{dataset}/heights
+Answer AnswerHeights(const Handlers& from, const Call& call);
+
+// Limit of tiles per request: each must be built if it is not cached.
+inline constexpr std::size_t kMaxCertifiedTiles = 64;
+
+struct CertifiedPoints {
+  std::vector<geo::TileKey> tiles;              // without duplicates
+  std::vector<std::size_t> tile_of_point;       // index into `tiles`
+  std::vector<std::optional<double>> errors_m;  // by tile; nothing: the tile states none
+};
+
+// Returns the deepest available tile of each point, down to level `deepest`. kInvalidArgument, with a message for the
+// client: more than kMaxCertifiedTiles. kCancelled: a stop was requested.
+Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
+                                const std::stop_token& stop = {});
+
+// {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, the format of Open Topo Data. Points of
+// a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. Orthometric
+// heights have "datum". `certified`: adds "certified_error" and "tile" to each point with a height; null: nothing is
+// added. Returns an empty string if a stop was requested.
+std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
+                        const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
+
+// GET /{dataset}/mesh
+Answer AnswerArea(const Handlers& from, const Call& call);
+// Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,
+// `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
+// kInvalidArgument: the message is for the client.
+Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
+
+// GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
+Described DescribeLayer(const Handlers& from, const Call& call);
+// The document for requests without parameters.
+Document PlainLayer(const DatasetView& dataset);
+// The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
+// printed in their shortest form and without '+', which CesiumJS would convert to a space.
+std::string TileQuery(const RequestedError& requested);
+
+// Adds the request's token to the query of a template if the token came in the query: such clients use templates
+// unchanged.
+std::string WithToken(std::string query, const Call& call);
+
+// Identifies that token in cache keys, which must not contain the token itself: each token has one Grant as long as the
+// server runs. Null: WithToken adds none.
+const Grant* GrantInQuery(const Call& call);
+
+// GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
+Described DescribeTileset(const Handlers& from, const Call& call);
+// Makes the document for requests without parameters, and the roots of the dataset's trees.
+void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made);
+// The .subtree files below it. Any available tile may be the root, so that an older tileset.json that a client has
+// cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree begins
+// at this tile.
+Described DescribeSubtree(const Handlers& from, const Call& call);
+
+// GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.
+Answer AnswerTileJson(const Handlers& from, const Call& call);
+
+// GET /datasets: the datasets that the client may see.
+Described DescribeDatasets(const Handlers& from, const Call& call);
+// GET / and /viewer/{file}. Without a viewer, `/` is a plain list of datasets.
+Described DescribeViewerFile(const Handlers& from, const Call& call);
+// Whether the client may see a dataset. Empty: it may see all.
+using IsSeen = std::function<bool(const DatasetView&)>;
+
+// {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
+//   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","mesh"}}],"more_with_token":true}
+// Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server. `more_with_token` is
+// present for every client that may not see all datasets, whether or not there are more, so that it reveals nothing.
+// Returns an empty string if a stop was requested; so does IndexHtml.
+std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen = {},
+                         const std::stop_token& stop = {});
+
+// The page at `/` if no viewer is installed.
+std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen = {},
+                      const std::stop_token& stop = {});
+
+// GET /livez, /readyz and /metrics: for operators of the server.
+Answer AnswerLive(const Handlers& from, const Call& call);
+Answer AnswerReady(const Handlers& from, const Call& call);
+Answer AnswerMetrics(const Handlers& from, const Call& call);
+
+}  // namespace terrace::server

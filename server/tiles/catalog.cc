@@ -1,0 +1,128 @@
+#include "server/tiles/catalog.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "engine/geo/mercator_grid.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::server {
+namespace {
+
+// Columns may continue beyond the last one or below 0.
+bool Touches(const geo::TileRange& a, const geo::TileRange& b) {
+  return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
+}
+
+// Extends `box` by the ranges that touch it, around the whole Earth.
+geo::TileRange Grown(geo::TileRange box, const std::vector<geo::TileRange>& ranges, std::int64_t columns) {
+  constexpr int kMaxPasses = 8;  // ranges are sorted, so further passes would rarely find more
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    const geo::TileRange before = box;
+    for (const geo::TileRange& range : ranges) {
+      for (const std::int64_t turn : {-columns, std::int64_t{0}, columns}) {
+        const geo::TileRange turned{range.start_x + turn, range.start_y, range.end_x + turn, range.end_y};
+        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = geo::Hull(box, turned);
+      }
+    }
+    if (box == before) break;
+  }
+  return box;
+}
+
+double WrappedLongitude(double degrees) {
+  return degrees > 180 ? degrees - 360 : degrees < -180 ? degrees + 360 : degrees;
+}
+
+DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, const tiler::Dataset& dataset) {
+  const dem::DemInfo& info = dataset.source->info();
+  DatasetView view;
+  view.name = dataset.name;
+  view.attribution = dataset.attribution;
+  view.error_fraction = dataset.error_fraction;
+  view.glb_compression = dataset.glb.compression;
+  view.generation = dataset.generation;
+  view.available = dataset.source->Availability();
+  view.west = info.bounds.west;
+  view.south = info.bounds.south;
+  view.east = info.bounds.east;
+  view.north = info.bounds.north;
+  view.min_height_m = info.heights.min;
+  view.max_height_m = info.heights.max;
+  view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
+  view.has_datum = dataset.source->has_datum();
+  view.sources = info.sources.size();
+  view.has_water = dataset.water.any();
+  if (dataset.imagery.image) view.texture = dataset.imagery.texture;
+  view.metadata_levels = dataset.metadata_levels;
+  view.floor_m = info.floor;
+  view.max_mercator_depth = info.max_mercator_depth;
+  return view;
+}
+
+}  // namespace
+
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline) {
+  auto catalog = std::make_shared<Catalog>();
+  for (const tiler::Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
+  catalog->pipeline = std::move(pipeline);
+  return catalog;
+}
+
+dem::GeoBounds FinestBounds(const DatasetView& dataset) {
+  const dem::GeoBounds all{dataset.west, dataset.south, dataset.east, dataset.north};
+  if (dataset.available.empty() || dataset.available.back().empty()) return all;
+  const std::vector<geo::TileRange>& ranges = dataset.available.back();
+  const auto size = [](const geo::TileRange& range) {
+    return (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
+  };
+  const auto largest = std::ranges::max_element(ranges, {}, size);
+  const std::int64_t columns = geo::TileColumns(dataset.max_level());
+  const geo::TileRange box = Grown(*largest, ranges, columns);
+  const double step = 360.0 / static_cast<double>(columns);
+  const auto degrees = [step](std::int64_t tiles) { return static_cast<double>(tiles) * step; };
+  const double south = std::max(all.south, degrees(box.start_y) - 90);
+  const double north = std::min(all.north, degrees(box.end_y + 1) - 90);
+  dem::GeoBounds best{degrees(box.start_x) - 180, south, degrees(box.end_x + 1) - 180, north};
+  // Clips the outermost tiles to the part with data.
+  const double all_east = all.east < all.west ? all.east + 360 : all.east;
+  if (box.end_x - box.start_x + 1 >= columns) {
+    best.west = all.west;
+    best.east = all.east;
+  } else if (all_east - all.west < 360) {
+    const double west = best.west, east = best.east;
+    best.west = best.east = 0;
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+      const double first = std::max(all.west, west + turn), last = std::min(all_east, east + turn);
+      if (last - first <= best.east - best.west) continue;
+      best.west = first;
+      best.east = last;
+    }
+  }
+  best.west = WrappedLongitude(best.west);
+  best.east = WrappedLongitude(best.east);
+  return best;
+}
+
+bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key) {
+  if (!geo::IsValid(key) || key.level > dataset.max_level()) return false;
+  const auto& ranges = dataset.available[static_cast<std::size_t>(key.level)];
+  return std::any_of(ranges.begin(), ranges.end(), [&](const geo::TileRange& range) { return range.Contains(key); });
+}
+
+bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size) {
+  if (key.level < 0 || key.level > MaxHeightLevel(dataset, size)) return false;
+  const std::int64_t tiles = std::int64_t{1} << key.level;
+  if (key.x < 0 || key.x >= tiles || key.y < 0 || key.y >= tiles) return false;
+  const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / static_cast<double>(tiles); };
+  if (geo::MercatorLatitude(share(key.y)) < dataset.south || geo::MercatorLatitude(share(key.y + 1)) > dataset.north) {
+    return false;
+  }
+  const double west = share(key.x) * 360 - 180, east = share(key.x + 1) * 360 - 180;
+  if (dataset.west > dataset.east) return west <= dataset.east || east >= dataset.west;
+  return west <= dataset.east && east >= dataset.west;
+}
+
+int MaxHeightLevel(const DatasetView& dataset, int size) { return dataset.max_mercator_depth - (size == 512 ? 1 : 0); }
+
+}  // namespace terrace::server

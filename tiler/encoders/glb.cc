@@ -1,0 +1,127 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/error/surface_error.h"
+#include "proto/error/tile_error.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/mesh/grid_mesh.h"
+#include "proto/mesh/skirt.h"
+#include "proto/mesh/tile_normals.h"
+#include "tiler/encoders.h"
+#include "tiler/mesh/mend_mesh.h"
+#include "tiler/mesh/tile_mesher.h"
+
+namespace terrace::tiler {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// 0.003 degrees: much larger than differences between processors, much smaller than visible in shading.
+double RoundNormal(double component) {
+  constexpr double kGrid = 16384;
+  return std::floor(component * kGrid + 0.5) / kGrid;
+}
+
+std::vector<geo::Vec3> RoundedNormals(std::vector<geo::Vec3> normals) {
+  for (geo::Vec3& n : normals) n = {RoundNormal(n.x), RoundNormal(n.y), RoundNormal(n.z)};
+  return normals;
+}
+
+struct MeshedGlb {
+  proto::GridMesh mesh;                  // with normals and skirts
+  double max_error_m = 0;                // of the flat triangles, measured on the grid points
+  double surface_error_m = 0;            // the same everywhere, not only at the lattice's samples
+  std::chrono::microseconds replayed{};  // time until the mesh was replayed
+};
+
+// Takes the mesh of the tile's quantized-mesh form at the same error, and rounds its vertices to the grid of
+// proto/mesh/grid_mesh.h. Measures the result, and inserts samples where rounding has pushed one over the bound. Edges
+// do not change: they are refined to 15/16 of the error, and the grid's rounding takes less than the rest.
+// `refinement`: as for MeshTile. `skirt_error_m`: determines the depth of skirts (proto/mesh/skirt.h), as in tilesets.
+// kCancelled: stopped.
+Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& lattice, const tin::Refinement& refinement,
+                          double wanted_error_m, double skirt_error_m, proto::PositionWidth width,
+                          const std::stop_token& stop) {
+  const Clock::time_point start = Clock::now();
+  Result<StartedMesh> started = StartMesh(*dataset.source, lattice, refinement, dataset.rules, wanted_error_m, stop);
+  if (!started) return tl::unexpected(std::move(started).error());
+  MeshedGlb meshed;
+  meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+
+  tin::TinMesh& mesh = started->mesh;
+  double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
+  const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
+  proto::TileMeter meter(lattice, started->error_m);
+  std::vector<proto::GridPoint> points;
+  std::vector<geo::Vec3> positions;
+  const auto measure = [&](const tin::TinMesh& rounded) {
+    points = proto::SnapVertices(lattice, rounded, step_m);
+    while (!proto::FitsFloats(points, step_m, depth_m)) points = proto::SnapVertices(lattice, rounded, step_m *= 2);
+    positions = proto::GridPositions(points, step_m);
+    return meter.MeasureFlat(rounded, positions);
+  };
+  const Result<proto::TileError> error = MendMesh(mesh, measure, proto::kMaxTileVertices, stop);
+  if (!error) return tl::unexpected(error.error());
+  meshed.max_error_m = error->max_m;
+  meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
+  meshed.mesh = proto::MakeGridMesh(lattice, mesh, points,
+                                    RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m, depth_m);
+  return meshed;
+}
+
+// Cuts the texture of the requested tile from the imagery and adds it to `options`. Does nothing if no texture is
+// requested or the image shows no part of the tile.
+Result<void> AddTexture(const ImageryRules& imagery, const TileRequest& request, proto::GlbOptions& options,
+                        const std::stop_token& stop) {
+  if (!imagery.image || request.texture == proto::TextureFormat::kNone) return {};
+  const int side = imagery.image->SideOf(request.key.level, imagery.side);
+  const Result<std::optional<dem::TilePicture>> picture = imagery.image->Read(request.key, side, stop);
+  if (!picture) return tl::unexpected(picture.error());
+  if (!*picture) return {};
+  Result<std::string> bytes = proto::EncodePicture((*picture)->rgb, side, side, request.texture, imagery.quality);
+  if (!bytes) return tl::unexpected(std::move(bytes).error());
+  options.texture = proto::GlbTexture{*std::move(bytes), proto::MediaTypeOf(request.texture)};
+  // Clients split credits at semicolons (CesiumJS, cesium-native).
+  if (!options.copyright.empty() && !imagery.attribution.empty()) options.copyright += "; ";
+  options.copyright += imagery.attribution;
+  return {};
+}
+
+}  // namespace
+
+Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  const auto& [dataset, request, refined, error_m] = input;
+  const auto start = Clock::now();
+  const proto::LatticeView lattice = input.lattice();
+  const bool is_deepest = request.key.level == dataset.source->max_level();
+  const double skirt_error_m =
+      proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
+  const Result<MeshedGlb> meshed =
+      MeshGlb(dataset, lattice, refined->refinement, error_m, skirt_error_m, proto::WidthOf(request.compression), stop);
+  if (!meshed) return tl::unexpected(meshed.error());
+  proto::GlbOptions options = dataset.glb;
+  options.compression = request.compression;
+  options.copyright = dataset.attribution;
+  options.max_error_m = meshed->max_error_m;
+  options.certified_error_m = meshed->surface_error_m + refined->heights.source_error_m;
+  if (const Result<void> added = AddTexture(dataset.imagery, request, options, stop); !added) {
+    return tl::unexpected(added.error());
+  }
+  Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
+  if (!glb) return tl::unexpected(std::move(glb).error());
+  encoded.bytes = std::move(glb->bytes);
+  encoded.times.refine += meshed->replayed;
+  encoded.times.encode = MicrosecondsSince(start) - meshed->replayed;
+  encoded.max_error_m = meshed->max_error_m;
+  encoded.certified_error_m = options.certified_error_m;
+  encoded.vertices = glb->vertices;
+  encoded.triangles = glb->triangles;
+  return {};
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,50 @@
+#include "proto/documents/height_png.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <vector>
+
+#include "tiler/encoders.h"
+
+namespace terrace::tiler {
+namespace {
+
+// Heights beyond the code's range are clamped, so their error is larger than rounding.
+double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding encoding) {
+  double largest = 0;
+  for (const double height : heights) {
+    largest =
+        std::max(largest, std::abs(proto::DecodeHeight(proto::EncodeHeight(height, encoding), encoding) - height));
+  }
+  return largest;
+}
+
+}  // namespace
+
+// One pixel for each node of the Web Mercator grid. Tiles share no pixels with neighbours. EncodedTile::max_error_m is
+// the measured rounding error of the colours.
+Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  const Dataset& dataset = input.dataset;
+  const TileRequest& request = input.request;
+  const int size = request.height_size;
+  // A tile of 512 pixels has the pixels of the four tiles of 256 below it.
+  const int depth = request.key.level + (size == 512 ? 1 : 0);
+  if (depth > dataset.source->info().max_mercator_depth) {
+    return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));
+  }
+  encoded.refinement = RefinementUse::kNone;
+  auto start = std::chrono::steady_clock::now();
+  const dem::NodeWindow window{request.key.x * size, request.key.y * size, size, size};
+  const Result<std::vector<float>> heights = dataset.source->ReadMercator(depth, window, stop);
+  if (!heights) return tl::unexpected(heights.error());
+  encoded.times.read = MicrosecondsSince(start);
+
+  start = std::chrono::steady_clock::now();
+  encoded.bytes = proto::EncodeHeightPng(*heights, size, request.height_encoding);
+  encoded.times.encode = MicrosecondsSince(start);
+  encoded.max_error_m = LargestLoss(*heights, request.height_encoding);
+  return {};
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,77 @@
+#include "proto/mesh/quantized_mesh.h"
+
+#include <chrono>
+#include <utility>
+
+#include "proto/mesh/tile_metadata.h"
+#include "proto/mesh/tile_normals.h"
+#include "proto/mesh/water_mask.h"
+#include "tiler/encoders.h"
+#include "tiler/mesh/tile_mesher.h"
+
+namespace terrace::tiler {
+namespace {
+
+static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
+
+// A sea level is in the source's vertical datum: if tiles have another datum, heights are read again in the source's.
+Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
+                                   const std::stop_token& stop) {
+  const double sea_level_m = *dataset.water.sea_level_m;
+  if (!dataset.source->converts()) return proto::Shortest(proto::SeaLevelMask(lattice, sea_level_m));
+  const Result<dem::TileHeights> counted = dataset.source->ReadAsCounted(lattice.key, stop);
+  if (!counted) return tl::unexpected(counted.error());
+  return proto::Shortest(proto::SeaLevelMask({lattice.key, counted->lattice, counted->heights}, sea_level_m));
+}
+
+Result<proto::WaterMask> WaterMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,
+                                     const std::stop_token& stop) {
+  if (dataset.water.sea_level_m) return SeaMaskOf(dataset, lattice, stop);
+  Result<proto::WaterMask> mask = dataset.water.mask->Read(lattice.key, stop);
+  if (mask) *mask = proto::Shortest(*std::move(mask));
+  return mask;
+}
+
+// Adds the water mask and the metadata to `tile`, if `request` asks for them and the dataset has them. Returns the
+// extensions to encode, including normals.
+Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const TileRequest& request,
+                                                  const proto::LatticeView& lattice, proto::QuantizedTile& tile,
+                                                  const std::stop_token& stop) {
+  proto::QuantizedMeshOptions options;
+  options.normals = request.normals;
+  options.water_mask = request.water_mask && dataset.water.any();
+  options.metadata = request.metadata &&
+                     proto::CarriesMetadata(request.key.level, dataset.metadata_levels, dataset.source->max_level());
+  if (options.water_mask) {
+    Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
+    if (!mask) return tl::unexpected(std::move(mask).error());
+    tile.water_mask = *std::move(mask);
+  }
+  if (options.metadata) {
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.source->Availability(), dataset.metadata_levels);
+  }
+  return options;
+}
+
+}  // namespace
+
+Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  const auto& [dataset, request, refined, error_m] = input;
+  const auto start = std::chrono::steady_clock::now();
+  const proto::LatticeView lattice = input.lattice();
+  Result<MeshedTile> measured = MeshTile(*dataset.source, lattice, refined->refinement, dataset.rules, error_m, stop);
+  if (!measured) return tl::unexpected(std::move(measured).error());
+  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
+  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
+  if (!options) return tl::unexpected(options.error());
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
+  encoded.times.refine += measured->replayed;
+  encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
+  encoded.max_error_m = measured->max_error_m;
+  encoded.certified_error_m = measured->surface_error_m + refined->heights.source_error_m;
+  encoded.vertices = static_cast<std::uint32_t>(measured->tile.u.size());
+  encoded.triangles = static_cast<std::uint32_t>(measured->tile.triangles.size());
+  return {};
+}
+
+}  // namespace terrace::tiler
