@@ -3,33 +3,14 @@
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import fs from 'node:fs';
-import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { fileURLToPath } from 'node:url';
 import { promisify } from 'node:util';
-import { chromium } from '../e2e/node_modules/playwright-core/index.mjs';
 import { json, request, samples, serve } from '../e2e/harness.mjs';
+import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, servePages, settle, typeOf } from './pages.mjs';
 
-const kHere = path.dirname(fileURLToPath(import.meta.url));
-const kExamples = path.join(kHere, '../../examples');
-const kModules = [path.join(kHere, 'node_modules'), path.join(kHere, '../../server/viewer/node_modules')];
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
-const kTypes = { '.js': 'text/javascript', '.css': 'text/css', '.json': 'application/json', '.html': 'text/html' };
-const kSize = { width: 330, height: 220 };
-const kSettleMs = 40000;
 const run = promisify(execFile);
-
-// The file of node_modules for a URL of the CDN; its version must be the installed one.
-function fileOf(url) {
-  const [, name, version, file] = url.match(/^https:\/\/cdn\.jsdelivr\.net\/npm\/((?:@[^/]+\/)?[^@/]+)@([\d.]+)\/([^?#]+)/) ?? [];
-  const folder = name && kModules.map((modules) => path.join(modules, name)).find((folder) => fs.existsSync(folder));
-  if (!folder || JSON.parse(fs.readFileSync(path.join(folder, 'package.json'))).version !== version) return undefined;
-  return fs.existsSync(path.join(folder, file)) ? path.join(folder, file) : undefined;
-}
 
 async function openPage(browser, url) {
   const page = await browser.newPage({ viewport: kSize });
@@ -41,25 +22,13 @@ async function openPage(browser, url) {
     const file = fileOf(route.request().url());
     if (!file) page.wrongs.push(`not in node_modules: ${route.request().url()}`);
     const headers = { 'Access-Control-Allow-Origin': '*' };
-    const contentType = kTypes[path.extname(file ?? '')] ?? 'application/octet-stream';
-    return file ? route.fulfill({ body: fs.readFileSync(file), contentType, headers }) : route.abort();
+    return file ? route.fulfill({ body: fs.readFileSync(file), contentType: typeOf(file), headers }) : route.abort();
   });
   await page.goto(url);
   return page;
 }
 
 const line = (page) => page.locator('#line').innerText();
-
-// Waits until `ready`, an expression of the page, has been true for half a second.
-async function settle(page, ready) {
-  await page.waitForFunction((expression) => {
-    const fine = !document.getElementById('line').textContent.startsWith('Loading') && (0, eval)(expression);
-    window.calmSince = fine ? window.calmSince ?? performance.now() : undefined;
-    return fine && performance.now() - window.calmSince > 500;
-  }, ready, { timeout: kSettleMs, polling: 100 }).catch(async (error) => {
-    throw new Error(`${error.message.split('\n')[0]}: ${await line(page)} ${page.wrongs.join('; ')}`);
-  });
-}
 
 // Clicks at (x, y) and reads position and height from the page's line.
 async function click(page, x, y) {
@@ -117,17 +86,12 @@ describe('the pages of examples/', () => {
 
   before(async () => {
     server = await serve('--config', path.join(samples, 'samples.json'));
-    files = http.createServer((asked, reply) => {
-      const file = path.join(kExamples, path.basename(new URL(asked.url, 'http://host').pathname));
-      reply.writeHead(fs.existsSync(file) ? 200 : 404, { 'Content-Type': kTypes[path.extname(file)] ?? 'text/plain' });
-      reply.end(fs.existsSync(file) ? fs.readFileSync(file) : '');
-    });
-    await new Promise((resolve) => files.listen(0, '127.0.0.1', resolve));
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    files = await servePages();
+    browser = await launchBrowser();
   });
   after(async () => {
     await browser?.close();
-    files?.close();
+    await files?.stop();
     await server?.stop();
   });
 
@@ -234,7 +198,7 @@ describe('the pages of examples/', () => {
     for (const [name, { ready, check }] of Object.entries(pages)) {
       const how = dataset === 'earth' ? 'by http' : 'as a file';
       it(`${name} draws ${dataset}, opened ${how}`, async () => {
-        const folder = dataset === 'earth' ? `http://127.0.0.1:${files.address().port}` : `file://${kExamples}`;
+        const folder = dataset === 'earth' ? files.url : `file://${kExamples}`;
         const page = await openPage(browser, `${folder}/${name}.html?server=${server.url}&dataset=${dataset}`);
         await settle(page, 'true');
         await page.evaluate(() => { if (window.widget) widget.scene.msaaSamples = 1; });  // a software renderer
