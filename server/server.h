@@ -52,7 +52,7 @@ class Server {
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
   // errors. Call it before datasets are opened, which may take long.
   static std::vector<Error> TryFiles(const config::Config& config);
-  // Checks that the address is free.
+  // Checks that the addresses are free.
   static Result<void> TryAddress(const config::Config& config);
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
@@ -71,6 +71,7 @@ class Server {
   virtual void SetTroubles(std::map<std::string, std::string> troubles) = 0;
 
   virtual std::uint16_t port() const = 0;
+  virtual std::uint16_t admin_port() const = 0;  // of config.admin_listen; 0: none
   virtual std::string url() const = 0;  // "http://127.0.0.1:8080/"; https with a certificate
 
   // Begins to stop and returns at once. Thread-safe, may be called repeatedly; not from a signal handler.
