@@ -22,7 +22,8 @@ Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
   const auto first = PlainDecimal(text.substr(0, dash), /*max_digits=*/2);
   const auto last = dash == std::string_view::npos ? first : PlainDecimal(text.substr(dash + 1), /*max_digits=*/2);
   if (!first || !last || *first > *last || *last > geo::kMaxLevel) {
-    return MakeError(ErrorCode::kInvalidArgument, "levels must be a level or two such as 8-13, 0 to {}", geo::kMaxLevel);
+    return MakeError(ErrorCode::kInvalidArgument, "levels must be a level or two such as 8-13, 0 to {}",
+                     geo::kMaxLevel);
   }
   selection.min_level = static_cast<int>(*first);
   selection.max_level = static_cast<int>(*last);
@@ -148,8 +149,8 @@ class AdminApplication::Handler final : public ConnectionHandler {
     }
     const bool reads = request.method == Method::kGet || request.method == Method::kHead;
     if (is_purge ? request.method == Method::kPost : reads) return std::nullopt;
-    Response response = ProblemResponse(405, is_purge ? "only POST is answered here" : "only GET is answered here",
-                                        request.id);
+    Response response =
+        ProblemResponse(405, is_purge ? "only POST is answered here" : "only GET is answered here", request.id);
     response.headers.emplace_back("Allow", is_purge ? "POST" : "GET, HEAD");
     response.close = true;  // a body of any form may follow
     return response;

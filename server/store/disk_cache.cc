@@ -122,9 +122,8 @@ class DiskTier final : public tiler::Store<Key, Value> {
     for (int level = selection.min_level; level <= selection.max_level; ++level) {
       prefixes.push_back(version + tiler::RecordPrefix(selection.generation, level));
     }
-    return store_->Erase(prefixes, [&](std::string_view key) {
-      return tiler::IsSelected(selection, key.substr(version.size()));
-    });
+    return store_->Erase(
+        prefixes, [&](std::string_view key) { return tiler::IsSelected(selection, key.substr(version.size())); });
   }
 
   void Insert(const Key& key, std::shared_ptr<const Value> value) override {

@@ -88,7 +88,7 @@ class DiskStore {
   std::chrono::steady_clock::time_point retry_at_;  // while not writing
   std::list<Job> queue_;                            // a list, because its jobs can be moved without allocating memory
   std::size_t queued_bytes_ = 0;
-  bool busy_ = false;         // jobs have left the queue and are being written
+  bool busy_ = false;          // jobs have left the queue and are being written
   std::uint64_t batches_ = 0;  // that were written
   bool stop_ = false;
   bool abandoned_ = false;

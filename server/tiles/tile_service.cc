@@ -86,7 +86,9 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
     cache_.Insert(key, tile);
     return tile;
   }
-  const Work<tiler::EncodedTile> work = [&](std::stop_token token) { return catalog.pipeline->Build(request, std::move(token)); };
+  const Work<tiler::EncodedTile> work = [&](std::stop_token token) {
+    return catalog.pipeline->Build(request, std::move(token));
+  };
   Result<tiler::EncodedTile> built = Outcome(NameOf(request), work, std::move(stop));
   Result<tiler::TilePtr> tile;
   if (built) {
