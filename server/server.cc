@@ -124,7 +124,6 @@ class RunningServer final : public Server {
   void ReopenAccessLog() override { access_log_.Reopen(); }
 
   std::uint16_t port() const override { return listener_->port(); }
-  std::uint16_t admin_port() const override { return admin_listener_ ? admin_listener_->port() : 0; }
   std::string url() const override { return UrlOf(*listener_, edge_->tls != nullptr); }
 
   void RequestStop() override {

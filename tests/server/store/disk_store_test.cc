@@ -9,6 +9,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -266,6 +267,25 @@ TEST_F(DiskStoreTest, ErasesWhatIsChosenWhereverItIs) {
     const Result<std::size_t> none = store.Erase({"another ", "kez"}, [](std::string_view) { return true; });
     EXPECT_EQ(none.value_or(1), 0u);
   }
+}
+
+TEST_F(DiskStoreTest, ErasesWhatIsBeingWritten) {
+  DiskStore store(Options());
+  std::promise<void> begun, go;
+  const auto write = [&] {
+    begun.set_value();
+    go.get_future().wait();
+    return ValueOf(1);
+  };
+  store.Keep(KeyOf(1), write, 1000);
+  begun.get_future().wait();
+  auto erased =
+      std::async(std::launch::async, [&] { return store.Erase({"key "}, [](std::string_view) { return true; }); });
+  erased.wait_for(milliseconds(50));  // without the wait for the writer, it has found nothing by then
+  go.set_value();
+  EXPECT_EQ(erased.get().value_or(0), 1u);
+  store.Flush();
+  EXPECT_FALSE(store.Find(KeyOf(1)));
 }
 
 TEST_F(DiskStoreTest, NeverServesARecordOfAnotherKeyOrWithoutASeal) {
