@@ -71,7 +71,7 @@ class Server {
   virtual void SetTroubles(std::map<std::string, std::string> troubles) = 0;
 
   virtual std::uint16_t port() const = 0;
-  virtual std::string url() const = 0;           // "http://127.0.0.1:8080/"; https with a certificate
+  virtual std::string url() const = 0;  // "http://127.0.0.1:8080/"; https with a certificate
 
   // Begins to stop and returns at once. Thread-safe, may be called repeatedly; not from a signal handler.
   virtual void RequestStop() = 0;
