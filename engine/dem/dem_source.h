@@ -52,7 +52,7 @@ class DemSource {
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
   // floor is converted to the datum of the last source that refers to a geoid.
-  Result<TileHeights> ReadAsCounted(const geo::TileKey& key, std::stop_token stop = {}) const;
+  Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
   // Levels 0 .. geo::kMaxLevel. Columns wrap at 360 degrees. Precondition: rows lie within the lattice.
@@ -74,7 +74,7 @@ class DemSource {
 
   // Whether the vertical datum of every source is known. Orthometric heights need it.
   bool has_datum() const;
-  // Whether a source refers to a geoid, so that ReadAsCounted differs from Read.
+  // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
   // Samples read since Open, by all threads. For metrics.
