@@ -1,4 +1,4 @@
-// What is served at one moment: the datasets, and the pipeline that makes their answers.
+// Everything that is served at one moment: the datasets, and the pipeline that makes their tiles, heights and meshes.
 //
 // Immutable, so any thread reads it without a lock. A request uses the catalog it began with until its end, and so does
 // a build that it starts: answers never mix two catalogs.
@@ -42,7 +42,7 @@ struct DatasetView {
   bool has_water = false;                       // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
-  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
+  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
