@@ -17,6 +17,7 @@
 #include <thread>
 #include <utility>
 
+#include "server/admin.h"
 #include "server/api/tile_formats.h"
 #include "server/application.h"
 #include "server/frontend/frontend.h"
@@ -33,6 +34,15 @@ namespace {
 // Time for replies to requests whose builds were just cancelled, and again for sockets that were just aborted. Twice
 // this is less than the second that stopping may take beyond the drain timeout.
 constexpr std::chrono::milliseconds kLastWords{400};
+
+// Operators open few connections.
+constexpr std::size_t kAdminConnections = 16;
+
+std::string UrlOf(const Listener& listener, bool is_https) {
+  const std::string& host = listener.host();
+  const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
+  return fmt::format("{}://{}:{}/", is_https ? "https" : "http", bare_v6 ? "[" + host + "]" : host, listener.port());
+}
 
 Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
   std::set<std::string_view> names;
@@ -68,6 +78,8 @@ class RunningServer final : public Server {
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_trouble},
                      std::move(catalog), options_.config),
+        admin_({tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
+                [this] { return application_.catalog(); }, application_.deadline()}),
         io_(options_.config.io_threads),
         signals_(io_.first()) {}
 
@@ -84,6 +96,7 @@ class RunningServer final : public Server {
                                                      : Listener::Open(io_, listen.host, listen.port, Context());
     if (!listener) return tl::unexpected(listener.error());
     listener_ = std::move(*listener);
+    if (const Result<void> opened = OpenAdminListener(); !opened) return opened;
     WatchSignals();
     // On an inherited socket, connections wait in its queue until there is something to serve: a stop before that loses
     // none.
@@ -111,11 +124,7 @@ class RunningServer final : public Server {
   void ReopenAccessLog() override { access_log_.Reopen(); }
 
   std::uint16_t port() const override { return listener_->port(); }
-  std::string url() const override {
-    const std::string& host = listener_->host();
-    const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
-    return fmt::format("{}://{}:{}/", frontend_->tls ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
-  }
+  std::string url() const override { return UrlOf(*listener_, frontend_->tls != nullptr); }
 
   void RequestStop() override {
     const std::lock_guard lock(mutex_);
@@ -130,6 +139,17 @@ class RunningServer final : public Server {
   }
 
  private:
+  Result<void> OpenAdminListener() {
+    const std::optional<config::ListenAddress>& address = options_.config.admin_listen;
+    if (!address) return {};
+    auto listener = Listener::Open(io_, address->host, address->port, AdminContext());
+    if (!listener) return MakeError(listener.error().code, "admin_listen: {}", listener.error().message);
+    admin_listener_ = std::move(*listener);
+    spdlog::info("operators: {} answers /admin/purge and /metrics", UrlOf(*admin_listener_, /*is_https=*/false));
+    admin_listener_->Start();
+    return {};
+  }
+
   // On a separate thread, because stopping blocks and joins the others.
   void StopWhenAsked() {
     std::unique_lock lock(mutex_);
@@ -160,6 +180,7 @@ class RunningServer final : public Server {
       frontend_->connections.AbortAll();
       frontend_->connections.WaitUntilEmpty(kLastWords);
     }
+    CloseAdminListener();
     io_.Stop();
     metrics_page_.Stop();
     tiles_.Shutdown();
@@ -171,6 +192,16 @@ class RunningServer final : public Server {
                    std::chrono::duration<double>(options_.config.drain_timeout).count());
     }
     return drained;
+  }
+
+  // Last, so that operators see the stop.
+  void CloseAdminListener() {
+    if (!admin_listener_) return;
+    admin_connections_.Drain();
+    admin_listener_->Close();
+    if (admin_connections_.WaitUntilEmpty(kLastWords)) return;
+    admin_connections_.AbortAll();
+    admin_connections_.WaitUntilEmpty(kLastWords);
   }
 
   std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.config.drain_timeout); }
@@ -240,6 +271,17 @@ class RunningServer final : public Server {
     return context;
   }
 
+  // Without TLS, and for no page of another origin.
+  std::shared_ptr<const SessionContext> AdminContext() {
+    auto context = std::make_shared<SessionContext>(*Context());
+    context->options.drain_grace = std::chrono::milliseconds(0);
+    context->application = &admin_;
+    context->connections = &admin_connections_;
+    context->cors = CorsPolicy(std::vector<std::string>());
+    context->tls = nullptr;
+    return context;
+  }
+
   const ServerOptions options_;
   AccessLog access_log_;
   Metrics metrics_;
@@ -247,9 +289,11 @@ class RunningServer final : public Server {
   TileService tiles_;
   MetricsPage metrics_page_;
   TerrainApplication application_;
+  AdminApplication admin_;
+  ConnectionSet admin_connections_{kAdminConnections};
   IoThreads io_;
   asio::signal_set signals_;
-  std::shared_ptr<Listener> listener_;
+  std::shared_ptr<Listener> listener_, admin_listener_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
@@ -273,6 +317,10 @@ std::vector<Error> Server::CheckStartFiles(const config::Config& config) {
 }
 
 Result<void> Server::CheckAddress(const config::Config& config) {
+  if (config.admin_listen) {
+    const Result<void> free = Listener::CheckAddress(config.admin_listen->host, config.admin_listen->port);
+    if (!free) return MakeError(free.error().code, "admin_listen: {}", free.error().message);
+  }
   return Listener::CheckAddress(config.listen.host, config.listen.port);
 }
 

@@ -52,7 +52,7 @@ class Server {
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
   // errors. Call it before datasets are opened, which may take long.
   static std::vector<Error> CheckStartFiles(const config::Config& config);
-  // Checks that the address is free.
+  // Checks that the addresses are free.
   static Result<void> CheckAddress(const config::Config& config);
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their

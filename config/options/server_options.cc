@@ -27,14 +27,18 @@ constexpr const char* kListenSchema = R"({
   "examples": ["0.0.0.0:8080", "[::1]:8080", "localhost:0"]
 })";
 
-Codec<Config> Listen() {
-  return {[](const Json& value, const ConfigLocation& place, Config& config) {
+Json WriteAddress(const ListenAddress& address) { return ToString(address); }
+Json WriteAddress(const std::optional<ListenAddress>& address) { return address ? WriteAddress(*address) : Json(); }
+
+template <typename Member>
+Codec<Config> Address(Member Config::*member) {
+  return {[=](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"");
             Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
             if (!address) return place.Fail(address.error().message);
-            config.listen = *std::move(address);
+            config.*member = *std::move(address);
           },
-          [](const Config& config) { return Json(ToString(config.listen)); }, TextToJson, Json::parse(kListenSchema)};
+          [=](const Config& config) { return WriteAddress(config.*member); }, TextToJson, Json::parse(kListenSchema)};
 }
 
 Codec<Config> Viewer() {
@@ -94,7 +98,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .help = "Address and port to listen on; port 0 picks a free one",
        .details = "An IPv6 address is in brackets: `[::1]:8080`. `0.0.0.0:8080` or `[::]:8080` is every interface. The "
                   "server prints one line with the port that it uses",
-       .codec = Listen(),
+       .codec = Address(&Config::listen),
        .other_words = "port host address bind interface ip"},
       {.key = "datasets",
        .section = "datasets",
@@ -121,6 +125,14 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .codec = Text(&Config::cache_control, CheckCacheControl, Json::parse(kCacheControlSchema)),
        .other_words = "max_age",
        .is_live = true},
+      {.key = "admin_listen",
+       .value = "HOST:PORT",
+       .section = "listening",
+       .help = "A second address, for operators: POST /admin/purge and /metrics",
+       .details = "Plain HTTP without tokens: whoever reaches it may use it, so take a loopback address or one of a "
+                  "closed network ([operations](operations.md#purging-caches))",
+       .codec = Address(&Config::admin_listen),
+       .other_words = "management control"},
       {.key = "io_threads",
        .value = "N",
        .section = "load",

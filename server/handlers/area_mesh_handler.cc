@@ -19,31 +19,12 @@ namespace terrace::server {
 namespace {
 
 Result<void> SetBox(tiler::AreaRequest& area, std::string_view text) {
-  constexpr std::array<const char*, 4> kNames = {"west", "south", "east", "north"};
-  std::array<double, 4> numbers{};
-  for (std::size_t i = 0; i < numbers.size(); ++i) {
-    const bool is_last = i + 1 == numbers.size();
-    const std::size_t comma = is_last ? text.size() : text.find(',');
-    if (comma == std::string_view::npos) {
-      return MakeError(ErrorCode::kInvalidArgument, "bbox must be west,south,east,north in degrees");
-    }
-    const std::optional<double> number = FiniteNumber(text.substr(0, comma));
-    const double most = i % 2 == 0 ? 180 : 90;
-    if (!number || std::abs(*number) > most) {
-      return MakeError(ErrorCode::kInvalidArgument, "bbox: {} must be a number from -{} to {}", kNames[i], most, most);
-    }
-    numbers[i] = *number;
-    text.remove_prefix(std::min(comma + 1, text.size()));
-  }
-  const auto [west, south, east, north] = numbers;
-  if (south >= north) return MakeError(ErrorCode::kInvalidArgument, "bbox: south must be below north");
-  area.west = west;
-  area.south = south;
-  area.east = east < west ? east + 360 : east;
-  area.north = north;
-  if (area.west == area.east) {  // 180 and -180 are equal, too
-    return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
-  }
+  const Result<dem::GeoBounds> box = ParseBox(text);
+  if (!box) return tl::unexpected(box.error());
+  area.west = box->west;
+  area.south = box->south;
+  area.east = box->east < box->west ? box->east + 360 : box->east;
+  area.north = box->north;
   return {};
 }
 
@@ -124,6 +105,31 @@ asio::awaitable<Response> BuildArea(const Handlers& from, const RequestContext& 
 }
 
 }  // namespace
+
+Result<dem::GeoBounds> ParseBox(std::string_view text) {
+  constexpr std::array<const char*, 4> kNames = {"west", "south", "east", "north"};
+  std::array<double, 4> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const bool is_last = i + 1 == numbers.size();
+    const std::size_t comma = is_last ? text.size() : text.find(',');
+    if (comma == std::string_view::npos) {
+      return MakeError(ErrorCode::kInvalidArgument, "bbox must be west,south,east,north in degrees");
+    }
+    const std::optional<double> number = FiniteNumber(text.substr(0, comma));
+    const double most = i % 2 == 0 ? 180 : 90;
+    if (!number || std::abs(*number) > most) {
+      return MakeError(ErrorCode::kInvalidArgument, "bbox: {} must be a number from -{} to {}", kNames[i], most, most);
+    }
+    numbers[i] = *number;
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  const auto [west, south, east, north] = numbers;
+  if (south >= north) return MakeError(ErrorCode::kInvalidArgument, "bbox: south must be below north");
+  if (west == east || (west == 180 && east == -180)) {
+    return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
+  }
+  return dem::GeoBounds{west, south, east, north};
+}
 
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
   const Result<QueryParameters> sent = ParseQuery(query);

@@ -113,6 +113,8 @@ Answer AnswerArea(const Handlers& from, const RequestContext& context);
 // `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
 // kInvalidArgument: the message is for the client.
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
+// Reads `west,south,east,north`; west > east: the box crosses the antimeridian. Errors: as above.
+Result<dem::GeoBounds> ParseBox(std::string_view text);
 
 // GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
 DocumentAnswer DescribeLayer(const Handlers& from, const RequestContext& context);

@@ -12,8 +12,10 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "server/store/disk_store.h"
 #include "tiler/build_id.h"
@@ -68,11 +70,15 @@ Result<LockPtr> LockDirectory(const std::filesystem::path& directory) {
   return std::make_shared<const DirectoryLock>(file);
 }
 
+// What the keys of this program's records begin with.
+std::string StoreVersion() {
+  const std::uint64_t version = tiler::BuildId();
+  return {reinterpret_cast<const char*>(&version), sizeof(version)};
+}
+
 template <typename Key>
 std::string StoreKey(const Key& key) {
-  const std::uint64_t version = tiler::BuildId();
-  std::string text(reinterpret_cast<const char*>(&version), sizeof(version));
-  return text + tiler::RecordKey(key);
+  return StoreVersion() + tiler::RecordKey(key);
 }
 
 // The two kinds of values as bytes.
@@ -107,6 +113,17 @@ class DiskTier final : public tiler::Store<Key, Value> {
     if (value) return *std::move(value);
     store_->Forget(store_key);
     return std::nullopt;
+  }
+
+  Result<std::size_t> Erase(const tiler::TileSelection& selection) override {
+    if (!store_) return 0;
+    const std::string version = StoreVersion();
+    std::vector<std::string> prefixes;
+    for (int level = selection.min_level; level <= selection.max_level; ++level) {
+      prefixes.push_back(version + tiler::RecordPrefix(selection.generation, level));
+    }
+    return store_->Erase(
+        prefixes, [&](std::string_view key) { return tiler::IsSelected(selection, key.substr(version.size())); });
   }
 
   void Insert(const Key& key, std::shared_ptr<const Value> value) override {

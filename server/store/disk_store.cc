@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <bit>
 #include <exception>
 #include <utility>
@@ -84,6 +85,44 @@ void DiskStore::Forget(const std::string& key) {
   Enqueue(Job{key, nullptr, kJobBytes});
 }
 
+Result<std::size_t> DiskStore::Erase(const std::vector<std::string>& prefixes,
+                                     const std::function<bool(std::string_view key)>& is_chosen) {
+  std::size_t erased = 0;
+  std::list<Job> waiting;  // destroyed after the lock is released
+  std::shared_ptr<RecordDb> db;
+  {
+    std::unique_lock lock(mutex_);
+    for (auto job = queue_.begin(); job != queue_.end();) {
+      const auto here = job++;
+      const auto begins = [&](const std::string& prefix) { return here->key.starts_with(prefix); };
+      if (!here->value || std::ranges::none_of(prefixes, begins) || !is_chosen(here->key)) continue;
+      queued_bytes_ -= here->charge;
+      ++erased;
+      waiting.splice(waiting.end(), queue_, here);
+    }
+    // Records that have left the queue are found in the database once they are written.
+    const std::uint64_t batch = batches_;
+    changed_.wait(lock, [&] { return !busy_ || batches_ != batch; });
+    if (writing_) db = db_;
+  }
+  if (!db) return MakeError(ErrorCode::kUnavailable, "the disk cache of {} is switched off", options_.name);
+  Result<void> done;
+  for (const std::string& prefix : prefixes) {
+    const Result<std::size_t> of_prefix = db->EraseIf(prefix, is_chosen);
+    if (!of_prefix) {
+      done = tl::unexpected(of_prefix.error());
+      break;
+    }
+    erased += *of_prefix;
+  }
+  entries_.store(db->entries(), std::memory_order_relaxed);
+  bytes_.store(db->bytes(), std::memory_order_relaxed);
+  if (done) return erased;
+  errors_.fetch_add(1, std::memory_order_relaxed);
+  SwitchOff(done.error().message, /*reading=*/true);
+  return tl::unexpected(std::move(done.error()));
+}
+
 void DiskStore::Enqueue(Job job) {
   {
     const std::lock_guard lock(mutex_);
@@ -127,6 +166,7 @@ void DiskStore::Run() {
       lock.lock();
       queued_bytes_ -= bytes;  // values being written count, too
       busy_ = false;
+      ++batches_;
       changed_.notify_all();
     } else if (stop_) {
       return;

@@ -15,6 +15,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -50,6 +51,12 @@ class DiskStore {
   // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
 
+  // Erases the records whose keys begin with one of `prefixes` and that `is_chosen` accepts, also those that wait to be
+  // written. Blocks for reads and writes. Returns their number. kUnavailable: the store is switched off, or the disk
+  // failed; records may be left.
+  Result<std::size_t> Erase(const std::vector<std::string>& prefixes,
+                            const std::function<bool(std::string_view key)>& is_chosen);
+
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();
 
@@ -81,7 +88,8 @@ class DiskStore {
   std::chrono::steady_clock::time_point retry_at_;  // while not writing
   std::list<Job> queue_;                            // a list, because its jobs can be moved without allocating memory
   std::size_t queued_bytes_ = 0;
-  bool busy_ = false;  // jobs have left the queue and are being written
+  bool busy_ = false;          // jobs have left the queue and are being written
+  std::uint64_t batches_ = 0;  // that were written
   bool stop_ = false;
   bool abandoned_ = false;
 

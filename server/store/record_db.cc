@@ -9,12 +9,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
+#include <vector>
 
 namespace terrace::server {
 namespace {
 
 constexpr std::size_t kMiB = std::size_t{1} << 20;
 constexpr std::size_t kProbeBytes = kMiB;
+constexpr std::size_t kErasedAtOnce = 1000;
 
 rocksdb::Slice SliceOf(std::string_view text) { return {text.data(), text.size()}; }
 
@@ -135,6 +138,28 @@ Result<void> RecordDb::Write(std::span<const Change> changes) {
     return Fail(status);
   }
   return {};
+}
+
+Result<std::size_t> RecordDb::EraseIf(std::string_view prefix,
+                                      const std::function<bool(std::string_view key)>& is_chosen) {
+  std::size_t erased = 0;
+  std::vector<Change> changes;
+  const auto write = [&] {
+    erased += changes.size();
+    const Result<void> written = Write(changes);
+    changes.clear();
+    return written;
+  };
+  const std::unique_ptr<rocksdb::Iterator> record(impl_->db->NewIterator(rocksdb::ReadOptions()));
+  for (record->Seek(SliceOf(prefix)); record->Valid() && record->key().starts_with(SliceOf(prefix)); record->Next()) {
+    const std::string_view key(record->key().data(), record->key().size());
+    if (is_chosen(key)) changes.push_back({std::string(key), std::nullopt});
+    if (changes.size() < kErasedAtOnce) continue;
+    if (const Result<void> written = write(); !written) return tl::unexpected(written.error());
+  }
+  if (!record->status().ok()) return Fail(record->status());
+  if (const Result<void> written = write(); !written) return tl::unexpected(written.error());
+  return erased;
 }
 
 std::size_t RecordDb::bytes() const {

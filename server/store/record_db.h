@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -63,6 +64,10 @@ class RecordDb {
   };
   // Writes all changes or none. kUnavailable: the disk does not respond, or is full.
   Result<void> Write(std::span<const Change> changes);
+
+  // Erases the records whose keys begin with `prefix` and that `is_chosen` accepts. Reads all that begin with it.
+  // Returns their number. Errors: those of Write.
+  Result<std::size_t> EraseIf(std::string_view prefix, const std::function<bool(std::string_view key)>& is_chosen);
 
   // Approximate.
   std::size_t bytes() const;

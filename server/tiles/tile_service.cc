@@ -119,6 +119,23 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
   cache_.Retain(generations);
 }
 
+// Memory last: what is found in a slower tier meanwhile goes there.
+Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection) {
+  Erased erased;
+  Result<void> done;
+  for (const auto& store : stores_) {
+    Result<std::size_t> of_store = store->Erase(selection);
+    if (of_store) {
+      erased.stores.emplace_back(store->name(), *of_store);
+    } else {
+      done = tl::unexpected(std::move(of_store.error()));
+    }
+  }
+  erased.memory = cache_.EraseIf([&](const tiler::CacheKey& key) { return IsSelected(selection, key); });
+  if (!done) return tl::unexpected(std::move(done.error()));
+  return erased;
+}
+
 TileService::Stats TileService::stats() const {
   Stats stats;
   stats.hits = hits_.load(std::memory_order_relaxed);

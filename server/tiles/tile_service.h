@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -74,6 +75,15 @@ class TileService {
 
   // Removes the tiles of datasets that are not in `catalog` from the cache, and refuses such tiles from now on.
   void RetainTilesOf(const Catalog& catalog);
+
+  // Erases these tiles from memory and the tiers below; builds that have begun keep theirs. Blocks. Errors: those of
+  // the tiers, of which the others are erased nevertheless.
+  struct Erased {
+    std::size_t memory = 0;
+    std::vector<std::pair<const char*, std::size_t>> stores;  // by the tier's name
+  };
+  Result<Erased> Erase(const tiler::TileSelection& selection);
+
   void SetCacheBytes(std::size_t capacity) { cache_.SetCapacity(capacity); }
 
   // Cancels waiting calls of Build and Run; later calls fail at once. Find still works.

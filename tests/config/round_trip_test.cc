@@ -28,6 +28,7 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
+  config.admin_listen = ListenAddress{"10.0.0.1", 9090};
   DatasetConfig dataset = Dataset("a");
   dataset.sources = {"/data/a.tif"};
   dataset.vertical = "egm96";
@@ -90,6 +91,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
 
 TEST(ToJson, NamesEveryOption) {
   Config config;
+  config.admin_listen = ListenAddress{"127.0.0.1", 9090};
   config.access_log_file = "/var/log/terrace/access.log";
   DatasetConfig dataset = Dataset("a");
   dataset.finest_error = 1;

@@ -97,14 +97,22 @@ class ByteCache {
       std::list<Entry> gone;
       const std::lock_guard lock(shard->mutex);
       shard->retained = generations;
-      for (Segment* segment : {&shard->probation, &shard->protection, &shard->ghosts}) {
-        for (auto entry = segment->entries.begin(); entry != segment->entries.end();) {
-          const auto here = entry++;
-          if (!shard->Retains(here->key)) shard->Remove(here, gone);
-        }
-      }
-      shard->TrimGhosts(gone);
+      shard->RemoveIf([&](const Key& key) { return !shard->Retains(key); }, gone);
     }
+  }
+
+  // Removes the entries whose keys `is_chosen` accepts. Returns how many values they had.
+  template <typename Predicate>
+  std::size_t EraseIf(const Predicate& is_chosen) {
+    std::size_t erased = 0;
+    for (const auto& shard : shards_) {
+      std::list<Entry> gone;
+      const std::lock_guard lock(shard->mutex);
+      const std::size_t before = shard->live();
+      shard->RemoveIf(is_chosen, gone);
+      erased += before - shard->live();
+    }
+    return erased;
   }
 
   // The number of shards stays the same: a cache that was created small keeps its single lock.
@@ -181,6 +189,16 @@ class ByteCache {
       from.charged -= entry->charge;
       index.erase(entry->key);
       to.splice(to.end(), from.entries, entry);
+    }
+    template <typename Predicate>
+    void RemoveIf(const Predicate& is_chosen, std::list<Entry>& to) {
+      for (Segment* segment : {&probation, &protection, &ghosts}) {
+        for (auto entry = segment->entries.begin(); entry != segment->entries.end();) {
+          const auto here = entry++;
+          if (is_chosen(here->key)) Remove(here, to);
+        }
+      }
+      TrimGhosts(to);
     }
     // Evicts entries until `most` bytes are left. They become ghosts.
     void EvictTo(std::size_t most, std::vector<ValuePtr>& evicted) {

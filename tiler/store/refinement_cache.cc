@@ -23,6 +23,17 @@ void RefinementCache::Insert(const RefinedTileKey& key, RefinedTilePtr tile) {
   memory_.Insert(key, std::move(tile));
 }
 
+// The slower tier first: what is found there meanwhile goes into memory.
+Result<RefinementCache::Erased> RefinementCache::Erase(const TileSelection& selection) {
+  Result<std::size_t> below = 0;
+  if (below_) below = below_->Erase(selection);
+  Erased erased;
+  erased.memory = memory_.EraseIf([&](const RefinedTileKey& key) { return IsSelected(selection, key); });
+  if (!below) return tl::unexpected(std::move(below.error()));
+  erased.below = *below;
+  return erased;
+}
+
 ByteCacheStats RefinementCache::stats() const {
   ByteCacheStats stats = memory_.stats();
   stats.hits = hits_.load(std::memory_order_relaxed);

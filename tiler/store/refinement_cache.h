@@ -24,6 +24,12 @@ class RefinementCache {
 
   void Insert(const RefinedTileKey& key, RefinedTilePtr tile);
 
+  // Erases the refinements of these tiles. Blocks if the store below blocks. Errors: those of the store below.
+  struct Erased {
+    std::size_t memory = 0, below = 0;
+  };
+  Result<Erased> Erase(const TileSelection& selection);
+
   // As ByteCache::Retain, for the memory tier.
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }
   void SetCapacity(std::size_t memory_bytes) { memory_.SetCapacity(memory_bytes); }

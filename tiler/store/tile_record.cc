@@ -69,6 +69,28 @@ std::string RecordKey(const RefinedTileKey& key) {
   return writer.Take();
 }
 
+std::string RecordPrefix(std::uint64_t generation, int level) {
+  ByteWriter writer;
+  writer.Put(generation);
+  writer.Put(static_cast<std::int32_t>(level));
+  return writer.Take();
+}
+
+bool IsSelected(const TileSelection& selection, std::string_view record_key) {
+  ByteReader reader(record_key);
+  const auto generation = reader.Get<std::uint64_t>();
+  geo::TileKey tile;
+  tile.level = reader.Get<std::int32_t>();
+  tile.x = reader.Get<std::int64_t>();
+  tile.y = reader.Get<std::int64_t>();
+  bool is_mercator = false;
+  if (reader.remaining() > 0) {  // a tile's
+    reader.Get<std::int32_t>();
+    is_mercator = reader.Get<std::uint8_t>() == static_cast<std::uint8_t>(TileFormat::kHeightPng);
+  }
+  return reader.ok() && selection.Contains(generation, tile, is_mercator);
+}
+
 std::string SerializeTile(const EncodedTile& tile) {
   ByteWriter writer;
   writer.Reserve(tile.bytes.size() + tile.etag.size() + 32);

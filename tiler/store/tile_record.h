@@ -19,6 +19,11 @@ namespace terrace::tiler {
 std::string RecordKey(const CacheKey& key);
 std::string RecordKey(const RefinedTileKey& key);
 
+// What the keys of a generation's records of one level begin with, and no others.
+std::string RecordPrefix(std::uint64_t generation, int level);
+// Whether the record of this key is a selected tile's, or its refinement.
+bool IsSelected(const TileSelection& selection, std::string_view record_key);
+
 std::string SerializeTile(const EncodedTile& tile);
 // The times of the build are zero. kInvalidArgument: not written by SerializeTile.
 Result<EncodedTile> ParseTile(std::string_view bytes);

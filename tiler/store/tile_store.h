@@ -1,16 +1,18 @@
 // The interface of a cache tier for tiles and refinements. A tier is a class that implements it and a row where the
 // program lists its tiers; look-ups, metrics and the stop go through the list.
 //
-// Implementations are thread-safe. Find may block on a disk or a network. The others return at once.
+// Implementations are thread-safe. Find and Erase may block on a disk or a network. The others return at once.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <optional>
 
+#include "engine/core/result.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/store/byte_cache.h"
 #include "tiler/store/refined_tile.h"
+#include "tiler/store/tile_selection.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::tiler {
@@ -30,6 +32,13 @@ struct CacheKeyHash {
   }
 };
 
+inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
+  return selection.Contains(key.generation, key.request.key, key.request.format == TileFormat::kHeightPng);
+}
+inline bool IsSelected(const TileSelection& selection, const RefinedTileKey& key) {
+  return selection.Contains(key.generation, key.key, /*is_mercator=*/false);
+}
+
 // The tier in memory.
 using TileCache = ByteCache<CacheKey, CacheKeyHash, EncodedTile>;
 
@@ -48,6 +57,10 @@ class StoreBase {
   // A literal: what metrics and Server-Timing call the tier.
   virtual const char* name() const = 0;
   virtual StoreStats stats() const = 0;
+
+  // Erases the values of these tiles, also those that wait to be written, and returns their number. kUnavailable: the
+  // medium does not respond, and values may be left.
+  virtual Result<std::size_t> Erase(const TileSelection& selection) = 0;
 
   // Drops values that wait to be written, and accepts no more: the process ends, and has no time left.
   virtual void Abandon() = 0;

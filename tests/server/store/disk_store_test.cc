@@ -9,6 +9,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <iterator>
 #include <memory>
 #include <string>
@@ -248,6 +249,45 @@ TEST_F(DiskStoreTest, ErasesWhatItsOwnerForgets) {
   EXPECT_EQ(store.stats().damaged, 1u);
 }
 
+// What was written, what is being written and what waits.
+TEST_F(DiskStoreTest, ErasesWhatIsChosenWhereverItIs) {
+  constexpr int kCount = 3000;
+  const auto is_even = [](std::string_view key) { return (key.back() - '0') % 2 == 0; };
+  for (const int written : {kCount, kCount / 3, 0}) {
+    DiskStore store(Options());
+    for (int i = 0; i < kCount; ++i) {
+      Keep(store, i);
+      if (i + 1 == written) store.Flush();
+    }
+    const Result<std::size_t> erased = store.Erase({"key "}, is_even);
+    ASSERT_TRUE(erased) << erased.error().message;
+    EXPECT_EQ(*erased, kCount / 2u) << written;
+    store.Flush();
+    for (int i = 0; i < kCount; ++i) ASSERT_EQ(store.Find(KeyOf(i)).has_value(), i % 2 == 1) << i;
+    const Result<std::size_t> none = store.Erase({"another ", "kez"}, [](std::string_view) { return true; });
+    EXPECT_EQ(none.value_or(1), 0u);
+  }
+}
+
+TEST_F(DiskStoreTest, ErasesWhatIsBeingWritten) {
+  DiskStore store(Options());
+  std::promise<void> begun, go;
+  const auto write = [&] {
+    begun.set_value();
+    go.get_future().wait();
+    return ValueOf(1);
+  };
+  store.Keep(KeyOf(1), write, 1000);
+  begun.get_future().wait();
+  auto erased =
+      std::async(std::launch::async, [&] { return store.Erase({"key "}, [](std::string_view) { return true; }); });
+  erased.wait_for(milliseconds(50));  // without the wait for the writer, it has found nothing by then
+  go.set_value();
+  EXPECT_EQ(erased.get().value_or(0), 1u);
+  store.Flush();
+  EXPECT_FALSE(store.Find(KeyOf(1)));
+}
+
 TEST_F(DiskStoreTest, NeverServesARecordOfAnotherKeyOrWithoutASeal) {
   std::string sealed;
   {
@@ -441,6 +481,9 @@ TEST_F(FailingDiskTest, BeginsSwitchedOffWhereTheDiskDoesNotAnswer) {
   EXPECT_FALSE(store.stats().on);
   Keep(store, 1);
   EXPECT_FALSE(store.Find(KeyOf(1)));
+  // What it holds comes back with the disk.
+  const Result<std::size_t> erased = store.Erase({"key "}, [](std::string_view) { return true; });
+  EXPECT_TRUE(!erased && erased.error().code == ErrorCode::kUnavailable);
   plan.Heal();
   EXPECT_TRUE(Eventually([&] { return store.stats().on; }));
 }

@@ -32,6 +32,18 @@ TEST(TileCache, FindsWhatWasInserted) {
   EXPECT_EQ(cache.Find(Key(2)), nullptr);
 }
 
+TEST(TileCache, ErasesWhatIsChosenAndKeepsItsBooks) {
+  TileCache cache(100 * kCharge);
+  for (int x = 1; x <= 9; ++x) cache.Insert(Key(x), Tile());
+  ASSERT_NE(cache.Find(Key(2)), nullptr);  // in the protected part
+  EXPECT_EQ(cache.EraseIf([](const CacheKey& key) { return key.request.key.x % 2 == 0; }), 4u);
+  for (int x = 1; x <= 9; ++x) EXPECT_EQ(cache.Find(Key(x)) != nullptr, x % 2 == 1) << x;
+  EXPECT_EQ(cache.stats().entries, 5u);
+  EXPECT_EQ(cache.stats().bytes, 5 * kCharge);
+  cache.Insert(Key(2), Tile());
+  EXPECT_NE(cache.Find(Key(2)), nullptr);
+}
+
 TEST(TileCache, EvictsOldestWhenOverBudget) {
   TileCache cache(3 * kCharge);
   for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());

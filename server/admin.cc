@@ -1,0 +1,184 @@
+#include "server/admin.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <utility>
+
+#include "server/handlers/handlers.h"
+#include "server/http/http_error.h"
+#include "server/http/text.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr std::string_view kPurgePath = "/admin/purge", kMetricsPath = "/metrics";
+
+Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
+  const std::size_t dash = text.find('-');
+  const auto first = PlainDecimal(text.substr(0, dash), /*max_digits=*/2);
+  const auto last = dash == std::string_view::npos ? first : PlainDecimal(text.substr(dash + 1), /*max_digits=*/2);
+  if (!first || !last || *first > *last || *last > geo::kMaxLevel) {
+    return MakeError(ErrorCode::kInvalidArgument, "levels must be a level or two such as 8-13, 0 to {}",
+                     geo::kMaxLevel);
+  }
+  selection.min_level = static_cast<int>(*first);
+  selection.max_level = static_cast<int>(*last);
+  return {};
+}
+
+struct Purged {
+  TileService::Erased tiles;
+  tiler::RefinementCache::Erased refinements;
+};
+
+// Refinements first: tiles that are made of them meanwhile are erased, too.
+Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection) {
+  Result<tiler::RefinementCache::Erased> refinements;
+  if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection);
+  Result<TileService::Erased> tiles = parts.tiles.Erase(selection);
+  if (!refinements) return tl::unexpected(std::move(refinements.error()));
+  if (!tiles) return tl::unexpected(std::move(tiles.error()));
+  return Purged{*std::move(tiles), *refinements};
+}
+
+// {"dataset":"maui","version":"0a1b2c3d4e5f","erased":{"tiles":{"memory":12,"disk":40},"refinements":{...}}}
+std::string PurgedJson(const Purge& purge, const Purged& purged) {
+  std::string stores;
+  for (const auto& [name, count] : purged.tiles.stores) stores += fmt::format(",\"{}\":{}", name, count);
+  return fmt::format(
+      R"({{"dataset":"{}","version":"{}","erased":{{"tiles":{{"memory":{}{}}},"refinements":{{"memory":{},"disk":{}}}}}}})"
+      "\n",
+      purge.dataset, purge.version, purged.tiles.memory, stores, purged.refinements.memory, purged.refinements.below);
+}
+
+Response TextResponse(std::string_view content_type, Body body) {
+  Response response;
+  response.is_vital = true;
+  response.content_type = content_type;
+  response.body = std::move(body);
+  response.cache_control = "no-store";
+  return response;
+}
+
+}  // namespace
+
+Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  std::array<std::optional<std::string>, 3> values;
+  constexpr std::array<std::string_view, 3> kKnown = {"dataset", "bbox", "levels"};
+  for (const auto& [name, value] : *sent) {
+    const auto known = std::ranges::find(kKnown, name);
+    if (known == kKnown.end()) {
+      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are dataset, bbox, levels");
+    }
+    std::optional<std::string>& place = values[static_cast<std::size_t>(known - kKnown.begin())];
+    if (place) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", *known);
+    place = value;
+  }
+  const auto& [dataset, box, levels] = values;
+  if (!dataset) return MakeError(ErrorCode::kInvalidArgument, "dataset is missing: name the one to purge");
+  const Result<std::uint32_t> index = FindDataset(*dataset, catalog.datasets);
+  if (!index) return tl::unexpected(index.error());
+  const DatasetView& found = catalog.datasets[*index];
+  Purge purge{found.name, found.version(), {}};
+  purge.selection.generation = found.generation;
+  if (box) {
+    const Result<dem::GeoBounds> bounds = ParseBox(*box);
+    if (!bounds) return tl::unexpected(bounds.error());
+    purge.selection.box = *bounds;
+  }
+  if (levels) {
+    if (const Result<void> set = SetLevels(purge.selection, *levels); !set) return tl::unexpected(set.error());
+  }
+  return purge;
+}
+
+// Serves one connection.
+class AdminApplication::Handler final : public ConnectionHandler {
+ public:
+  explicit Handler(const AdminParts& parts) : parts_(parts) {}
+
+  Admission Admit(Request& request, std::chrono::milliseconds /*longest_wait*/) override {
+    Admission admission;
+    admission.refusal = Refuse(request);
+    return admission;
+  }
+
+  Answer Handle(const Request& request) override {
+    if (PathOf(request) == kPurgePath) return ErasePurged(request);
+    return WriteMetrics();
+  }
+
+  void Report(const SentReply& reply) override {
+    ReplyRecord record;
+    record.method = reply.request.method_name;
+    record.target = reply.request.target;
+    record.status = reply.response.status;
+    record.body_bytes = reply.body_bytes;
+    record.duration = reply.duration;
+    record.route = "admin";
+    record.cache = "-";
+    record.version = reply.request.version;
+    record.request_id = reply.request.id;
+    record.peer = reply.peer;
+    record.user_agent = reply.request.fields->user_agent;
+    parts_.metrics.CountReply(record);
+    parts_.access_log.Write(record);
+  }
+
+ private:
+  static std::string_view PathOf(const Request& request) {
+    return std::string_view(request.target).substr(0, request.target.find('?'));
+  }
+  static std::string_view QueryOf(const Request& request) {
+    const std::size_t path = PathOf(request).size();
+    return std::string_view(request.target).substr(std::min(path + 1, request.target.size()));
+  }
+
+  static std::optional<Response> Refuse(const Request& request) {
+    if (!request.fields->origin.empty()) return ProblemResponse(403, "web pages are not answered here", request.id);
+    const std::string_view path = PathOf(request);
+    const bool is_purge = path == kPurgePath;
+    if (!is_purge && path != kMetricsPath) {
+      return ProblemResponse(404, "no such URL; there are /admin/purge and /metrics", request.id);
+    }
+    const bool reads = request.method == Method::kGet || request.method == Method::kHead;
+    if (is_purge ? request.method == Method::kPost : reads) return std::nullopt;
+    Response response =
+        ProblemResponse(405, is_purge ? "only POST is answered here" : "only GET is answered here", request.id);
+    response.headers.emplace_back("Allow", is_purge ? "POST" : "GET, HEAD");
+    response.close = true;  // a body of any form may follow
+    return response;
+  }
+
+  asio::awaitable<Response> WriteMetrics() {
+    co_return TextResponse("text/plain; version=0.0.4; charset=utf-8", co_await parts_.metrics_page.Get());
+  }
+
+  asio::awaitable<Response> ErasePurged(const Request& request) {
+    const Result<Purge> purge = ParsePurge(QueryOf(request), *parts_.catalog());
+    if (!purge) co_return ClientErrorResponse(purge.error(), request.id);
+    Work<Purged> work = [&parts = parts_, selection = purge->selection](const std::stop_token&) {
+      return EraseAll(parts, selection);
+    };
+    const auto deadline = TileService::Clock::now() + parts_.deadline.load(std::memory_order_relaxed);
+    const Result<Purged> purged = co_await parts_.tiles.Run(std::move(work), TileService::Length::kLong, deadline);
+    if (!purged) co_return co_await BackendFailure(purged.error(), request.id);
+    std::string text = PurgedJson(*purge, *purged);
+    spdlog::info("purge: {}", Trim(text, "\n"));
+    co_return TextResponse("application/json", std::make_shared<const std::string>(std::move(text)));
+  }
+
+  const AdminParts& parts_;
+};
+
+std::unique_ptr<ConnectionHandler> AdminApplication::Connect(const asio::ip::address& /*peer*/) {
+  return std::make_unique<Handler>(parts_);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,21 @@
+// Tiles to erase from caches: those of one dataset between two levels that overlap a box.
+#pragma once
+
+#include <cstdint>
+
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::tiler {
+
+struct TileSelection {
+  std::uint64_t generation = 0;  // identifies the dataset
+  int min_level = 0, max_level = geo::kMaxLevel;
+  dem::GeoBounds box;  // degrees; west > east: across the antimeridian
+
+  // `is_mercator`: `key` is a tile of Web Mercator's XYZ scheme, and its level is a level of that scheme. A tile that
+  // only touches the box is not selected.
+  bool Contains(std::uint64_t generation_of_key, const geo::TileKey& key, bool is_mercator) const;
+};
+
+}  // namespace terrace::tiler
