@@ -47,13 +47,17 @@ class SingleFlightTest : public testing::Test {
 
   void Join(Flights::Build build, JobClock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
+      flights_done_.push_back(std::move(flight));
+    };
     asio::co_spawn(io_, flights_.Join(0, "it", std::move(build), Until(deadline)),
                    asio::bind_cancellation_slot(slot, keep));
   }
   void JoinAs(std::size_t key, JobOrder order, Flights::Build build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
+      flights_done_.push_back(std::move(flight));
+    };
     asio::co_spawn(io_, flights_.Join(key, "it", std::move(build), order), asio::bind_cancellation_slot(slot, keep));
   }
   // Blocks the workers with jobs of the first client.
@@ -254,9 +258,8 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
   };
   std::vector<Result<Value>> ends;
   const auto join = [&](std::size_t i, std::uint64_t client) {
-    asio::co_spawn(
-        io_, flights.Join(i, "it", wait, Until(Soon(), client)),
-        [&](std::exception_ptr, Flights::FlightResult flight) { ends.push_back(std::move(flight.value)); });
+    asio::co_spawn(io_, flights.Join(i, "it", wait, Until(Soon(), client)),
+                   [&](std::exception_ptr, Flights::FlightResult flight) { ends.push_back(std::move(flight.value)); });
     io_.poll();
     io_.restart();
   };
