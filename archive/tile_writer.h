@@ -36,14 +36,13 @@ class TileWriter {
 
   // Writes the file and renames it. Call it once, last; the file is complete and on the disk afterwards. Without tiles
   // no file is written, and an old one is removed. kUnavailable: as Add.
+  // kInvalidArgument: a tile was added twice.
   virtual Result<UnitSummary> Finish() = 0;
 };
 
 struct UnitOptions {
   tiler::TileRequest kind;  // Manifest::kind
   std::uint64_t key = 0;    // UnitEntry::key; kept in the file
-  std::string attribution;  // for other readers of the file
-  dem::GeoBounds bounds;    // of the data, likewise
 };
 
 // Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 60 bytes for
