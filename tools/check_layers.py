@@ -16,7 +16,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server (config knows VALUES as
+# core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- server, and core <- config <- server (config knows VALUES as
 # well). In the server, asio.h stands below all, the files of the folder itself put the rooms together, and the command
 # line is above all:
 # net <- http, which know no product; jobs; store, jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api};
@@ -26,7 +26,7 @@ TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended"
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
-ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "server/asio.h"]
+ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Of elevation models, each may know those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
@@ -58,11 +58,12 @@ ROOMS = {
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
+    "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
     "server/http": ["engine/core", "server/asio.h", "server/net"],
-    "server/store": ["engine/core", "config", "tiler"],
+    "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive"],
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
@@ -84,7 +85,7 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"engine/tin/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
@@ -94,7 +95,7 @@ LIBRARIES = [
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
-    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|server)/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|server/net/.*)\.cc"),
@@ -105,12 +106,12 @@ LIBRARIES = [
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # What a room promises not to know: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|server)/"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|server)/"),
     Library("clocks", r"(chrono|ctime)", r"(config|tiler|server|engine/dem)/"),
-    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/gltf/mesh_file)"),
+    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|tiler|server)/.*\.cc"),
+            r"(config|engine/dem|tiler|archive|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 
