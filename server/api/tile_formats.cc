@@ -261,19 +261,6 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
   return wanted;
 }
 
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction) {
-  if (requested.fraction) {
-    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
-    const double error_m = std::clamp(*requested.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
-                                      std::numeric_limits<double>::max());
-    return geo::SnapToLadder(level, error_m, error_fraction);
-  }
-  if (!requested.error_m) return 0;
-  const int step = geo::SnapToLadder(level, *requested.error_m, error_fraction);
-  // max(error, default): steps above 0 are finer than the default.
-  return requested.at_least && !is_deepest ? std::min(step, 0) : step;
-}
-
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     if (datasets[i].name == name) return static_cast<std::uint32_t>(i);
