@@ -3,7 +3,7 @@
 // Thread-safe. Files of units are opened when they are first needed; a bounded number stays open.
 #pragma once
 
-#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -39,8 +39,13 @@ class Archive {
   // or cannot be read; the message names it.
   virtual Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const = 0;
 
-  // The range of a tile without its bytes; nothing as Find, also for errors.
+  // The range of a tile; nothing as Find, also for errors.
   virtual std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const = 0;
+
+  // Calls `take` for each tile until it fails: unit by unit, in a unit as its file has them. Reads and checks every
+  // byte. Errors: those of `take` and of Find.
+  using TakeTile = std::function<Result<void>(const geo::TileKey& key, ArchivedTile tile)>;
+  virtual Result<void> ForEach(const TakeTile& take) const = 0;
 };
 
 }  // namespace terrace::archive
