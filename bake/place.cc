@@ -75,14 +75,14 @@ struct Owner {
 
 Result<void> MakeFolder(const std::string& place) {
   std::error_code error;
-  fs::create_directories(place, error);
-  if (error && !fs::is_directory(place)) {
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be created: {}; give a folder that can be written with --out",
-                     place, error.message());
-  }
-  if (!fs::is_directory(place)) {
+  if (fs::exists(place, error) && !fs::is_directory(place, error)) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is a file; a bake needs a folder: give another place with --out",
                      place);
+  }
+  fs::create_directories(place, error);
+  if (!fs::is_directory(place)) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be created: {}; give a folder that can be written with --out",
+                     place, error.message());
   }
   if (::access(place.c_str(), W_OK | X_OK) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a folder that can be written with --out",

@@ -104,6 +104,7 @@ class Bake(unittest.TestCase):
                 reply = connection.getresponse()
                 return reply.status, reply.read()
             yield get
+            connection.close()
         finally:
             process.kill()
             process.communicate()
