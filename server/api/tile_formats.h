@@ -69,6 +69,9 @@ const TileFormat* CutSuffix(std::string_view& name);
 // what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
 Result<tiler::TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets);
 
+// kNotFound, for a dataset without sources: its archive has no tiles of this format.
+Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
+
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
@@ -84,6 +87,9 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 // The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
 // of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
 int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
+
+// ErrorStep for a level of this dataset. If no error is requested, and the dataset has no sources, that of its archive.
+int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
 // Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is what answers
