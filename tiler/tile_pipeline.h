@@ -56,6 +56,7 @@ struct Dataset {
   ImageryRules imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
+  std::uint64_t options = 0;     // the same without what only heights depend on (DemSource::fingerprint)
 };
 
 // Heights of a dataset at points, NaN where it has none.

@@ -16,12 +16,12 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- server, and core <- config <- server (config knows VALUES as
+# core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- {bake, server}, and core <- config <- server (config knows VALUES as
 # well). In the server, asio.h stands below all, the files of the folder itself put the rooms together, and the command
 # line is above all:
 # net <- http, which know no product; jobs; store, jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api};
 # {telemetry, api} <- edge; {query, api} <- documents <- handlers; {edge, handlers} <- server <- cli, and tiles <- reload
-# <- cli. In the command line common <- {serve, mesh, info} <- cli.
+# <- cli. In the command line common <- {serve, mesh, info, bake} <- cli, and bake <- cli/bake.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
@@ -32,7 +32,7 @@ DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
 # Headers of rooms below a front room: whoever may know the front room may include these.
 DOORS = {front + "/" + name: front for front, names in {
-    "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
+    "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
                    "gdal/gdal_runtime.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
                    "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
     "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
@@ -59,6 +59,7 @@ ROOMS = {
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive"],
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
@@ -75,7 +76,8 @@ ROOMS = {
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info"],
+    "server/cli/bake": ENGINE + ["bake", "server/cli/common"],
+    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
 # Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
@@ -85,7 +87,7 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"engine/tin/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|server/.*\.cc)"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|bake/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
@@ -95,7 +97,7 @@ LIBRARIES = [
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
-    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|server)/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|server/net/.*)\.cc"),
@@ -106,12 +108,12 @@ LIBRARIES = [
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # What a room promises not to know: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|server)/"),
-    Library("clocks", r"(chrono|ctime)", r"(config|tiler|server|engine/dem)/"),
-    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|server/|proto/gltf/mesh_file)"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|server)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|server|engine/dem)/"),
+    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|tiler|archive|server)/.*\.cc"),
+            r"(config|engine/dem|tiler|archive|bake|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 

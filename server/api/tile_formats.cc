@@ -268,19 +268,6 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
   return wanted;
 }
 
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction) {
-  if (requested.fraction) {
-    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
-    const double error_m = std::clamp(*requested.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
-                                      std::numeric_limits<double>::max());
-    return geo::SnapToLadder(level, error_m, error_fraction);
-  }
-  if (!requested.error_m) return 0;
-  const int step = geo::SnapToLadder(level, *requested.error_m, error_fraction);
-  // max(error, default): steps above 0 are finer than the default.
-  return requested.at_least && !is_deepest ? std::min(step, 0) : step;
-}
-
 int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset) {
   if (!requested.error_m && !requested.fraction && dataset.baked_alone) {
     const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;

@@ -16,16 +16,13 @@
 #include "server/api/call.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoded_tile.h"
+#include "tiler/requested_error.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::server {
 
-// The geometric error that a client requests; all members are optional.
-struct RequestedError {
-  std::optional<double> error_m;   // finite, > 0
-  std::optional<double> fraction;  // of the level's error; finite, > 0
-  bool at_least = false;           // error_m is the minimum of the default errors
-};
+using tiler::ErrorStep;
+using tiler::RequestedError;
 
 struct TileParameters {
   RequestedError requested;
@@ -83,10 +80,6 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding,
 // The extensions named by `extensions=a-b` parameters anywhere in Accept and by the query's values. Unknown names are
 // ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
-
-// The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
-// of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
 
 // ErrorStep for a level of this dataset. If no error is requested, and the dataset has no sources, that of its archive.
 int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);

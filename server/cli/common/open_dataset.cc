@@ -68,16 +68,16 @@ Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, con
   return imagery;
 }
 
-// Changes when a source, a layer, or an option that changes bytes does, and with the encoders; equal for equal
-// contents, wherever they lie. What decides heights is in the fingerprint of the source.
+// Changes when a layer or an option that changes bytes does, with the encoders, and with `heights`; equal for equal
+// contents, wherever they lie.
 std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
-                           const std::string& version) {
+                           const std::string& version, std::uint64_t heights) {
   const tiler::WaterRules& water = dataset.water;
   const tiler::ImageryRules& imagery = dataset.imagery;
   const std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(),
-      dataset.source->fingerprint(), dataset.error_fraction, static_cast<int>(dataset.rules.criterion),
-      dataset.rules.compact, static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
+      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(), heights,
+      dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
+      static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
       water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
       dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, static_cast<int>(imagery.texture),
       imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution, dataset.attribution.size(),
@@ -124,7 +124,8 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_levels = wanted.metadata_availability;
-  dataset.generation = GenerationOf(wanted, dataset, version);
+  dataset.generation = GenerationOf(wanted, dataset, version, dataset.source->fingerprint());
+  dataset.options = GenerationOf(wanted, dataset, version, 0);
   return dataset;
 }
 

@@ -1,0 +1,26 @@
+#include "server/cli/bake/bake_export.h"
+
+#include <filesystem>
+#include <system_error>
+
+#include "archive/archive.h"
+
+namespace terrace::cli {
+
+namespace fs = std::filesystem;
+
+Result<void> CheckExportPlace(const std::string& out) {
+  std::error_code error;
+  const bool is_taken = fs::is_directory(out, error) ? !fs::is_empty(out, error) : fs::exists(out, error);
+  if (!is_taken) return {};
+  return MakeError(ErrorCode::kInvalidArgument, "{}: is there already; remove it, or give another place with --out",
+                   out);
+}
+
+Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop) {
+  (void)baked;
+  (void)stop;
+  return MakeError(ErrorCode::kInternal, "--form {}: not yet", arguments.form);
+}
+
+}  // namespace terrace::cli
