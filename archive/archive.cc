@@ -18,8 +18,6 @@ namespace {
 
 using FilePtr = std::shared_ptr<const PmtilesFile>;
 
-constexpr std::size_t kOpenUnits = 64;
-
 // Common parts of both forms.
 class ArchiveBase : public Archive {
  public:
@@ -105,7 +103,7 @@ class ChunkedArchive final : public ArchiveBase {
     if (!file) return file;
     const std::lock_guard lock(mutex_);
     open_.push_front({unit->second, *file});
-    if (open_.size() > kOpenUnits) open_.pop_back();
+    if (open_.size() > kMaxOpenFiles) open_.pop_back();
     return file;
   }
 

@@ -24,6 +24,9 @@ struct ArchivedTile {
 
 class Archive {
  public:
+  // Of one archive, at a time.
+  static constexpr std::size_t kMaxOpenFiles = 32;
+
   // `place`: a folder with a manifest, or a file written by WriteSingle; also /vsis3/... where the source policy allows
   // it. kNotFound: nothing is there, or the bake is unfinished. kInvalidArgument: it is something else, or of a newer
   // format. kUnavailable: it cannot be read now. Messages name the place and the remedy.

@@ -2,6 +2,7 @@
 // as one deterministic pass. `out` appears by rename when it is complete.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <stop_token>
 #include <string>
@@ -19,10 +20,8 @@ struct ExportOptions {
 // One PMTiles file with all tiles; Archive::Open reads it.
 Result<void> WriteSingle(const Archive& archive, const std::string& out, const ExportOptions& options = {});
 
-// A folder for static hosts: {z}/{x}/{y}.terrain with layer.json, or {z}/{x}/{y}.png with tiles.json.
+// A folder for static hosts: {z}/{x}/{y}.terrain with layer.json, or {z}/{x}/{y}.png with tiles.json. kInvalidArgument:
+// `out` exists and is not empty, or these are GLB tiles.
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const ExportOptions& options = {});
-
-// 3TZ: tileset.json, subtrees and GLB tiles in a ZIP file with an index.
-Result<void> Write3tz(const Archive& archive, const std::string& out, const ExportOptions& options = {});
 
 }  // namespace terrace::archive

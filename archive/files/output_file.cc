@@ -114,6 +114,19 @@ std::string OutputFile::xxh3() const {
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }
 
+Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {
+  const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode); };
+  int descriptor = open();
+  if (descriptor < 0 && errno == ENOENT) {
+    if (Result<void> made = MakeFolder(path); !made) return made;
+    descriptor = open();
+  }
+  if (descriptor < 0) return CannotWrite(path, errno);
+  Result<void> written = WriteAll(descriptor, bytes, path);
+  if (::close(descriptor) != 0 && written) return CannotWrite(path, errno);
+  return written;
+}
+
 SpoolFile::SpoolFile(int descriptor, std::string folder) : descriptor_(descriptor), folder_(std::move(folder)) {}
 SpoolFile::SpoolFile(SpoolFile&& other) noexcept
     : descriptor_(std::exchange(other.descriptor_, -1)),

@@ -36,6 +36,9 @@ class OutputFile {
   std::unique_ptr<Impl> impl_;
 };
 
+// Writes a file without waiting for the disk: for many small files. Makes its folder. kUnavailable: as OutputFile.
+Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
+
 // A file without a name beside `path`, for data that wait: it is gone with the process.
 class SpoolFile {
  public:

@@ -66,6 +66,9 @@ const TileFormat* CutSuffix(std::string_view& name);
 // what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
 Result<tiler::TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets);
 
+// kNotFound, for a dataset without sources: its archive has no tiles of this format.
+Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
+
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
@@ -77,6 +80,9 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding,
 // The extensions named by `extensions=a-b` parameters anywhere in Accept and by the query's values. Unknown names are
 // ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
+
+// ErrorStep for a level of this dataset. If no error is requested, and the dataset has no sources, that of its archive.
+int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
 // Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is what answers

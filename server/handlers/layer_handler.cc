@@ -30,6 +30,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
   layer.north = dataset.north;
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
+  if (dataset.baked_alone) layer.normals = dataset.baked_alone->extent().normals;
   layer.tile_query = std::move(tile_query);
   return proto::EncodeLayerJson(layer, stop);
 }
@@ -57,6 +58,9 @@ Document PlainLayer(const DatasetView& dataset) { return Document::Make(WriteLay
 Described DescribeLayer(const Handlers& from, const Call& call) {
   const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
+  if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh); !has) {
+    return ClientErrorResponse(has.error(), call.request->id);
+  }
   const Result<TileParameters> parameters = ParseTileParameters(call.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), call);

@@ -51,6 +51,9 @@ asio::awaitable<Response> BuildTile(const Handlers& from, const Call& call, tile
   const Result<ServedTile> served =
       co_await from.tiles.Build(from.catalog, tile, from.Deadline(), call.request->client);
   if (served) co_return Reply(from, tile, *served, call);
+  const bool is_absent =
+      served.error().code == ErrorCode::kNotFound && from.catalog->datasets[tile.dataset].baked_alone;
+  if (is_absent) co_return ClientErrorResponse(served.error(), call.request->id);
   co_return co_await BackendFailure(served.error(), call.request->id);
 }
 

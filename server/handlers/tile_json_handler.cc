@@ -38,6 +38,9 @@ Answer AnswerTileJson(const Handlers& from, const Call& call) {
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(call.route.query);
   if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
   const DatasetView& dataset = from.catalog->datasets[*index];
+  if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
+    return ClientErrorResponse(has.error(), call.request->id);
+  }
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;

@@ -10,6 +10,7 @@
 
 #include "engine/dem/gdal/file_content.h"
 #include "engine/dem/statistics/cache_folder.h"
+#include "server/cli/common/open_baked.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -131,9 +132,12 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress,
                                    std::stop_token stop) {
+  if (wanted.sources.empty() && !wanted.baked.empty()) return OpenBakedAlone(wanted);
   auto source = OpenSource(wanted, cache, progress, stop);
   if (!source) return tl::unexpected(source.error());
-  return MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
+  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
+  if (dataset) AddBaked(wanted, *dataset);
+  return dataset;
 }
 
 }  // namespace terrace::cli

@@ -16,6 +16,10 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources) {
   return count;
 }
 
+std::string NameOf(const config::DatasetConfig& dataset) {
+  return dataset.sources.empty() ? dataset.baked : NameOf(dataset.sources);
+}
+
 std::string NameOf(const std::vector<config::SourceConfig>& sources) {
   if (sources.size() == 1) return sources.front().written;
   return fmt::format("{} and {} more source{}", sources.front().written, sources.size() - 1,
