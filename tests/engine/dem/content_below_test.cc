@@ -170,7 +170,7 @@ TEST(ContentBelow, EqualHashesMeanEqualTiles) {
     Landscape landscape(options);
     std::vector<Below> before = ReadAll(landscape, kLevel);
     int same = 0, others = 0;
-    constexpr int kChanges = 14;
+    constexpr int kChanges = 8;
     for (int i = 0; i < kChanges; ++i) {
       // Close to the joints, where what one raster holds reaches into its neighbour.
       const auto near_joint = [&] { return i % 3 == 0 ? random(kSide) : (random(20) + kSide - 10) % kSide; };
