@@ -30,9 +30,9 @@ Pyramid SomePyramid(int deepest) {
   Pyramid pyramid = {{{0, 0, 1, 0}}};
   for (int level = 1; level <= deepest; ++level) {
     const std::int64_t x = std::int64_t{3} << (level - 1), y = std::int64_t{1} << (level - 1);
-    pyramid.push_back({{x & ~1, (y - 2) & ~1, (x + 2) | 1, y | 1}});
-    pyramid.back()[0].start_y = std::max<std::int64_t>(pyramid.back()[0].start_y, 0);
-    if (level > 2) pyramid.back().push_back({0, 0, 1, 1});
+    pyramid.push_back({{x & ~1, std::max<std::int64_t>((y - 2) & ~1, 0),
+                        std::min((x + 2) | 1, geo::TileColumns(level) - 1), std::min(y | 1, geo::TileRows(level) - 1)},
+                       {0, 0, 1, 1}});
   }
   return pyramid;
 }
