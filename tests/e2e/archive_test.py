@@ -3,8 +3,10 @@
 What an archive gives is what building gives, byte for byte, with sources and without; a damaged archive never gives a
 wrong byte.
 """
+import functools
 import gzip
 import http.client
+import http.server
 import json
 import os
 import pathlib
@@ -14,6 +16,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 import unittest
 
@@ -61,6 +64,29 @@ class Server:
 
     def log(self):
         return self.log_path.read_text()
+
+
+class Bucket(http.server.SimpleHTTPRequestHandler):
+    """Files over HTTP with ranges, as an object store serves them."""
+
+    def do_GET(self):
+        try:
+            data = pathlib.Path(self.translate_path(self.path)).read_bytes()
+        except OSError:
+            return self.send_error(404)
+        asked = re.match(r"bytes=(\d+)-(\d+)", self.headers.get("Range", ""))
+        self.send_response(206 if asked else 200)
+        self.send_header("Accept-Ranges", "bytes")
+        if asked:
+            first, last = int(asked[1]), min(int(asked[2]), len(data) - 1)
+            self.send_header("Content-Range", f"bytes {first}-{last}/{len(data)}")
+            data = data[first:last + 1]
+        self.send_header("Content-Length", str(len(data)))
+        self.end_headers()
+        self.wfile.write(data)
+
+    def log_message(self, *_):
+        pass
 
 
 class ArchiveTest(unittest.TestCase):
@@ -211,6 +237,22 @@ class ArchiveTest(unittest.TestCase):
                 time.sleep(0.2)
             self.assertIn("is served now", server.log())
             self.assertEqual(server.get("/cell/0/0/0.terrain")[0], 200)
+
+    def test_archive_in_a_bucket(self):
+        bucket = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Bucket, directory=self.place))
+        threading.Thread(target=bucket.serve_forever, daemon=True).start()
+        self.addCleanup(bucket.server_close)
+        self.addCleanup(bucket.shutdown)
+        url = f"/vsicurl/http://127.0.0.1:{bucket.server_address[1]}/"
+        datasets = [{"name": "cell", "baked": url + "terrain"}]
+        with self.serve() as live, Server({"datasets": datasets, "allowed_prefixes": [url]}, self.scratch) as remote:
+            for target in ("/cell/0/0/0.terrain", "/cell/5/33/24.terrain", "/cell/9/532/387.terrain"):
+                self.expect_same(target, QUANTIZED, live, remote)
+            self.assertEqual(remote.tier("/cell/5/33/24.terrain", QUANTIZED), "archive")
+        done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--listen", "127.0.0.1:0"], text=True, timeout=60,
+                              input=json.dumps({"datasets": datasets}), capture_output=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("allowed prefix", done.stderr)
 
     def test_python_reader(self):
         reader = SOURCE_DIR / "docs/formats/read_archive.py"
