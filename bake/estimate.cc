@@ -47,6 +47,9 @@ std::vector<geo::TileKey> SamplesOf(const std::vector<geo::TileRange>& ranges, i
   return samples;
 }
 
+// Units of one tile exist so that parents have four children.
+bool ReachesDown(const Unit& unit) { return !unit.root || CountTiles(unit.tiles) > 1; }
+
 Estimate Sum(std::vector<LevelEstimate> levels) {
   Estimate estimate;
   estimate.levels = std::move(levels);
@@ -91,18 +94,21 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
     }
   }
   Estimate estimate = Sum(std::move(levels));
-  estimate.units = plan.files;
+  estimate.files = plan.files;
+  for (const UnitPlan::Of& of : plan.units) estimate.units += ReachesDown(of.unit) ? of.targets.size() : 0;
   estimate.sampled = sampled;
   return estimate;
 }
 
-Estimate EstimateWith(const Pyramid& tiles, std::uint64_t units, double bytes_per_tile, double milliseconds_per_tile) {
+Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double milliseconds_per_tile) {
   std::vector<LevelEstimate> levels;
   for (std::size_t level = 0; level < tiles.size(); ++level) {
     levels.push_back({static_cast<int>(level), CountTiles({tiles[level]}), bytes_per_tile, milliseconds_per_tile});
   }
   Estimate estimate = Sum(std::move(levels));
-  estimate.units = units;
+  const std::vector<Unit> units = UnitsOf(tiles);
+  estimate.files = units.size();
+  estimate.units = static_cast<std::uint64_t>(std::ranges::count_if(units, ReachesDown));
   return estimate;
 }
 

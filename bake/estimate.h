@@ -20,7 +20,8 @@ struct LevelEstimate {
 
 struct Estimate {
   std::vector<LevelEstimate> levels;
-  std::uint64_t tiles = 0, units = 0;
+  std::uint64_t tiles = 0, files = 0;
+  std::uint64_t units = 0;    // of these the top and those that reach below their first level
   std::uint64_t sampled = 0;  // tiles that were built for it
   double bytes = 0, core_hours = 0;
 };
@@ -30,6 +31,6 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
                               const UnitPlan& plan, const std::stop_token& stop);
 
 // From figures that are the same for every tile.
-Estimate EstimateWith(const Pyramid& tiles, std::uint64_t units, double bytes_per_tile, double milliseconds_per_tile);
+Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double milliseconds_per_tile);
 
 }  // namespace terrace::bake

@@ -37,9 +37,8 @@ void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source
   const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / tiles; };
   // A pixel more on each side, which interpolation may need.
   const double slack = 360 / tiles / 256;
-  const dem::GeoBounds box{
-      share(root.x) * 360 - 180, std::max(-90.0, geo::MercatorLatitude(share(root.y + 1)) - slack),
-      share(root.x + 1) * 360 - 180, std::min(90.0, geo::MercatorLatitude(share(root.y)) + slack)};
+  const dem::GeoBounds box{share(root.x) * 360 - 180, std::max(-90.0, geo::MercatorLatitude(share(root.y + 1)) - slack),
+                           share(root.x + 1) * 360 - 180, std::min(90.0, geo::MercatorLatitude(share(root.y)) + slack)};
   const int level = root.level - 1;
   for (const geo::TileRange& range : dem::TilesOverlapping(box, level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {

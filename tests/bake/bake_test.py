@@ -17,7 +17,7 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
-from pmtiles import archive  # noqa: E402
+from pmtiles import archive, tiles_of  # noqa: E402
 from srtm import write_hgt  # noqa: E402
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
@@ -342,13 +342,32 @@ class Bake(unittest.TestCase):
                 self.assertIn((level, x ^ 1, y), tiles)
         self.assertIn((11, int(186.3 / 180 * 2048), int(136.3 / 180 * 2048)), tiles)
 
+    def test_the_other_forms_hold_the_same_tiles(self):
+        _, tiles = archive(self.reference)
+        folder, single = self.place("folder"), self.place("single.pmtiles")
+        for form, place in (("folder", folder), ("single", single)):
+            done = self.run_bake("--out", place, "--form", form)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertFalse(place.with_name(place.name + ".bake").exists())
+            again = self.run_bake("--out", place, "--form", form)
+            self.assertEqual(again.returncode, 2)
+            self.assertIn("is there already", again.stderr)
+        written = {tuple(int(part) for part in path.relative_to(folder).with_suffix("").parts): path.read_bytes()
+                   for path in folder.rglob("*.terrain")}
+        self.assertEqual(written, tiles)
+        layer = json.loads((folder / "layer.json").read_text())
+        promised = {(level, x, y) for level, ranges in enumerate(layer["available"]) for box in ranges
+                    for x in range(box["startX"], box["endX"] + 1) for y in range(box["startY"], box["endY"] + 1)}
+        self.assertEqual(promised, set(tiles))
+        self.assertEqual({(zoom - 1, x, y): tile for (zoom, x, y), tile in tiles_of(single).items()}, tiles)
+
     def test_dry_run_counts_the_tiles(self):
         manifest, tiles = archive(self.reference)
         done = self.run_bake("--dry-run", "--json")
         self.assertEqual(done.returncode, 0, done.stderr)
         estimate = json.loads(done.stdout)
         self.assertEqual(estimate["tiles"], len(tiles))
-        self.assertEqual(estimate["units"], len(manifest["units"]))
+        self.assertEqual(estimate["files"], len(manifest["units"]))
         written = sum(unit["bytes"] for unit in manifest["units"])
         self.assertTrue(0.5 < estimate["bytes"] / written < 2, (estimate["bytes"], written))
 

@@ -151,7 +151,9 @@ void AddBake(CLI::App& app, int& exit_code) {
       "2 wrong arguments; 130 or 143 stopped by a signal.");
   AddWhat(*command, *arguments);
   AddHow(*command, *arguments);
-  AddFlags(*command, config::DatasetOptions(), "The dataset, as for terrace serve", arguments->dataset_flags);
+  std::vector<config::OptionInfo> about_dataset = config::DatasetOptions();
+  std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked"; });
+  AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
   AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);

@@ -202,6 +202,11 @@ Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::Co
     auto dataset = ConfiguredDataset(arguments, input.config);
     if (!dataset) return tl::unexpected(dataset.error());
     input.dataset = *std::move(dataset);
+    input.dataset.baked.clear();  // a bake comes from sources
+    if (input.dataset.sources.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "dataset {} has no sources, only the archive of an earlier bake",
+                       input.dataset.name);
+    }
     return input;
   }
   for (const std::string& written : arguments.dems) {

@@ -157,6 +157,7 @@ std::string SummaryText(const BakeSummary& summary) {
 std::string EstimateJson(const bake::Estimate& estimate) {
   Json json;
   json["tiles"] = estimate.tiles;
+  json["files"] = estimate.files;
   json["units"] = estimate.units;
   json["bytes"] = std::round(estimate.bytes);
   json["core_hours"] = estimate.core_hours;
@@ -178,8 +179,9 @@ std::string EstimateText(const bake::Estimate& estimate) {
   }
   const std::string hours = estimate.core_hours < 0.1 ? fmt::format("{:.1f} core-minutes", estimate.core_hours * 60)
                                                       : fmt::format("{:.1f} core-hours", estimate.core_hours);
-  fmt::format_to(std::back_inserter(text), "{} tiles in {} files, about {} and {}; {}\n", Grouped(estimate.tiles),
-                 Grouped(estimate.units), Bytes(estimate.bytes), hours,
+  fmt::format_to(std::back_inserter(text), "{} tiles in {} files ({} subtrees), about {} and {}; {}\n",
+                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.units), Bytes(estimate.bytes),
+                 hours,
                  estimate.sampled > 0 ? fmt::format("from {} tiles that were built", estimate.sampled)
                                       : std::string("from the assumed bytes and milliseconds a tile"));
   return text;

@@ -66,8 +66,7 @@ int PlanFromCatalogue(const BakeArguments& arguments, const bake::Order& order) 
   }
   if (order.bbox) *tiles = bake::TilesWithin(*tiles, *order.bbox);
   if (order.levels) tiles->resize(static_cast<std::size_t>(order.levels->second) + 1);
-  const bake::Estimate estimate = bake::EstimateWith(*tiles, bake::UnitsOf(*tiles).size(), arguments.bytes_per_tile,
-                                                     arguments.milliseconds_per_tile);
+  const bake::Estimate estimate = bake::EstimateWith(*tiles, arguments.bytes_per_tile, arguments.milliseconds_per_tile);
   fmt::print("{}", arguments.json ? EstimateJson(estimate) + "\n" : EstimateText(estimate));
   return kExitOk;
 }
