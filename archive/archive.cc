@@ -3,15 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <list>
 #include <mutex>
-#include <system_error>
 #include <unordered_map>
 #include <utility>
 
+#include "archive/files/input_file.h"
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
+#include "engine/dem/gdal/remote_file.h"
 
 namespace terrace::archive {
 namespace {
@@ -147,8 +147,7 @@ class ChunkedArchive final : public ArchiveBase {
 Result<std::shared_ptr<const Archive>> Archive::Open(const std::string& place) {
   Result<Manifest> manifest = ReadManifest(place);
   if (!manifest) return tl::unexpected(std::move(manifest.error()));
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(place, ignored)) {
+  if (!IsSingleFile(place)) {
     return std::make_shared<const ChunkedArchive>(place, *std::move(manifest));
   }
   Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(place);
@@ -161,12 +160,12 @@ Result<std::vector<std::shared_ptr<const Archive>>> Archive::OpenAll(const std::
   Result<std::shared_ptr<const Archive>> only = Open(place);
   if (only) return std::vector{*std::move(only)};
   if (only.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(only.error()));
-  std::error_code ignored;
   for (const auto format :
        {tiler::TileFormat::kQuantizedMesh, tiler::TileFormat::kGlb, tiler::TileFormat::kHeightPng}) {
     const std::string folder = place + "/" + FolderOf(format);
-    if (!std::filesystem::is_directory(folder, ignored)) continue;
+    if (!IsPlace(folder)) continue;
     Result<std::shared_ptr<const Archive>> archive = Open(folder);
+    if (!archive && dem::IsGdalName(folder) && archive.error().code == ErrorCode::kNotFound) continue;
     if (!archive) return tl::unexpected(std::move(archive.error()));
     archives.push_back(*std::move(archive));
   }

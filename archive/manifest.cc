@@ -1,7 +1,5 @@
 #include "archive/manifest.h"
 
-#include <filesystem>
-#include <system_error>
 #include <utility>
 
 #include "archive/files/input_file.h"
@@ -37,12 +35,11 @@ Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
 }
 
 Result<Manifest> ReadManifest(const std::string& place) {
-  std::error_code ignored;
-  if (std::filesystem::is_regular_file(place, ignored)) return ReadSingle(place);
+  if (IsSingleFile(place)) return ReadSingle(place);
   const std::string path = place + "/" + kManifestFile;
   const Result<std::string> json = ReadFile(path, kMaxManifestBytes);
   if (!json && json.error().code == ErrorCode::kNotFound) {
-    if (!std::filesystem::exists(place, ignored)) {
+    if (!IsPlace(place)) {
       return MakeError(ErrorCode::kNotFound, "there is no {}; give the folder or file that 'terrace bake' wrote",
                        place);
     }

@@ -15,12 +15,12 @@ namespace terrace::server {
 struct DescriptorDemand {
   unsigned io_threads = 1, worker_threads = 1;
   bool access_log_file = false;
-  std::size_t archive_files = 0;
   std::size_t stores = 0;       // of the disk cache
   std::size_t store_files = 0;  // record files of each that are open at a time
   std::size_t open_sources = 0;
   bool has_vrts = false;  // whose parts GDAL keeps open beside
   std::size_t connections = 1;
+  std::size_t archive_files = 0;
 };
 
 struct DescriptorBudget {

@@ -6,7 +6,11 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <system_error>
 #include <utility>
+
+#include "engine/dem/gdal/remote_file.h"
 
 namespace terrace::archive {
 namespace {
@@ -42,9 +46,25 @@ class LocalFile final : public InputFile {
   const std::uint64_t size_;
 };
 
+class GdalFile final : public InputFile {
+ public:
+  explicit GdalFile(std::unique_ptr<dem::RemoteFile> file) : file_(std::move(file)) {}
+
+  std::uint64_t size() const override { return file_->size(); }
+  Result<std::string> Read(std::uint64_t offset, std::size_t size) const override { return file_->Read(offset, size); }
+
+ private:
+  const std::unique_ptr<dem::RemoteFile> file_;
+};
+
 }  // namespace
 
 Result<std::unique_ptr<const InputFile>> InputFile::Open(const std::string& path) {
+  if (dem::IsGdalName(path)) {
+    Result<std::unique_ptr<dem::RemoteFile>> remote = dem::RemoteFile::Open(path);
+    if (!remote) return tl::unexpected(std::move(remote.error()));
+    return std::make_unique<GdalFile>(*std::move(remote));
+  }
   const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);  // a pipe does not block either
   if (descriptor < 0) {
     const bool is_missing = errno == ENOENT || errno == ENOTDIR;
@@ -57,6 +77,16 @@ Result<std::unique_ptr<const InputFile>> InputFile::Open(const std::string& path
     return MakeError(ErrorCode::kUnavailable, "{} is no regular file", path);
   }
   return std::make_unique<LocalFile>(path, descriptor, static_cast<std::uint64_t>(status.st_size));
+}
+
+bool IsSingleFile(const std::string& place) {
+  std::error_code ignored;
+  return dem::IsGdalName(place) ? place.ends_with(".pmtiles") : std::filesystem::is_regular_file(place, ignored);
+}
+
+bool IsPlace(const std::string& place) {
+  std::error_code ignored;
+  return dem::IsGdalName(place) || std::filesystem::exists(place, ignored);
 }
 
 Result<std::string> ReadFile(const std::string& path, std::uint64_t max_bytes) {

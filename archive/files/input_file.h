@@ -21,6 +21,11 @@ class InputFile {
   virtual Result<std::string> Read(std::uint64_t offset, std::size_t size) const = 0;
 };
 
+// Whether the place of an archive is one file. Names of GDAL's file systems end with .pmtiles then.
+bool IsSingleFile(const std::string& place);
+// Whether something may be there; of remote places this is not known.
+bool IsPlace(const std::string& place);
+
 // The whole file. kInvalidArgument: it is larger than `max_bytes`. Other errors as Open.
 Result<std::string> ReadFile(const std::string& path, std::uint64_t max_bytes);
 
