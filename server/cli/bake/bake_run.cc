@@ -268,6 +268,9 @@ std::string WrongTogether(const BakeArguments& arguments) {
                : "give DEMs, or a configuration with --config, not both";
   }
   if (!arguments.dry_run && !given(arguments.out)) return "--out PLACE is missing: where the bake goes";
+  if (arguments.out.starts_with("/vsi")) {
+    return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
+  }
   if (given(arguments.shard) && arguments.finish) return "--finish is for all shards together: leave --shard out";
   if (given(arguments.shard) && arguments.form != kChunks) {
     return fmt::format("--form {} is written from all units: bake shards with --form chunks", arguments.form);
