@@ -25,9 +25,9 @@ asio::awaitable<void> Pause() {
 }
 
 // Unknown names must not become labels of metrics.
-void SetLabels(const Call& call, const Handlers& handlers, Response& response) {
-  response.labels.route = call.route.row->label;
-  const std::string& dataset = call.route.dataset;
+void SetLabels(const RequestContext& context, const Handlers& handlers, Response& response) {
+  response.labels.route = context.route.row->label;
+  const std::string& dataset = context.route.dataset;
   if (!dataset.empty() && FindDataset(dataset, handlers.catalog->datasets)) response.labels.subject = dataset;
 }
 
@@ -40,35 +40,35 @@ class TerrainApplication::Handler final : public ConnectionHandler {
       : application_(application), peer_(Canonical(peer)) {}
 
   Admission Admit(Request& request, std::chrono::milliseconds longest_wait) override {
-    Gate& gate = application_.parts_.edge.gate;
-    call_.request = &request;
-    caller_ = gate.Identify(request, peer_, call_);
+    AdmissionControl& admission_control = application_.parts_.frontend.admission_control;
+    context_.request = &request;
+    client_ = admission_control.Identify(request, peer_, context_);
     Result<Route> route = Routes().Match(request.target);
-    call_.route = route ? *std::move(route) : Route();
+    context_.route = route ? *std::move(route) : Route();
     Admission admission;
-    const RateLimiter::Turn turn = gate.TakeTurn(call_, caller_, longest_wait);
+    const RateLimiter::Turn turn = admission_control.TakeTurn(context_, client_, longest_wait);
     if (!turn.granted) {
-      admission.refusal = Gate::TooManyRequests(turn, call_);
+      admission.refusal = AdmissionControl::TooManyRequests(turn, context_);
       admission.delays_refusal = true;
       return admission;
     }
     admission.wait = turn.wait;
     admission.refusal = route ? Refuse() : RefuseUnknown(route.error());
     if (admission.refusal) return admission;
-    const RouteRow& row = *call_.route.row;
-    admission.for_grant = gate.IsForGrant(call_);
+    const RouteRow& row = *context_.route.row;
+    admission.depends_on_token = admission_control.DependsOnToken(context_);
     if (row.takes_post()) admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
     return admission;
   }
 
   Answer Handle(const Request&) override {
-    const RouteRow& row = *call_.route.row;
-    if (application_.opening() && !row.is_of_process) return AfterOpening();
+    const RouteRow& row = *context_.route.row;
+    if (application_.opening() && !row.needs_no_catalog) return AfterOpening();
     HandlersPtr handlers = application_.Current();
-    Answer answer = row.handle(*handlers, call_);
+    Answer answer = row.handle(*handlers, context_);
     auto* response = std::get_if<Response>(&answer);
     if (response == nullptr) return Finish(std::move(handlers), std::get<asio::awaitable<Response>>(std::move(answer)));
-    SetLabels(call_, *handlers, *response);
+    SetLabels(context_, *handlers, *response);
     return answer;
   }
 
@@ -77,7 +77,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
  private:
   // Preflight requests are answered before access is checked, because they have no token.
   std::optional<Response> RefuseMethod(bool takes_post) const {
-    const Request& request = *call_.request;
+    const Request& request = *context_.request;
     if (request.method == Method::kOptions) return PreflightResponse(takes_post);
     if (request.method == Method::kOther || (request.method == Method::kPost && !takes_post)) {
       return NoSuchMethodResponse(takes_post, request.id);
@@ -86,13 +86,13 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   }
   std::optional<Response> RefuseUnknown(const Error& error) const {
     std::optional<Response> refusal = RefuseMethod(/*takes_post=*/false);
-    return refusal ? std::move(refusal) : ClientErrorResponse(error, call_.request->id);
+    return refusal ? std::move(refusal) : ClientErrorResponse(error, context_.request->id);
   }
   std::optional<Response> Refuse() const {
-    std::optional<Response> refusal = RefuseMethod(call_.route.row->takes_post());
+    std::optional<Response> refusal = RefuseMethod(context_.route.row->takes_post());
     if (refusal) return refusal;
-    refusal = application_.parts_.edge.gate.Refuse(call_);
-    if (refusal) refusal->labels.route = call_.route.row->label;
+    refusal = application_.parts_.frontend.admission_control.Refuse(context_);
+    if (refusal) refusal->labels.route = context_.route.row->label;
     return refusal;
   }
 
@@ -100,19 +100,19 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   asio::awaitable<Response> Finish(HandlersPtr handlers, asio::awaitable<Response> answer);
 
   TerrainApplication& application_;
-  const Caller peer_;
-  Caller caller_;
-  Call call_;
+  const ClientIdentity peer_;
+  ClientIdentity client_;
+  RequestContext context_;
 };
 
 asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
   if (!co_await application_.FirstCatalog()) {
-    Response response = ProblemResponse(503, "the sources are being opened", call_.request->id);
+    Response response = ProblemResponse(503, "the sources are being opened", context_.request->id);
     response.headers.emplace_back("Retry-After", "5");
-    response.labels.route = call_.route.row->label;
+    response.labels.route = context_.route.row->label;
     co_return response;
   }
-  Answer answer = Handle(*call_.request);
+  Answer answer = Handle(*context_.request);
   if (auto* response = std::get_if<Response>(&answer)) co_return std::move(*response);
   co_return co_await std::get<asio::awaitable<Response>>(std::move(answer));
 }
@@ -126,14 +126,14 @@ asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handle
       next = std::move(response);
     }
     Response& response = std::get<Response>(next);
-    SetLabels(call_, *handlers, response);
+    SetLabels(context_, *handlers, response);
     if (!response.try_again || !application_.parts_.on_source_changed) co_return std::move(response);
     application_.parts_.on_source_changed();
     std::string dataset = response.labels.subject;
     const bool is_replaced = co_await application_.NextCatalog(handlers, std::move(dataset), give_up);
     if (!is_replaced) co_return std::move(response);
     handlers = application_.Current();
-    next = call_.route.row->handle(*handlers, call_);
+    next = context_.route.row->handle(*handlers, context_);
   }
 }
 
@@ -154,8 +154,8 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
   record.user_agent = request.fields->user_agent;
   record.request_id = request.id;
   record.peer = reply.peer;
-  if (reply.is_admitted && caller_.address != peer_.address) record.client = caller_.text;
-  if (reply.is_admitted && call_.grant) record.token_name = call_.grant->name;
+  if (reply.is_admitted && client_.address != peer_.address) record.client = client_.text;
+  if (reply.is_admitted && context_.grant) record.token_name = context_.grant->name;
   application_.parts_.metrics.CountReply(record);
   application_.parts_.access_log.Write(record);
 }
@@ -180,7 +180,7 @@ std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::a
 
 std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
   const asio::ip::address address = Canonical(peer);
-  return parts_.edge.gate.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
+  return parts_.frontend.admission_control.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
 }
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {

@@ -127,9 +127,9 @@ std::string_view LiteralOf(std::string_view segment) {
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
 // RouteRow::handle of documents.
-template <Described (*describe)(const Handlers&, const Call&)>
-Answer Write(const Handlers& from, const Call& call) {
-  return from.documents.Make(describe(from, call), call);
+template <DocumentAnswer (*describe)(const Handlers&, const RequestContext&)>
+Answer Write(const Handlers& from, const RequestContext& context) {
+  return from.documents.Make(describe(from, context), context);
 }
 
 // Most frequent routes first.
@@ -148,36 +148,39 @@ constexpr RouteRow kRows[] = {
     {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
     {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
     {.label = "mesh", .pattern = "/{dataset}/mesh", .handle = AnswerArea},
-    {.label = "datasets", .pattern = "/datasets", .handle = Write<DescribeDatasets>, .shows = Shows::kSeenDatasets},
+    {.label = "datasets",
+     .pattern = "/datasets",
+     .handle = Write<DescribeDatasets>,
+     .scope = DatasetScope::kVisibleDatasets},
     {.label = "viewer",
      .pattern = "/",
      .handle = Write<DescribeViewerFile>,
      .read = ReadViewerFile,
-     .shows = Shows::kNothing,
+     .scope = DatasetScope::kNothing,
      .takes_any_query = true},
     {.label = "viewer",
      .pattern = "/viewer/{file}...",
      .handle = Write<DescribeViewerFile>,
      .read = ReadViewerFile,
-     .shows = Shows::kNothing,
+     .scope = DatasetScope::kNothing,
      .takes_any_query = true},
     {.label = "livez",
      .pattern = "/livez",
      .handle = AnswerLive,
-     .shows = Shows::kNothing,
+     .scope = DatasetScope::kNothing,
      .is_probe = true,
-     .is_of_process = true},
+     .needs_no_catalog = true},
     {.label = "readyz",
      .pattern = "/readyz",
      .handle = AnswerReady,
-     .shows = Shows::kNothing,
+     .scope = DatasetScope::kNothing,
      .is_probe = true,
-     .is_of_process = true},
+     .needs_no_catalog = true},
     {.label = "metrics",
      .pattern = "/metrics",
      .handle = AnswerMetrics,
-     .shows = Shows::kAllDatasets,
-     .is_of_process = true},
+     .scope = DatasetScope::kAllDatasets,
+     .needs_no_catalog = true},
 };
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/api/call.h"
+#include "server/api/request_context.h"
 
 namespace terrace::server {
 

@@ -19,7 +19,7 @@
 
 #include "server/api/tile_formats.h"
 #include "server/application.h"
-#include "server/edge/edge.h"
+#include "server/frontend/frontend.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
 #include "server/net/io_threads.h"
@@ -55,16 +55,16 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
 // before everything a session refers to.
 class RunningServer final : public Server {
  public:
-  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Edge> edge,
+  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<Frontend> frontend,
                 ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
-        edge_(std::move(edge)),
+        frontend_(std::move(frontend)),
         tiles_({options_.config.worker_threads, options_.config.queue_length, options_.config.cache_bytes,
-                options_.tile_stores, MakeTileHead},
+                options_.tile_stores, MakeTileHeaders},
                std::bind_front(&Metrics::CountBuild, &metrics_)),
         metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
-        application_({*edge_, tiles_, metrics_, metrics_page_, access_log_,
+        application_({*frontend_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_trouble},
                      std::move(catalog), options_.config),
@@ -88,7 +88,7 @@ class RunningServer final : public Server {
     // On an inherited socket, connections wait in its queue until there is something to serve: a stop before that loses
     // none.
     if (!application_.opening() || options_.listen_socket < 0) listener_->Start();
-    if (edge_->tls) asio::co_spawn(io_.first(), WatchCertificate(edge_->tls.get()), asio::detached);
+    if (frontend_->tls) asio::co_spawn(io_.first(), WatchCertificate(frontend_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
@@ -114,7 +114,7 @@ class RunningServer final : public Server {
   std::string url() const override {
     const std::string& host = listener_->host();
     const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
-    return fmt::format("{}://{}:{}/", edge_->tls ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
+    return fmt::format("{}://{}:{}/", frontend_->tls ? "https" : "http", bare_v6 ? "[" + host + "]" : host, port());
   }
 
   void RequestStop() override {
@@ -145,20 +145,20 @@ class RunningServer final : public Server {
 
   bool Stop() {
     const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
-    edge_->connections.Drain();
-    edge_->connections.WaitUntilEmpty(DrainGrace());
+    frontend_->connections.Drain();
+    frontend_->connections.WaitUntilEmpty(DrainGrace());
     listener_->Close();
-    const bool drained = edge_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
+    const bool drained = frontend_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
         std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
     tiles_.CancelBuilds();
     // The time beyond the drain timeout is too short to wait for the disk.
     if (!drained) {
       for (tiler::StoreBase* store : Stores()) store->Abandon();
     }
-    if (!drained && !edge_->connections.WaitUntilEmpty(kLastWords)) {
-      spdlog::warn("{} connections are cut off: the drain timeout has passed", edge_->connections.size());
-      edge_->connections.AbortAll();
-      edge_->connections.WaitUntilEmpty(kLastWords);
+    if (!drained && !frontend_->connections.WaitUntilEmpty(kLastWords)) {
+      spdlog::warn("{} connections are cut off: the drain timeout has passed", frontend_->connections.size());
+      frontend_->connections.AbortAll();
+      frontend_->connections.WaitUntilEmpty(kLastWords);
     }
     io_.Stop();
     metrics_page_.Stop();
@@ -215,9 +215,9 @@ class RunningServer final : public Server {
     if (options_.refinements) state.refinements = options_.refinements->stats();
     state.stores = Stores();
     state.tile_stores = options_.tile_stores.size();
-    state.connections = edge_->connections.size();
-    state.refused_connections = edge_->connections.refused();
-    state.transfers = edge_->transfers.stats();
+    state.connections = frontend_->connections.size();
+    state.refused_connections = frontend_->connections.refused();
+    state.transfers = frontend_->transfers.stats();
     state.catalog = application_.catalog();
     state.troubles = application_.troubles().size();
     state.catalogs = application_.replaced();
@@ -232,18 +232,18 @@ class RunningServer final : public Server {
     context->options.min_rate = config.min_read_rate;
     context->options.drain_grace = DrainGrace();
     context->application = &application_;
-    context->connections = &edge_->connections;
-    context->transfers = &edge_->transfers;
+    context->connections = &frontend_->connections;
+    context->transfers = &frontend_->transfers;
     context->deadline = &application_.deadline();
-    context->cors = edge_->cors;
-    context->tls = edge_->tls.get();
+    context->cors = frontend_->cors;
+    context->tls = frontend_->tls.get();
     return context;
   }
 
   const ServerOptions options_;
   AccessLog access_log_;
   Metrics metrics_;
-  const std::unique_ptr<Edge> edge_;  // jobs of workers hold bodies that count in it
+  const std::unique_ptr<Frontend> frontend_;  // jobs of workers hold bodies that count in it
   TileService tiles_;
   MetricsPage metrics_page_;
   TerrainApplication application_;
@@ -261,19 +261,19 @@ class RunningServer final : public Server {
 
 }  // namespace
 
-std::vector<Error> Server::TryFiles(const config::Config& config) {
+std::vector<Error> Server::CheckStartFiles(const config::Config& config) {
   std::vector<Error> errors;
   const auto note = [&](const auto& opened) {
     if (!opened) errors.push_back(opened.error());
   };
   note(StaticFiles::Load(config.viewer.directory));
   note(AccessLog::Try(config.access_log, config.access_log_file));
-  note(Edge::Open(config));
+  note(Frontend::Open(config));
   return errors;
 }
 
-Result<void> Server::TryAddress(const config::Config& config) {
-  return Listener::TryAddress(config.listen.host, config.listen.port);
+Result<void> Server::CheckAddress(const config::Config& config) {
+  return Listener::CheckAddress(config.listen.host, config.listen.port);
 }
 
 Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions options) {
@@ -284,10 +284,10 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (!viewer) return tl::unexpected(viewer.error());
   Result<AccessLog> access_log = AccessLog::Open(config.access_log, config.access_log_file);
   if (!access_log) return tl::unexpected(access_log.error());
-  Result<std::unique_ptr<Edge>> edge = Edge::Open(config);
-  if (!edge) return tl::unexpected(edge.error());
+  Result<std::unique_ptr<Frontend>> frontend = Frontend::Open(config);
+  if (!frontend) return tl::unexpected(frontend.error());
   auto server = std::make_unique<RunningServer>(std::move(catalog), std::move(*viewer), std::move(*access_log),
-                                                *std::move(edge), std::move(options));
+                                                *std::move(frontend), std::move(options));
   if (const Result<void> started = server->Run(); !started) return tl::unexpected(started.error());
   return server;
 }

@@ -51,9 +51,9 @@ class Server {
 
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
   // errors. Call it before datasets are opened, which may take long.
-  static std::vector<Error> TryFiles(const config::Config& config);
+  static std::vector<Error> CheckStartFiles(const config::Config& config);
   // Checks that the address is free.
-  static Result<void> TryAddress(const config::Config& config);
+  static Result<void> CheckAddress(const config::Config& config);
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.

@@ -25,7 +25,7 @@ enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
 // Header lines of a response that depend on the body alone, not on the request or the configuration. Each ends with
 // CR LF.
-struct HeadLines {
+struct HeaderLines {
   std::string text;
   std::size_t of_body = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
 };
@@ -42,7 +42,7 @@ struct EncodedTile {
   StageTimes times;  // of the build
   RefinementUse refinement = RefinementUse::kMade;
   const char* store = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
-  HeadLines head;               // see MakeTileHead
+  HeaderLines head;             // see MakeTileHeaders
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.head.text.size(); }

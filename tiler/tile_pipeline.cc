@@ -68,7 +68,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   }
   const proto::LatticeView lattice{key, heights.lattice, heights.heights};
   const tin::HeightField field = FieldOf(lattice);
-  tin::GreedyOptions plan = PlanOf(*dataset.source, lattice, dataset.rules.criterion);
+  tin::GreedyOptions plan = RefineOptionsOf(*dataset.source, lattice, dataset.rules.criterion);
   tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(plan), known->refinement)
                                           : tin::GreedyTriangulation(field, std::move(plan));
   tin::GreedyGoal goal;

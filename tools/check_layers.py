@@ -43,7 +43,7 @@ VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_t
 HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
 API = TILES + HTTP + ["server/api"]
-SERVER = API + ["server/store", "server/telemetry", "server/query", "server/edge", "server/documents", "server/handlers"]
+SERVER = API + ["server/store", "server/telemetry", "server/query", "server/frontend", "server/documents", "server/handlers"]
 ROOMS = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
@@ -69,7 +69,7 @@ ROOMS = {
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
     "server/api": TILES + HTTP,
-    "server/edge": API + ["server/telemetry"],
+    "server/frontend": API + ["server/telemetry"],
     "server/documents": API,
     "server/handlers": API + ["server/query", "server/documents"],
     "server/reload": ENGINE + ["server/tiles"],
@@ -246,7 +246,7 @@ class SelfTest(unittest.TestCase):
 
     def test_front_room_shows_its_doors_alone(self):
         self.assert_clean({"config/options/options.h": "", "server/cli/serve/a.cc": '#include "config/options/options.h"\n'})
-        self.assert_refused({"config/input/place.h": "", "server/cli/serve/a.cc": '#include "config/input/place.h"\n'},
+        self.assert_refused({"config/input/config_location.h": "", "server/cli/serve/a.cc": '#include "config/input/config_location.h"\n'},
                             "server/cli/serve may not know config/input")
         self.assert_refused({"server/cli/serve/log.h": "", "server/cli/mesh/a.cc": '#include "server/cli/serve/log.h"\n'},
                             "server/cli/mesh may not know server/cli/serve")

@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/coverage"
 PROFILES = BUILD / "profiles"
 ROOMS = ("engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "tiler", "server/jobs", "server/store", "server/tiles", "server/net", "server/http",
-         "server/telemetry", "server/query", "server/api", "server/edge", "server/documents", "server/handlers",
+         "server/telemetry", "server/query", "server/api", "server/frontend", "server/documents", "server/handlers",
          "server/reload", "server/cli", "server")
 WANTED = 90.0
 

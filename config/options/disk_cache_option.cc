@@ -8,7 +8,8 @@ constexpr std::size_t kMinBytes = std::size_t{16} << 20;  // the smallest size f
 
 Codec<DiskCacheConfig> FileBytes(std::size_t DiskCacheConfig::*member) {
   Codec<DiskCacheConfig> codec = Bytes(member, kMaxBytes);
-  codec.read = [read_bytes = codec.read, member](const Json& value, const Place& place, DiskCacheConfig& cache) {
+  codec.read = [read_bytes = codec.read, member](const Json& value, const ConfigLocation& place,
+                                                 DiskCacheConfig& cache) {
     read_bytes(value, place, cache);
     if (cache.*member > 0 && cache.*member < kMinBytes) {
       place.Fail(fmt::format("must be 0, which keeps none, or at least {} (16 MiB)", kMinBytes));
@@ -44,7 +45,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
 }
 
 Codec<Config> DiskCacheOption() {
-  return {[](const Json& value, const Place& place, Config& config) {
+  return {[](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})");
             ReadObject(value, place, DiskCacheOptionTable(), config.disk_cache);
           },

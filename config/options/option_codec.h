@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
+#include "config/input/config_location.h"
 #include "config/input/json_text.h"
-#include "config/input/place.h"
 
 namespace terrace::config {
 
 template <typename Target>
 struct Codec {
-  std::function<void(const Json&, const Place&, Target&)> read;
+  std::function<void(const Json&, const ConfigLocation&, Target&)> read;
   std::function<Json(const Target&)> write;
   Json (*from_text)(const std::string&) = nullptr;  // null: the option has no flag
   Json schema = {};
@@ -60,7 +60,7 @@ Json NumberOut(double value);
 
 template <typename Target, typename Member>
 Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             const std::optional<std::int64_t> number = WholeNumber(value);
             if (!number || *number < min || *number > max) {
               return place.Expected(fmt::format("a whole number from {} to {}", min, max));
@@ -73,7 +73,7 @@ Codec<Target> Integer(Member Target::*member, std::int64_t min, std::int64_t max
 template <typename Target>
 Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
   return {
-      [=](const Json& value, const Place& place, Target& target) {
+      [=](const Json& value, const ConfigLocation& place, Target& target) {
         const std::optional<std::int64_t> number = ByteCount(value);
         if (!number || *number < 0 || *number > max) {
           return place.Expected(fmt::format("a number of bytes up to {}, or text such as \"512MB\" or \"1GiB\"", max));
@@ -88,7 +88,7 @@ Codec<Target> Bytes(std::size_t Target::*member, std::int64_t max) {
 // Both ends belong to the range.
 template <typename Target, typename Member>
 Codec<Target> Number(Member Target::*member, double min, double max) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             const double number = value.is_number() ? value.get<double>() : std::nan("");
             if (!(number >= min && number <= max)) {
               return place.Expected(fmt::format("a number from {} to {}", min, max));
@@ -104,7 +104,7 @@ Codec<Target> Number(Member Target::*member, double min, double max) {
 
 template <typename Target>
 Codec<Target> Switch(bool Target::*member) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             if (!value.is_boolean()) return place.Expected("true or false");
             target.*member = value.get<bool>();
           },
@@ -113,7 +113,7 @@ Codec<Target> Switch(bool Target::*member) {
 
 template <typename Target>
 Codec<Target> Seconds(std::chrono::milliseconds Target::*member, double min, double max) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             const double seconds = value.is_number() ? value.get<double>() : std::nan("");
             if (!(seconds >= min && seconds <= max)) {
               return place.Expected(fmt::format("a number of seconds from {} to {}", min, max));
@@ -129,7 +129,7 @@ template <typename Target, typename Member>
 Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>> words) {
   Json schema = {{"enum", Json::array()}};
   for (const auto& [word, meaning] : words) schema["enum"].push_back(word);
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             std::string allowed;
             for (const auto& [word, meaning] : words) {
               if (value == word) {
@@ -153,7 +153,7 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
 template <typename Target>
 Codec<Target> Text(std::string Target::*member, const std::function<std::string(const std::string&)>& check,
                    Json schema) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             if (!value.is_string()) return place.Expected("text");
             const std::string problem = check(value.get_ref<const std::string&>());
             if (!problem.empty()) return place.Fail(problem);
@@ -165,7 +165,7 @@ Codec<Target> Text(std::string Target::*member, const std::function<std::string(
 // `what`: "the path of a directory". A relative path begins at the file's folder.
 template <typename Target>
 Codec<Target> Path(std::string Target::*member, const char* what) {
-  return {[=](const Json& value, const Place& place, Target& target) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& target) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) return place.Expected(what);
             target.*member = place.Resolve(value.get<std::string>());
           },

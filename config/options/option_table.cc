@@ -5,7 +5,8 @@
 namespace terrace::config {
 
 template <typename Target>
-void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target) {
+void ReadObject(const Json& object, const ConfigLocation& place, const std::vector<Option<Target>>& table,
+                Target& target) {
   if (!object.is_object())
     return place.Expected("an object with keys such as \"" + std::string(table.front().key) + "\"");
   std::vector<std::string_view> keys;
@@ -61,12 +62,13 @@ Json ObjectSchema(const std::vector<Option<Target>>& table) {
   return schema;
 }
 
-template void ReadObject(const Json&, const Place&, const std::vector<Option<Config>>&, Config&);
-template void ReadObject(const Json&, const Place&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
-template void ReadObject(const Json&, const Place&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
-template void ReadObject(const Json&, const Place&, const std::vector<Option<DiskCacheConfig>>&, DiskCacheConfig&);
-template void ReadObject(const Json&, const Place&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
-template void ReadObject(const Json&, const Place&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<Config>>&, Config&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<DatasetConfig>>&, DatasetConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<DiskCacheConfig>>&,
+                         DiskCacheConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
 template Json WriteObject(const DatasetConfig&, const std::vector<Option<DatasetConfig>>&);
 template Json WriteObject(const ImageryConfig&, const std::vector<Option<ImageryConfig>>&);

@@ -51,7 +51,8 @@ std::string DefaultOf(const Option<Target>& option) {
 // Reads every key of `object` by the table. Missing required keys and unknown keys are errors. Unknown keys are
 // reported by their position, and by name only if they resemble a known key of this or another object.
 template <typename Target>
-void ReadObject(const Json& object, const Place& place, const std::vector<Option<Target>>& table, Target& target);
+void ReadObject(const Json& object, const ConfigLocation& place, const std::vector<Option<Target>>& table,
+                Target& target);
 
 // Writes every option that has a value, in the order of the table.
 template <typename Target>
@@ -88,7 +89,7 @@ Codec<DatasetConfig> NodataCodec();
 // commas.
 Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path);
 
-// layer_options.cc
+// water_imagery_options.cc
 // {"mask": "water.tif"} or {"sea_level": 0}. As a flag: a number is a sea level, any other text the path of a mask.
 Codec<DatasetConfig> WaterCodec();
 
@@ -103,7 +104,7 @@ Codec<Config> DiskCacheOption();
 
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();
 
-// edge_options.cc
+// client_options.cc
 // [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag, because command lines are not secret.
 Codec<Config> TokensCodec();
 

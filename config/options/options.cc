@@ -25,7 +25,7 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
       std::find_if(table.begin(), table.end(), [&](const Option<Target>& candidate) { return candidate.key == key; });
   TERRACE_CHECK(option != table.end() && option->codec.from_text != nullptr);
   std::vector<ConfigError> found;
-  option->codec.read(option->codec.from_text(text), Place::InWorkingDirectory(directory, found), target);
+  option->codec.read(option->codec.from_text(text), ConfigLocation::InWorkingDirectory(directory, found), target);
   for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
 }
 

@@ -28,7 +28,7 @@ constexpr const char* kListenSchema = R"({
 })";
 
 Codec<Config> Listen() {
-  return {[](const Json& value, const Place& place, Config& config) {
+  return {[](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"");
             Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
             if (!address) return place.Fail(address.error().message);
@@ -38,7 +38,7 @@ Codec<Config> Listen() {
 }
 
 Codec<Config> Viewer() {
-  return {[](const Json& value, const Place& place, Config& config) {
+  return {[](const Json& value, const ConfigLocation& place, Config& config) {
             if (value.is_boolean()) {
               config.viewer = {value.get<bool>(), {}};
             } else if (value.is_string() && !value.get_ref<const std::string&>().empty()) {
@@ -57,7 +57,7 @@ Codec<Config> Viewer() {
 // "default" and "none" are words, everything else is a path.
 Codec<Config> CacheDir() {
   constexpr const char* kNone = "none";
-  return {[=](const Json& value, const Place& place, Config& config) {
+  return {[=](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_string()) return place.Expected("the path of a folder, \"default\" or \"none\"");
             const auto& path = value.get_ref<const std::string&>();
             const bool is_off = path.empty() || path == kNone;
@@ -68,7 +68,7 @@ Codec<Config> CacheDir() {
 }
 
 Codec<Config> Datasets() {
-  return {[](const Json& value, const Place& place, Config& config) {
+  return {[](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_array()) return place.Expected("a list of datasets");
             for (std::size_t i = 0; i < value.size() && !place.has_failed_often(); ++i) {
               ReadObject(value[i], place.At(i), DatasetOptionTable(), config.datasets.emplace_back());

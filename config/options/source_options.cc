@@ -28,7 +28,7 @@ bool IsVerticalName(const std::string& text) {
 }
 
 // Returns nothing, after reporting an error, if the value is invalid.
-std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
+std::optional<std::string> ReadVertical(const Json& value, const ConfigLocation& place) {
   const std::string text = value.is_string() ? value.get<std::string>() : "";
   if (IsVerticalName(text)) return text;
   if (IsGrid(text) && !HasControlCharacter(text)) return place.Resolve(text);
@@ -36,7 +36,7 @@ std::optional<std::string> ReadVertical(const Json& value, const Place& place) {
   return std::nullopt;
 }
 
-std::optional<NodataConfig> ReadNodata(const Json& value, const Place& place) {
+std::optional<NodataConfig> ReadNodata(const Json& value, const ConfigLocation& place) {
   if (value == "auto") return NodataConfig{};
   NodataConfig nodata{false, {}};
   if (value == "declared") return nodata;
@@ -61,7 +61,7 @@ Json WriteNodata(const NodataConfig& nodata) {
 }
 
 Codec<SourceConfig> SourcePath() {
-  return {[](const Json& value, const Place& place, SourceConfig& source) {
+  return {[](const Json& value, const ConfigLocation& place, SourceConfig& source) {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
               return place.Expected("a path, a glob or a folder");
             }
@@ -82,19 +82,22 @@ constexpr const char* kNodataSchema = R"({
 })";
 
 Codec<SourceConfig> SourceVertical() {
-  return {
-      [](const Json& value, const Place& place, SourceConfig& source) { source.vertical = ReadVertical(value, place); },
-      [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }, nullptr,
-      Json::parse(kVerticalSchema)};
+  return {[](const Json& value, const ConfigLocation& place, SourceConfig& source) {
+            source.vertical = ReadVertical(value, place);
+          },
+          [](const SourceConfig& source) { return source.vertical ? Json(*source.vertical) : Json(); }, nullptr,
+          Json::parse(kVerticalSchema)};
 }
 
 Codec<SourceConfig> SourceNodata() {
-  return {[](const Json& value, const Place& place, SourceConfig& source) { source.nodata = ReadNodata(value, place); },
+  return {[](const Json& value, const ConfigLocation& place, SourceConfig& source) {
+            source.nodata = ReadNodata(value, place);
+          },
           [](const SourceConfig& source) { return source.nodata ? WriteNodata(*source.nodata) : Json(); }, nullptr,
           Json::parse(kNodataSchema)};
 }
 
-void ReadSource(const Json& value, const Place& place, DatasetConfig& dataset) {
+void ReadSource(const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
   SourceConfig source;
   const bool is_object = value.is_object();
   if (!is_object) {
@@ -141,7 +144,7 @@ const std::vector<Option<SourceConfig>>& SourceOptionTable() {
 }
 
 Codec<DatasetConfig> SourcesCodec() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
             if (!value.is_array() || value.empty()) {
               return place.Expected("a list of paths such as [\"lidar/*.tif\", \"base.tif\"]");
             }
@@ -160,7 +163,7 @@ Codec<DatasetConfig> SourcesCodec() {
 }
 
 Codec<DatasetConfig> VerticalCodec() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
             if (auto vertical = ReadVertical(value, place)) dataset.vertical = *std::move(vertical);
           },
           [](const DatasetConfig& dataset) { return Json(dataset.vertical); }, TextToJson,
@@ -168,7 +171,7 @@ Codec<DatasetConfig> VerticalCodec() {
 }
 
 Codec<DatasetConfig> NodataCodec() {
-  return {[](const Json& value, const Place& place, DatasetConfig& dataset) {
+  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
             if (auto nodata = ReadNodata(value, place)) dataset.nodata = *std::move(nodata);
           },
           [](const DatasetConfig& dataset) { return WriteNodata(dataset.nodata); }, NumberToJson,
@@ -179,7 +182,7 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
   Json text_schema = Json::parse(kNonEmptyText);
   text_schema["pattern"] = kOneLinePattern;
   Json schema = {{"anyOf", Json::array({text_schema, ListOf(text_schema)})}};
-  return {[=](const Json& value, const Place& place, Config& config) {
+  return {[=](const Json& value, const ConfigLocation& place, Config& config) {
             std::vector<std::string> texts;
             for (const Json& item : value.is_array() ? value : Json::array({value})) {
               if (!item.is_string() || item.get_ref<const std::string&>().empty() ||

@@ -27,7 +27,7 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
       hasher.AddText({reinterpret_cast<const char*>(closed.data()), closed.size()});
     }
   }
-  // The floor in the datum of a source (ReadAsCounted) comes from the last raster grid with a geoid.
+  // The floor in the datum of a source (ReadInSourceDatum) comes from the last raster grid with a geoid.
   for (std::size_t i = impl_->grids.size(); i-- > 0 && impl_->floor_undulations != nullptr;) {
     if (impl_->grids[i].vertical().geoid == nullptr) continue;
     hasher.Add(impl_->contents[i].grid);

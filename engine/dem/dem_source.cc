@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/dem/common/all_cores.h"
 #include "engine/dem/common/content_hash.h"
+#include "engine/dem/common/parallel_for.h"
 #include "engine/dem/crs/footprint.h"
 #include "engine/dem/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
@@ -132,7 +132,7 @@ Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const
     std::ranges::move(PlanGrids(those), std::back_inserter(plans));
   }
   std::vector<std::optional<Result<RasterGrid>>> made(plans.size());
-  ForEachOnAllCores(plans.size(), [&](std::size_t i) {
+  ParallelFor(plans.size(), [&](std::size_t i) {
     made[i] = RasterGrid::Make(std::move(plans[i]), options);
     return made[i]->has_value();
   });
@@ -174,7 +174,7 @@ GeoBounds BoundsOf(const Rasters& rasters) {
 DemInfo InfoOf(const std::vector<RasterGrid>& grids, const Rasters& rasters, const DemOptions& options) {
   DemInfo info;
   std::vector<HeightRange> ranges(grids.size());
-  ForEachOnAllCores(grids.size(), [&](std::size_t i) {
+  ParallelFor(grids.size(), [&](std::size_t i) {
     ranges[i] = grids[i].EllipsoidalRange();
     return true;
   });
@@ -194,10 +194,10 @@ DemInfo InfoOf(const std::vector<RasterGrid>& grids, const Rasters& rasters, con
   return info;
 }
 
-std::vector<Reach> ReachesOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
+std::vector<SourceExtent> SourceExtentsOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
   const double finest =
       std::ranges::min_element(grids, {}, [](const RasterGrid& s) { return s.spacing().finer; })->spacing().finer;
-  std::vector<Reach> reaches;
+  std::vector<SourceExtent> reaches;
   for (const RasterGrid& grid : grids) {
     // `finest_error` applies to the finest source; for the other sources it is scaled by their spacing.
     const auto goal =
@@ -234,7 +234,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   const auto finest = std::ranges::min_element(impl->grids, {}, [](const RasterGrid& s) { return s.spacing().finer; });
   impl->info = InfoOf(impl->grids, *rasters, options);
   impl->info.left_out = std::move(left_out);
-  impl->available = AvailableTiles(ReachesOf(impl->grids, options));
+  impl->available = AvailableTiles(SourceExtentsOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
   impl->lattices = PlanLattices(finest->spacing(), impl->info.max_level);
   impl->floor = static_cast<float>(impl->info.floor);
@@ -296,7 +296,7 @@ Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token sto
   return impl_->Read(key, HeightDatum::kEllipsoid, stop);
 }
 
-Result<TileHeights> DemSource::ReadAsCounted(const geo::TileKey& key, std::stop_token stop) const {
+Result<TileHeights> DemSource::ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
   return impl_->Read(key, HeightDatum::kSource, stop);
 }
@@ -313,7 +313,8 @@ SampleCounts DemSource::CountSamples() const {
 }
 
 bool DemSource::has_datum() const {
-  return std::ranges::none_of(impl_->info.sources, [](const RasterInfo& raster) { return raster.counts_from.empty(); });
+  return std::ranges::none_of(impl_->info.sources,
+                              [](const RasterInfo& raster) { return raster.datum_in_use.empty(); });
 }
 
 bool DemSource::converts() const { return impl_->floor_undulations != nullptr; }

@@ -53,7 +53,7 @@ class DemSource {
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
   // floor is converted to the datum of the last source that refers to a geoid.
-  Result<TileHeights> ReadAsCounted(const geo::TileKey& key, std::stop_token stop = {}) const;
+  Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
   // Levels 0 .. geo::kMaxLevel. Columns wrap at 360 degrees. Precondition: rows lie within the lattice.
@@ -75,7 +75,7 @@ class DemSource {
 
   // Whether the vertical datum of every source is known. Orthometric heights need it.
   bool has_datum() const;
-  // Whether a source refers to a geoid, so that ReadAsCounted differs from Read.
+  // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
   // Samples read since Open, by all threads. For metrics.
@@ -85,11 +85,11 @@ class DemSource {
   // precedence, and every option that changes heights. Copies of the files have the same hash.
   std::uint64_t fingerprint() const;
 
-  // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on: samples
-  // within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the same bits
-  // for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours. Conservative: a
-  // change of a source near the tiles may change the hash although no height changes. Precondition: top is a valid key,
-  // top.level <= deepest <= geo::kMaxLevel.
+  // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
+  // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
+  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours.
+  // Conservative: a change of a source near the tiles may change the hash although no height changes. Precondition: top
+  // is a valid key, top.level <= deepest <= geo::kMaxLevel.
   ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.

@@ -75,7 +75,7 @@ struct DemFile {
   std::string path;
   // Where several sources have a height, the lowest rank wins, then the finer source, then the first path in order.
   int rank = 0;
-  bool may_be_other = false;                  // found in a folder: skipped if it is no raster
+  bool skip_if_no_raster = false;             // found in a folder: skipped if it is no raster
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
@@ -119,7 +119,7 @@ struct RasterInfo {
   std::string data_type;                     // "Int16"
   std::string crs;                           // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
   std::string vertical_datum;                // as stated by the CRS; empty: not stated
-  std::string counts_from;                   // the vertical datum in use; empty: unknown
+  std::string datum_in_use;                  // the vertical datum in use; empty: unknown
   std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
   bool knows_height_unit = true;             // false: metres assumed

@@ -11,7 +11,7 @@
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
-#include "engine/tin/standing_triangles.h"
+#include "engine/tin/live_triangles.h"
 
 namespace terrace::tin {
 namespace {
@@ -100,7 +100,7 @@ TinMesh Refinement::MeshOf(std::size_t points) const {
   mesh.vertices = {{0, 0}, {east, 0}, {east, north}, {0, north}};
   mesh.vertices.insert(mesh.vertices.end(), inserted_.begin(),
                        inserted_.begin() + static_cast<std::ptrdiff_t>(points - 4));
-  mesh.triangles = std::visit([=](const auto& record) { return StandingTriangles(record, points - 4); }, record_);
+  mesh.triangles = std::visit([=](const auto& record) { return LiveTriangles(record, points - 4); }, record_);
   return mesh;
 }
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <numbers>
 
-#include "proto/error/plumb_nodes.h"
+#include "proto/error/node_verticals.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/tile_geometry.h"
 
@@ -406,7 +406,7 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   }
-  const PlumbNodes plumb(lattice);
+  const NodeVerticals plumb(lattice);
   double beside_m = 0;
   for (std::size_t k = 0; k < positions.size(); ++k) {
     const tin::SamplePosition node = mesh.vertices[k];

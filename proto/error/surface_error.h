@@ -19,7 +19,7 @@ namespace terrace::proto {
 // bounds both surfaces everywhere in the tile; docs/decisions/0011-certified-error.md has the proof.
 double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile);
 
-// The same for flat triangles with their vertices at exact lattice positions, as in TileMeter::MeasureFlat.
+// The same for flat triangles with their vertices at exact lattice positions, as in TileErrorMeter::MeasureFlat.
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
                             const std::vector<geo::Vec3>& positions);
 

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "engine/geo/ellipsoid.h"
-#include "proto/error/plumb_nodes.h"
+#include "proto/error/node_verticals.h"
 #include "proto/mesh/edge_rows.h"
 #include "proto/mesh/tile_geometry.h"
 
@@ -76,14 +76,14 @@ bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vert
 
 }  // namespace
 
-class TileMeter::Impl {
+class TileErrorMeter::Impl {
  public:
   Impl(const LatticeView& lattice, double bound_m)
       : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m), plumb_(lattice) {}
 
   int cells() const { return cells_; }
   const Surface& surface() const { return surface_; }
-  const PlumbNodes& plumb() const { return plumb_; }
+  const NodeVerticals& plumb() const { return plumb_; }
 
   // Measures the height interpolated in longitude and latitude of every triangle, and bounds the error of the flat
   // triangle. Then measures the flat triangles that may be the worst or exceed the bound.
@@ -227,7 +227,7 @@ class TileMeter::Impl {
     const std::array<NodePoint, 3> p = CornersOf(t);
     const std::int64_t area = TwiceArea(p);
     if (area <= 0) return kUnknown;
-    const PlumbNodes::Bounds bounds = plumb_.BoundsOf(p, surface_.unit, surface_.beside_m);
+    const NodeVerticals::Bounds bounds = plumb_.BoundsOf(p, surface_.unit, surface_.beside_m);
     if (!std::isfinite(bounds.shift.x)) return kUnknown;
     const Linear plane = PlaneOf(t, p, area);
     const double unit = static_cast<double>(surface_.unit);
@@ -287,17 +287,17 @@ class TileMeter::Impl {
   }
 
   // The intersections of the nodes' plumb lines with the flat triangle. The position of a point of the triangle is not
-  // exactly the mean of its corners' positions, so nodes near the rim are tested (PlumbNodes::Meets) if they matter.
+  // exactly the mean of its corners' positions, so nodes near the rim are tested (NodeVerticals::Meets) if they matter.
   void MeasureFlat(const std::array<std::uint32_t, 3>& triangle, const std::array<NodePoint, 3>& p,
                    Found& found) const {
     constexpr double kNothing_m = 0.0005;  // smaller errors need no test
     const std::array<geo::Vec3, 3> corners = {surface_.ecef[triangle[0]], surface_.ecef[triangle[1]],
                                               surface_.ecef[triangle[2]]};
-    const PlumbNodes::Plane plane(corners);
+    const NodeVerticals::Plane plane(corners);
     if (plane.is_line) return;
-    const PlumbFootprint footprint(p, surface_.unit, surface_.beside_m, plumb_);
+    const VerticalsInTriangle footprint(p, surface_.unit, surface_.beside_m, plumb_);
     for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
-      const PlumbFootprint::Columns columns = footprint.ColumnsOf(j);
+      const VerticalsInTriangle::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
       const double largest = plumb_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
       if (largest <= found.largest && largest <= bound_) continue;
@@ -323,13 +323,14 @@ class TileMeter::Impl {
   std::vector<bool> is_vertex_;    // by node
   std::vector<Reading> readings_;  // by triangle
 
-  const PlumbNodes plumb_;
+  const NodeVerticals plumb_;
 };
 
-TileMeter::TileMeter(const LatticeView& lattice, double bound_m) : impl_(std::make_unique<Impl>(lattice, bound_m)) {}
-TileMeter::~TileMeter() = default;
+TileErrorMeter::TileErrorMeter(const LatticeView& lattice, double bound_m)
+    : impl_(std::make_unique<Impl>(lattice, bound_m)) {}
+TileErrorMeter::~TileErrorMeter() = default;
 
-TileError TileMeter::Measure(const QuantizedTile& tile) {
+TileError TileErrorMeter::Measure(const QuantizedTile& tile) {
   Surface surface{kQuantizedMax, {}, {}, {}, tile.triangles};
   surface.points.reserve(tile.u.size());
   surface.heights.reserve(tile.u.size());
@@ -345,13 +346,13 @@ TileError TileMeter::Measure(const QuantizedTile& tile) {
   return impl_->Measure(std::move(surface));
 }
 
-TileError TileMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions) {
+TileError TileErrorMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions) {
   Surface surface{1, {}, {}, positions, mesh.triangles, false};
   surface.points.reserve(mesh.vertices.size());
   surface.heights.reserve(mesh.vertices.size());
   for (std::size_t k = 0; k < positions.size(); ++k) {
     const tin::SamplePosition node = mesh.vertices[k];
-    const PlumbNodes::Position position = impl_->plumb().PositionOf(positions[k], node.x, node.y);
+    const NodeVerticals::Position position = impl_->plumb().PositionOf(positions[k], node.x, node.y);
     surface.points.push_back({node.x, node.y});
     surface.heights.push_back(position.height_m);
     surface.beside_m = std::max(surface.beside_m, position.beside_m);

@@ -25,10 +25,10 @@ struct TileError {
 
 // Measures the mesh of a tile repeatedly while samples are inserted. Triangles that have not changed since the last
 // call are not measured again. All meshes must be of the tile given by `lattice`.
-class TileMeter {
+class TileErrorMeter {
  public:
-  TileMeter(const LatticeView& lattice, double bound_m);
-  ~TileMeter();
+  TileErrorMeter(const LatticeView& lattice, double bound_m);
+  ~TileErrorMeter();
 
   // Measures two surfaces at every lattice sample: the height interpolated in longitude and latitude, which clients
   // sample, and the flat triangle in ECEF, which clients draw, at its intersection with the sample's plumb line (the

@@ -302,8 +302,8 @@ const TileFormat* CutSuffix(std::string_view& name) {
   return nullptr;
 }
 
-Result<TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets) {
-  const Route& route = call.route;
+Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets) {
+  const Route& route = context.route;
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
   if (!dataset) return tl::unexpected(dataset.error());
   if (Result<void> has = CheckHasFormat(datasets[*dataset], route.format->format); !has) {
@@ -313,16 +313,16 @@ Result<TileRequest> Negotiate(const Call& call, std::span<const DatasetView> dat
   tile.dataset = *dataset;
   tile.key = route.key;
   tile.format = route.format->format;
-  if (Result<void> read = route.format->read(route.query, *call.request->fields, datasets[*dataset], tile); !read) {
+  if (Result<void> read = route.format->read(route.query, *context.request->fields, datasets[*dataset], tile); !read) {
     return tl::unexpected(std::move(read.error()));
   }
   return tile;
 }
 
-tiler::HeadLines MakeTileHead(const TileRequest& request, const tiler::EncodedTile& tile) {
+tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::EncodedTile& tile) {
   const auto* const row = std::ranges::find(kFormats, request.format, &TileFormat::format);
   TERRACE_CHECK(row != std::end(kFormats));
-  tiler::HeadLines head;
+  tiler::HeaderLines head;
   const auto put = [to = std::back_inserter(head.text)](std::string_view name, const auto& value) {
     fmt::format_to(to, "{}: {}\r\n", name, value);
   };

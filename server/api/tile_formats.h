@@ -13,7 +13,7 @@
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "proto/media_type.h"
-#include "server/api/call.h"
+#include "server/api/request_context.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/requested_error.h"
@@ -64,7 +64,7 @@ const TileFormat* CutSuffix(std::string_view& name);
 
 // From a route and a request's headers to a canonical request. kNotFound: no such dataset, or the tile lies outside
 // what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
-Result<tiler::TileRequest> Negotiate(const Call& call, std::span<const DatasetView> datasets);
+Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
 // kNotFound, for a dataset without sources: its archive has no tiles of this format.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
@@ -87,6 +87,6 @@ int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& d
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
 // Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is what answers
 // `request`.
-tiler::HeadLines MakeTileHead(const tiler::TileRequest& request, const tiler::EncodedTile& tile);
+tiler::HeaderLines MakeTileHeaders(const tiler::TileRequest& request, const tiler::EncodedTile& tile);
 
 }  // namespace terrace::server

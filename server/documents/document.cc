@@ -39,9 +39,10 @@ Response Serve(const Document& document, const Request& request, std::string_vie
   return Conditional(std::move(response), request);
 }
 
-Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop) {
+Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding,
+                                      const std::stop_token& stop) {
   std::string bytes = write(stop);
-  MadeDocument made;
+  RenderedDocument made;
   if (coding == tiler::Coding::kGzip) {
     std::string compressed = proto::Gzip(bytes, proto::kGzipLevel, stop);
     if (compressed.size() < bytes.size()) {
@@ -55,7 +56,7 @@ Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Codin
   return made;
 }
 
-Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request) {
+Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Request& request) {
   Response response;
   response.content_type = plan.content_type;
   response.content_encoding = tiler::NameOf(made.coding);
@@ -63,33 +64,34 @@ Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request
   response.etag = made.etag;
   response.cache_control = plan.cache_control;
   response.vary = "Accept-Encoding";
-  response.for_grant = plan.for_grant;
+  response.depends_on_token = plan.depends_on_token;
   return Conditional(std::move(response), request);
 }
 
 DocumentMaker::DocumentMaker(CatalogPtr catalog, TileService& workers, std::chrono::milliseconds deadline)
     : catalog_(std::move(catalog)), workers_(workers), deadline_(deadline) {}
 
-Answer DocumentMaker::Make(Described described, const Call& call) const {
+Answer DocumentMaker::Make(DocumentAnswer described, const RequestContext& context) const {
   auto* plan = std::get_if<DocumentPlan>(&described);
   if (plan == nullptr) return std::get<Response>(std::move(described));
-  const tiler::Coding coding = CodingFor(*call.request);
-  if (const auto kept = kept_.Find(Key{plan->key, coding})) return Serve(*kept, *plan, *call.request);
-  return MakeAside(std::move(*plan), coding, call);
+  const tiler::Coding coding = CodingFor(*context.request);
+  if (const auto kept = kept_.Find(Key{plan->key, coding})) return Serve(*kept, *plan, *context.request);
+  return MakeOnWorker(std::move(*plan), coding, context);
 }
 
-asio::awaitable<Response> DocumentMaker::MakeAside(DocumentPlan plan, tiler::Coding coding, const Call& call) const {
+asio::awaitable<Response> DocumentMaker::MakeOnWorker(DocumentPlan plan, tiler::Coding coding,
+                                                      const RequestContext& context) const {
   // The waiting request may end before the worker does.
-  Work<MadeDocument> work = [catalog = catalog_, write = plan.write, coding](const std::stop_token& stop) {
+  Work<RenderedDocument> work = [catalog = catalog_, write = plan.write, coding](const std::stop_token& stop) {
     return MakeDocument(write, coding, stop);
   };
   const auto deadline = TileService::Clock::now() + deadline_;
-  Result<MadeDocument> document =
-      co_await workers_.Run(std::move(work), TileService::Length::kShort, deadline, call.request->client);
-  if (!document) co_return co_await BackendFailure(document.error(), call.request->id);
-  const auto made = std::make_shared<const MadeDocument>(*std::move(document));
+  Result<RenderedDocument> document =
+      co_await workers_.Run(std::move(work), TileService::Length::kShort, deadline, context.request->client);
+  if (!document) co_return co_await BackendFailure(document.error(), context.request->id);
+  const auto made = std::make_shared<const RenderedDocument>(*std::move(document));
   kept_.Insert(Key{plan.key, coding}, made);
-  co_return Serve(*made, plan, *call.request);
+  co_return Serve(*made, plan, *context.request);
 }
 
 }  // namespace terrace::server

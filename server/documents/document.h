@@ -15,7 +15,7 @@
 #include <variant>
 
 #include "engine/core/result.h"
-#include "server/api/call.h"
+#include "server/api/request_context.h"
 #include "server/asio.h"
 #include "server/http/application.h"
 #include "server/http/request.h"
@@ -47,27 +47,28 @@ struct DocumentPlan {
   std::string key;                 // equal only for equal documents of one catalog; contains no token
   std::string_view content_type;   // a literal
   std::string_view cache_control;  // outlives the request
-  bool for_grant = false;          // as in Response
+  bool depends_on_token = false;   // as in Response
   Write write;
 };
 
 // The result of a handler of documents: a reply, or a plan to make one.
-using Described = std::variant<Response, DocumentPlan>;
+using DocumentAnswer = std::variant<Response, DocumentPlan>;
 
 // A document in one coding.
-struct MadeDocument {
+struct RenderedDocument {
   Body body;
   tiler::Coding coding = tiler::Coding::kIdentity;
   std::string etag;
 };
-inline std::size_t BytesOf(const MadeDocument& made) { return made.body->size() + made.etag.size(); }
+inline std::size_t BytesOf(const RenderedDocument& made) { return made.body->size() + made.etag.size(); }
 
 // `coding`: kGzip falls back to identity if that is not larger. Bytes and ETag are equal to those of a Document with
 // the same text. kCancelled: a stop was requested.
-Result<MadeDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding, const std::stop_token& stop);
+Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding,
+                                      const std::stop_token& stop);
 
 // Like Serve for a Document.
-Response Serve(const MadeDocument& made, const DocumentPlan& plan, const Request& request);
+Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Request& request);
 
 // Thread-safe.
 class DocumentMaker {
@@ -78,8 +79,8 @@ class DocumentMaker {
   // `workers` must outlive this object. All plans refer to `catalog`. `deadline`: of making a document.
   DocumentMaker(CatalogPtr catalog, TileService& workers, std::chrono::milliseconds deadline);
 
-  // Returns cached documents at once. This object and `call` must outlive the answer.
-  Answer Make(Described described, const Call& call) const;
+  // Returns cached documents at once. This object and `context` must outlive the answer.
+  Answer Make(DocumentAnswer described, const RequestContext& context) const;
 
  private:
   struct Key {
@@ -95,12 +96,12 @@ class DocumentMaker {
     }
   };
 
-  asio::awaitable<Response> MakeAside(DocumentPlan plan, tiler::Coding coding, const Call& call) const;
+  asio::awaitable<Response> MakeOnWorker(DocumentPlan plan, tiler::Coding coding, const RequestContext& context) const;
 
   const CatalogPtr catalog_;
   TileService& workers_;
   const std::chrono::milliseconds deadline_;
-  mutable tiler::ByteCache<Key, KeyHash, MadeDocument> kept_{kKeptBytes};
+  mutable tiler::ByteCache<Key, KeyHash, RenderedDocument> kept_{kKeptBytes};
 };
 
 }  // namespace terrace::server

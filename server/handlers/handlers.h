@@ -18,7 +18,7 @@
 #include "engine/dem/dem_source.h"
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
-#include "server/api/call.h"
+#include "server/api/request_context.h"
 #include "server/api/tile_formats.h"
 #include "server/asio.h"
 #include "server/documents/document.h"
@@ -79,12 +79,12 @@ struct Handlers {
 
 // GET /{dataset}/{z}/{x}/{y}.terrain, .glb and .png. Replies that need no build (refusals and cached tiles) are
 // returned at once. Precondition: the route has a format.
-Answer AnswerTile(const Handlers& from, const Call& call);
+Answer AnswerTile(const Handlers& from, const RequestContext& context);
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times);
 
 // GET and POST /{dataset}/heights
-Answer AnswerHeights(const Handlers& from, const Call& call);
+Answer AnswerHeights(const Handlers& from, const RequestContext& context);
 
 // Limit of tiles per request: each must be built if it is not cached.
 inline constexpr std::size_t kMaxCertifiedTiles = 64;
@@ -108,14 +108,14 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
 
 // GET /{dataset}/mesh
-Answer AnswerArea(const Handlers& from, const Call& call);
+Answer AnswerArea(const Handlers& from, const RequestContext& context);
 // Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,
 // `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
 // kInvalidArgument: the message is for the client.
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
 
 // GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
-Described DescribeLayer(const Handlers& from, const Call& call);
+DocumentAnswer DescribeLayer(const Handlers& from, const RequestContext& context);
 // The document for requests without parameters.
 Document PlainLayer(const DatasetView& dataset);
 // The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
@@ -124,28 +124,28 @@ std::string TileQuery(const RequestedError& requested);
 
 // Adds the request's token to the query of a template if the token came in the query: such clients use templates
 // unchanged.
-std::string WithToken(std::string query, const Call& call);
+std::string WithToken(std::string query, const RequestContext& context);
 
 // Identifies that token in cache keys, which must not contain the token itself: each token has one Grant as long as the
 // server runs. Null: WithToken adds none.
-const Grant* GrantInQuery(const Call& call);
+const Grant* GrantInQuery(const RequestContext& context);
 
 // GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
-Described DescribeTileset(const Handlers& from, const Call& call);
+DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.
 void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made);
 // The .subtree files below it. Any available tile may be the root, so that an older tileset.json that a client has
 // cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree begins
 // at this tile.
-Described DescribeSubtree(const Handlers& from, const Call& call);
+DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& context);
 
 // GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.
-Answer AnswerTileJson(const Handlers& from, const Call& call);
+Answer AnswerTileJson(const Handlers& from, const RequestContext& context);
 
 // GET /datasets: the datasets that the client may see.
-Described DescribeDatasets(const Handlers& from, const Call& call);
+DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context);
 // GET / and /viewer/{file}. Without a viewer, `/` is a plain list of datasets.
-Described DescribeViewerFile(const Handlers& from, const Call& call);
+DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& context);
 // Whether the client may see a dataset. Empty: it may see all.
 using IsSeen = std::function<bool(const DatasetView&)>;
 
@@ -162,8 +162,8 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
                       const std::stop_token& stop = {});
 
 // GET /livez, /readyz and /metrics: for operators of the server.
-Answer AnswerLive(const Handlers& from, const Call& call);
-Answer AnswerReady(const Handlers& from, const Call& call);
-Answer AnswerMetrics(const Handlers& from, const Call& call);
+Answer AnswerLive(const Handlers& from, const RequestContext& context);
+Answer AnswerReady(const Handlers& from, const RequestContext& context);
+Answer AnswerMetrics(const Handlers& from, const RequestContext& context);
 
 }  // namespace terrace::server

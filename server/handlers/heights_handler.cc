@@ -50,10 +50,10 @@ struct Made {
 };
 
 // Parses on a worker, unless the input is small.
-asio::awaitable<Result<HeightsQuery>> ParseAside(const Handlers& from, const Call& call,
-                                                 TileService::Clock::time_point deadline) {
-  const Request& request = *call.request;
-  const std::string& query = call.route.query;
+asio::awaitable<Result<HeightsQuery>> ParseOnWorker(const Handlers& from, const RequestContext& context,
+                                                    TileService::Clock::time_point deadline) {
+  const Request& request = *context.request;
+  const std::string& query = context.route.query;
   const bool is_post = request.method == Method::kPost;
   // A path of two corners may have thousands of points.
   const bool may_be_path = query.find("path") != std::string::npos;
@@ -98,11 +98,11 @@ asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& from, std::uint
   co_return points;
 }
 
-asio::awaitable<Response> ReadHeights(const Handlers& from, const Call& call, std::uint32_t dataset) {
-  const Request& request = *call.request;
+asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext& context, std::uint32_t dataset) {
+  const Request& request = *context.request;
   const DatasetView& view = from.catalog->datasets[dataset];
   const auto deadline = from.Deadline();
-  Result<HeightsQuery> parsed = co_await ParseAside(from, call, deadline);
+  Result<HeightsQuery> parsed = co_await ParseOnWorker(from, context, deadline);
   if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
     co_return co_await BackendFailure(parsed.error(), request.id);
   }
@@ -124,10 +124,10 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const Call& call, st
     // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
     response.cache_control =
-        is_versioned ? CacheControlOf(call.route.query, view, from.cache_control) : from.cache_control;
+        is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;
     // Certified errors depend on the program, not only on the data.
     if (!parsed->certify_level) {
-      response.etag = tiler::RequestETag("heights", view.name, view.generation, call.route.query, coding);
+      response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
     }
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
@@ -168,15 +168,15 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const Call& call, st
 
 }  // namespace
 
-Answer AnswerHeights(const Handlers& from, const Call& call) {
-  const Request& request = *call.request;
+Answer AnswerHeights(const Handlers& from, const RequestContext& context) {
+  const Request& request = *context.request;
   if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
     return ProblemResponse(415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded",
                            request.id);
   }
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  return ReadHeights(from, call, *dataset);
+  return ReadHeights(from, context, *dataset);
 }
 
 std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,

@@ -43,30 +43,30 @@ std::string TileQuery(const RequestedError& requested) {
   return {};
 }
 
-const Grant* GrantInQuery(const Call& call) {
-  const bool has_name = call.grant && !call.grant->name.empty();
-  return call.token_in_query && has_name ? call.grant.get() : nullptr;
+const Grant* GrantInQuery(const RequestContext& context) {
+  const bool has_name = context.grant && !context.grant->name.empty();
+  return context.token_in_query && has_name ? context.grant.get() : nullptr;
 }
 
-std::string WithToken(std::string query, const Call& call) {
-  if (GrantInQuery(call) == nullptr) return query;
-  return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(call.token);
+std::string WithToken(std::string query, const RequestContext& context) {
+  if (GrantInQuery(context) == nullptr) return query;
+  return query + (query.empty() ? "" : "&") + "token=" + PercentEncode(context.token);
 }
 
 Document PlainLayer(const DatasetView& dataset) { return Document::Make(WriteLayer(dataset, ""), "application/json"); }
 
-Described DescribeLayer(const Handlers& from, const Call& call) {
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
-  if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
+DocumentAnswer DescribeLayer(const Handlers& from, const RequestContext& context) {
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
   if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh); !has) {
-    return ClientErrorResponse(has.error(), call.request->id);
+    return ClientErrorResponse(has.error(), context.request->id);
   }
-  const Result<TileParameters> parameters = ParseTileParameters(call.route.query, /*allow_at_least=*/false);
-  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
-  std::string tile_query = WithToken(TileQuery(parameters->requested), call);
-  if (tile_query.empty()) return Serve(from.of_datasets[*dataset].layer, *call.request, kRevalidate);
+  const Result<TileParameters> parameters = ParseTileParameters(context.route.query, /*allow_at_least=*/false);
+  if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
+  std::string tile_query = WithToken(TileQuery(parameters->requested), context);
+  if (tile_query.empty()) return Serve(from.of_datasets[*dataset].layer, *context.request, kRevalidate);
   DocumentPlan plan;
-  plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(call)));
+  plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
   plan.write = [&view = from.catalog->datasets[*dataset], tile_query = std::move(tile_query)](

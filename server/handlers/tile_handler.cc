@@ -27,19 +27,21 @@ std::string_view Name(const ServedTile& served) {
   return "join";
 }
 
-Response Reply(const Handlers& from, const tiler::TileRequest& tile, const ServedTile& served, const Call& call) {
+Response Reply(const Handlers& from, const tiler::TileRequest& tile, const ServedTile& served,
+               const RequestContext& context) {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
   response.lines_of_body = served.tile->head.of_body;
-  response.cache_control = CacheControlOf(call.route.query, from.catalog->datasets[tile.dataset], from.cache_control);
-  response.vary = call.route.format->vary(tile);
+  response.cache_control =
+      CacheControlOf(context.route.query, from.catalog->datasets[tile.dataset], from.cache_control);
+  response.vary = context.route.format->vary(tile);
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {
     response.headers.emplace_back("Server-Timing", FormatServerTiming(Name(served), served.tile->times));
   }
   response.labels.cache = Name(served);
-  if (MatchesEtag(call.request->fields->if_none_match, served.tile->etag)) {
+  if (MatchesEtag(context.request->fields->if_none_match, served.tile->etag)) {
     response.status = 304;
   } else {
     response.body = Body(served.tile, &served.tile->bytes);
@@ -47,24 +49,24 @@ Response Reply(const Handlers& from, const tiler::TileRequest& tile, const Serve
   return response;
 }
 
-asio::awaitable<Response> BuildTile(const Handlers& from, const Call& call, tiler::TileRequest tile) {
+asio::awaitable<Response> BuildTile(const Handlers& from, const RequestContext& context, tiler::TileRequest tile) {
   const Result<ServedTile> served =
-      co_await from.tiles.Build(from.catalog, tile, from.Deadline(), call.request->client);
-  if (served) co_return Reply(from, tile, *served, call);
+      co_await from.tiles.Build(from.catalog, tile, from.Deadline(), context.request->client);
+  if (served) co_return Reply(from, tile, *served, context);
   const bool is_absent =
       served.error().code == ErrorCode::kNotFound && from.catalog->datasets[tile.dataset].baked_alone;
-  if (is_absent) co_return ClientErrorResponse(served.error(), call.request->id);
-  co_return co_await BackendFailure(served.error(), call.request->id);
+  if (is_absent) co_return ClientErrorResponse(served.error(), context.request->id);
+  co_return co_await BackendFailure(served.error(), context.request->id);
 }
 
 }  // namespace
 
-Answer AnswerTile(const Handlers& from, const Call& call) {
-  const Result<tiler::TileRequest> tile = Negotiate(call, from.catalog->datasets);
-  if (!tile) return ClientErrorResponse(tile.error(), call.request->id);
+Answer AnswerTile(const Handlers& from, const RequestContext& context) {
+  const Result<tiler::TileRequest> tile = NegotiateTile(context, from.catalog->datasets);
+  if (!tile) return ClientErrorResponse(tile.error(), context.request->id);
   if (const std::optional<ServedTile> found = from.tiles.Find(*from.catalog, *tile))
-    return Reply(from, *tile, *found, call);
-  return BuildTile(from, call, *tile);
+    return Reply(from, *tile, *found, context);
+  return BuildTile(from, context, *tile);
 }
 
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times) {

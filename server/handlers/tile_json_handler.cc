@@ -32,21 +32,21 @@ std::string OriginOf(const Request& request) {
 
 }  // namespace
 
-Answer AnswerTileJson(const Handlers& from, const Call& call) {
-  const Result<std::uint32_t> index = FindDataset(call.route.dataset, from.catalog->datasets);
-  if (!index) return ClientErrorResponse(index.error(), call.request->id);
-  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(call.route.query);
-  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
+Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!index) return ClientErrorResponse(index.error(), context.request->id);
+  const Result<HeightTileParameters> parameters = ParseHeightTileParameters(context.route.query);
+  if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const DatasetView& dataset = from.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
-    return ClientErrorResponse(has.error(), call.request->id);
+    return ClientErrorResponse(has.error(), context.request->id);
   }
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
   tiles.tile_template =
-      fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*call.request), PercentEncode(dataset.name),
-                  WithToken(HeightTileQuery(dataset, *parameters), call));
+      fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*context.request), PercentEncode(dataset.name),
+                  WithToken(HeightTileQuery(dataset, *parameters), context));
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
@@ -55,8 +55,8 @@ Answer AnswerTileJson(const Handlers& from, const Call& call) {
   tiles.east = dataset.east;
   tiles.north = dataset.north;
   Response response =
-      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *call.request, kRevalidate);
-  response.vary_too = from.origin_headers;
+      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *context.request, kRevalidate);
+  response.vary_more = from.origin_headers;
   return response;
 }
 

@@ -37,7 +37,7 @@ double SkirtDepth(const DatasetView& dataset, const RequestedError& requested, i
 // error. It is the bound on the tile's samples, widened by skirts and rounding, and then outwards to multiples of a
 // power of two, which is at most a quarter of the error and at least 2^-6 m: such numbers are short and often equal.
 // Reads no raster. Thread-safe. Precondition: a valid key.
-proto::HeightSpan HeightsOfTile(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key) {
+proto::HeightSpan TileHeightSpan(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key) {
   const int step = ErrorStepOf(requested, key.level, dataset);
   const double error_m = geo::LadderError(key.level, step, dataset.error_fraction);
   // Skirts are shorter on each deeper level, except on the deepest level at a small `fraction`.
@@ -99,7 +99,7 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
   tileset.version = dataset.version();
   tileset.attribution = dataset.attribution;
   tileset.roots = roots;
-  tileset.heights = [&](const geo::TileKey& key) { return HeightsOfTile(dataset, requested, key); };
+  tileset.heights = [&](const geo::TileKey& key) { return TileHeightSpan(dataset, requested, key); };
   tileset.content_query = std::move(content_query);
   tileset.subtree_query = std::move(subtree_query);
   return proto::EncodeTileset(tileset);
@@ -111,7 +111,7 @@ std::string WriteSubtree(const DatasetView& dataset, const RequestedError& reque
   subtree.levels = levels;
   subtree.tiles = proto::BlocksBelow(dataset.available, top, levels);
   subtree.heights = [&](const geo::TileKey& below) {
-    return HeightsOfTile(dataset, requested, proto::TileUnder(top, below.level, below.x, below.y));
+    return TileHeightSpan(dataset, requested, proto::TileUnder(top, below.level, below.x, below.y));
   };
   return proto::EncodeSubtree(subtree);
 }
@@ -125,21 +125,21 @@ void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
   made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
 }
 
-Described DescribeTileset(const Handlers& from, const Call& call) {
-  const Result<std::uint32_t> dataset = FindDataset(call.route.dataset, from.catalog->datasets);
-  if (!dataset) return ClientErrorResponse(dataset.error(), call.request->id);
+DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context) {
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
   if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
-    return ClientErrorResponse(has.error(), call.request->id);
+    return ClientErrorResponse(has.error(), context.request->id);
   }
   const Result<TileParameters> parameters =
-      ParseTileParameters(call.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
-  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
-  const std::string content_parameters = ContentQuery(parameters->requested, call.route.query);
-  std::string content_query = WithToken(content_parameters, call);
-  if (content_query.empty()) return Serve(from.of_datasets[*dataset].tileset, *call.request, kRevalidate);
-  std::string subtree_query = WithToken(TileQuery(parameters->requested), call);
+      ParseTileParameters(context.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
+  const std::string content_parameters = ContentQuery(parameters->requested, context.route.query);
+  std::string content_query = WithToken(content_parameters, context);
+  if (content_query.empty()) return Serve(from.of_datasets[*dataset].tileset, *context.request, kRevalidate);
+  std::string subtree_query = WithToken(TileQuery(parameters->requested), context);
   DocumentPlan plan;
-  plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(call)));
+  plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
   plan.write = [&view = from.catalog->datasets[*dataset], roots = from.of_datasets[*dataset].roots,
@@ -150,30 +150,29 @@ Described DescribeTileset(const Handlers& from, const Call& call) {
   return plan;
 }
 
-Described DescribeSubtree(const Handlers& from, const Call& call) {
-  const Result<std::uint32_t> index = FindDataset(call.route.dataset, from.catalog->datasets);
-  if (!index) return ClientErrorResponse(index.error(), call.request->id);
+DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!index) return ClientErrorResponse(index.error(), context.request->id);
   const Result<TileParameters> parameters =
-      ParseTileParameters(call.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
-  if (!parameters) return ClientErrorResponse(parameters.error(), call.request->id);
+      ParseTileParameters(context.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
+  if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const DatasetView& dataset = from.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kGlb); !has) {
-    return ClientErrorResponse(has.error(), call.request->id);
+    return ClientErrorResponse(has.error(), context.request->id);
   }
-  if (!IsAvailable(dataset, call.route.key) ||
-      (call.route.key.level - call.route.root.level) % call.route.subtree_levels != 0) {
+  if (!IsAvailable(dataset, context.route.key) ||
+      (context.route.key.level - context.route.root.level) % context.route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin",
-                           call.request->id);
+                           context.request->id);
   }
   const RequestedError& requested = parameters->requested;
   DocumentPlan plan;
-  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(call.route.key), call.route.subtree_levels,
-                         TileQuery(requested), requested.at_least ? "" : " alone");
+  plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(context.route.key),
+                         context.route.subtree_levels, TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
-  plan.cache_control = CacheControlOf(call.route.query, dataset, from.cache_control);
-  plan.write = [&dataset, requested, top = call.route.key, levels = call.route.subtree_levels](const std::stop_token&) {
-    return WriteSubtree(dataset, requested, top, levels);
-  };
+  plan.cache_control = CacheControlOf(context.route.query, dataset, from.cache_control);
+  plan.write = [&dataset, requested, top = context.route.key, levels = context.route.subtree_levels](
+                   const std::stop_token&) { return WriteSubtree(dataset, requested, top, levels); };
   return plan;
 }
 

@@ -38,13 +38,13 @@ std::string EscapeHtml(std::string_view text) {
 using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&);
 
 // A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets.
-DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const Call& call, WriteDatasets write) {
+DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const RequestContext& context, WriteDatasets write) {
   DocumentPlan plan;
   // Each token has one Grant as long as the server runs.
-  plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(call.grant.get()));
+  plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(context.grant.get()));
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
-  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), grant = call.grant,
+  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), grant = context.grant,
                 write](const std::stop_token& stop) {
     return write(
         datasets, [&](const DatasetView& view) { return grant->Sees(view.name); }, stop);
@@ -105,28 +105,28 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
       items);
 }
 
-Described DescribeDatasets(const Handlers& from, const Call& call) {
-  if (const Result<void> none = RefuseParameters(call.route.query); !none) {
-    return ClientErrorResponse(none.error(), call.request->id);
+DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context) {
+  if (const Result<void> none = RefuseParameters(context.route.query); !none) {
+    return ClientErrorResponse(none.error(), context.request->id);
   }
-  if (call.sees_all()) return Serve(from.list, *call.request, kRevalidate);
-  return PlanOfSeen(from, from.list, call, DatasetsJson);
+  if (context.sees_all()) return Serve(from.list, *context.request, kRevalidate);
+  return PlanOfSeen(from, from.list, context, DatasetsJson);
 }
 
 // Pages keep their state in the query, so any query is allowed.
-Described DescribeViewerFile(const Handlers& from, const Call& call) {
-  if (const Document* file = from.viewer->Find(call.route.file)) return Serve(*file, *call.request, kRevalidate);
-  if (from.viewer->empty() && call.route.file == "index.html") {
-    if (call.sees_all()) {
-      Response index = Serve(from.index, *call.request, kRevalidate);
-      index.for_grant = call.grant != nullptr;
+DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& context) {
+  if (const Document* file = from.viewer->Find(context.route.file)) return Serve(*file, *context.request, kRevalidate);
+  if (from.viewer->empty() && context.route.file == "index.html") {
+    if (context.sees_all()) {
+      Response index = Serve(from.index, *context.request, kRevalidate);
+      index.depends_on_token = context.grant != nullptr;
       return index;
     }
-    DocumentPlan index = PlanOfSeen(from, from.index, call, IndexHtml);
-    index.for_grant = true;
+    DocumentPlan index = PlanOfSeen(from, from.index, context, IndexHtml);
+    index.depends_on_token = true;
     return index;
   }
-  return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", call.request->id);
+  return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", context.request->id);
 }
 
 }  // namespace terrace::server

@@ -118,7 +118,7 @@ Result<std::shared_ptr<Listener>> Listener::Adopt(IoThreads& io, int socket,
   return listener;
 }
 
-Result<void> Listener::TryAddress(const std::string& host, std::uint16_t port) {
+Result<void> Listener::CheckAddress(const std::string& host, std::uint16_t port) {
   asio::io_context io;
   tcp::acceptor acceptor(io);
   return Bind(acceptor, io, host, port);

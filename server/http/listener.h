@@ -33,7 +33,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
                                                  std::shared_ptr<const SessionContext> context);
 
   // Whether Open could use the address now. The socket does not listen: nobody can connect meanwhile.
-  static Result<void> TryAddress(const std::string& host, std::uint16_t port);
+  static Result<void> CheckAddress(const std::string& host, std::uint16_t port);
 
   const std::string& host() const { return host_; }  // of an adopted socket: its address
   std::uint16_t port() const { return port_; }

@@ -96,8 +96,8 @@ void PutVary(std::string& head, const Response& response, const CorsPolicy& cors
   std::string_view before = "Vary: ";
   const auto add = [&](std::string_view names) { head.append(std::exchange(before, ", ")).append(names); };
   if (!response.vary.empty()) add(response.vary);
-  if (!response.vary_too.empty()) add(response.vary_too);
-  if (response.for_grant) add("Authorization");
+  if (!response.vary_more.empty()) add(response.vary_more);
+  if (response.depends_on_token) add("Authorization");
   if (cors.varies()) add("Origin");
   if (before == ", ") head += "\r\n";
 }
@@ -125,7 +125,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   PutStatus(head, options.version, response.status);
   PutDate(head);
   PutContent(head, response);
-  PutCacheControl(head, response, response.for_grant || options.is_private);
+  PutCacheControl(head, response, response.depends_on_token || options.is_private);
   PutVary(head, response, cors);
   head += response.more_lines;
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);

@@ -25,8 +25,8 @@ struct Response {
   std::string etag;                   // with its quotes; may be empty
   std::string cache_control;          // may be empty
   std::string_view vary;              // a literal: the request headers that the reply depends on; may be empty
-  std::string_view vary_too;          // a literal: further request headers; may be empty
-  bool for_grant = false;             // the reply depends on the request's token
+  std::string_view vary_more;         // a literal: further request headers; may be empty
+  bool depends_on_token = false;      // the reply depends on the request's token
   bool close = false;                 // end the connection after this reply
   bool is_vital = false;              // reports the server's state: may use memory beyond the limits of other replies
 

@@ -81,7 +81,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Evict() override { Post(&Session::EvictHere); }
   void Drain() override { Post(&Session::DrainHere); }
   void Abort() override { Post(&Session::AbortHere); }
-  void Displace() override { Post(&Session::DisplaceHere); }
+  void Preempt() override { Post(&Session::DisplaceHere); }
 
  private:
   // The current request.
@@ -130,7 +130,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Response Failed(const std::exception& exception) const;
   asio::awaitable<void> Interrupted();
   asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Response& response);
-  TransferBudget::Ask AskFor(const Response& response) const;
+  TransferBudget::HoldRequest AskFor(const Response& response) const;
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
   asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
@@ -245,7 +245,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
   tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
   if (read && request.content_length > first) {
-    TransferBudget::Ask ask;
+    TransferBudget::HoldRequest ask;
     ask.kind = TransferBudget::Kind::kUpload;
     ask.bytes = request.content_length;
     ask.client = request.client;
@@ -345,8 +345,8 @@ bool Session::SendsBody(const Response& response) const {
   return exchange_.request.method != Method::kHead && response.status != 304 && response.body;
 }
 
-TransferBudget::Ask Session::AskFor(const Response& response) const {
-  TransferBudget::Ask ask;
+TransferBudget::HoldRequest Session::AskFor(const Response& response) const {
+  TransferBudget::HoldRequest ask;
   ask.kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
   ask.bytes = SendsBody(response) ? response.body->size() : 0;
   ask.body = response.body;
@@ -360,7 +360,7 @@ TransferBudget::Ask Session::AskFor(const Response& response) const {
 // gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
   for (;;) {
-    TransferBudget::Ask ask = AskFor(response);
+    TransferBudget::HoldRequest ask = AskFor(response);
     const std::size_t bytes = ask.bytes;
     ask.body = nullptr;
     Response bare;  // its lines share ownership with the body
@@ -376,7 +376,7 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
       again = *std::move(made);
     }
     response = std::get<Response>(std::move(again));
-    response.for_grant = response.for_grant || exchange_.admission.for_grant;
+    response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
     if (SendsBody(response) && response.body->size() > bytes) continue;  // the dataset may have changed
     room->Keep(response.body);
     co_return room;
@@ -387,7 +387,7 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
 // made again.
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
-  if (can_respond_again) response.for_grant = response.for_grant || exchange_.admission.for_grant;
+  if (can_respond_again) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
   std::optional<TransferBudget::Hold> room;
   if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
@@ -428,7 +428,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 // the reply that were written before. They say nothing about the client, because the kernel buffers them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
-  room.Took(0);
+  room.AddTaken(0);
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;
@@ -442,7 +442,7 @@ asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, Tra
       stream_.Reset();
       co_return false;
     }
-    room.Took(*sent);
+    room.AddTaken(*sent);
     total += *sent;
     Skip(*sent, left);
   }

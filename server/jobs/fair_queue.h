@@ -34,7 +34,7 @@ struct JobOrder {
 // A job that waits or runs. Its functions must not throw.
 struct PoolJob {
   std::function<void()> run;
-  std::function<void()> displaced;  // called instead of `run` if the job is removed for others; may be empty
+  std::function<void()> on_dropped;  // called instead of `run` if the job is removed for others; may be empty
   JobOrder order;
 
  private:

@@ -38,9 +38,9 @@ class SingleFlight {
  public:
   using Build = Work<Value>;
 
-  struct Landing {
-    Landing() = default;
-    Landing(Result<Value> v, bool j) : value(std::move(v)), joined(j) {}
+  struct FlightResult {
+    FlightResult() = default;
+    FlightResult(Result<Value> v, bool j) : value(std::move(v)), joined(j) {}
 
     Result<Value> value;
     bool joined = false;  // false: this call started the flight
@@ -55,7 +55,7 @@ class SingleFlight {
   // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or displaced the
   // flight's job. kCancelled: the order's deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
   // pool is cancelled. Otherwise the result of `build`.
-  asio::awaitable<Landing> Join(Key key, std::string name, Build build, JobOrder order);
+  asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobOrder order);
 
   std::size_t in_flight() const {
     const std::lock_guard lock(mutex_);
@@ -65,13 +65,13 @@ class SingleFlight {
 
  private:
   struct Flight;
-  class Seat;
+  class WaitGuard;
   using FlightPtr = std::shared_ptr<Flight>;
 
   void Launch(const FlightPtr& flight, Build build, JobOrder order);
-  void Fly(const FlightPtr& flight, const Build& build);
+  void RunFlight(const FlightPtr& flight, const Build& build);
   void Fail(const FlightPtr& flight, const PoolJob* job, Error error);
-  void Land(const FlightPtr& flight, Result<Value> outcome);
+  void Complete(const FlightPtr& flight, Result<Value> outcome);
   void Forget(const FlightPtr& flight);  // mutex_ is held
 
   WorkerPool& pool_;
@@ -99,13 +99,13 @@ struct SingleFlight<Key, Value, Hash>::Flight {
 // One waiter's place in a flight. Its destruction may stop the flight and withdraw its jobs. It is a local object of
 // Join, so that the place is released however the coroutine ends.
 template <typename Key, typename Value, typename Hash>
-class SingleFlight<Key, Value, Hash>::Seat {
+class SingleFlight<Key, Value, Hash>::WaitGuard {
  public:
-  Seat(SingleFlight& owner, FlightPtr flight, WaiterPtr waiter)
+  WaitGuard(SingleFlight& owner, FlightPtr flight, WaiterPtr waiter)
       : owner_(owner), flight_(std::move(flight)), waiter_(std::move(waiter)) {}
-  Seat(const Seat&) = delete;
-  Seat& operator=(const Seat&) = delete;
-  ~Seat() {
+  WaitGuard(const WaitGuard&) = delete;
+  WaitGuard& operator=(const WaitGuard&) = delete;
+  ~WaitGuard() {
     std::unique_lock lock(owner_.mutex_);
     std::erase(flight_->waiters, waiter_);
     if (!flight_->waiters.empty() || flight_->outcome) return;
@@ -123,15 +123,13 @@ class SingleFlight<Key, Value, Hash>::Seat {
 };
 
 template <typename Key, typename Value, typename Hash>
-asio::awaitable<typename SingleFlight<Key, Value, Hash>::Landing> SingleFlight<Key, Value, Hash>::Join(Key key,
-                                                                                                       std::string name,
-                                                                                                       Build build,
-                                                                                                       JobOrder order) {
+asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFlight<Key, Value, Hash>::Join(
+    Key key, std::string name, Build build, JobOrder order) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor, order.deadline);
   std::unique_lock lock(mutex_);
   if (pool_.cancelled().stop_requested()) {
-    co_return Landing(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
+    co_return FlightResult(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
   }
   const auto found = flights_.find(key);
   const bool joined = found != flights_.end();
@@ -143,7 +141,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::Landing> SingleFlight<K
                          return waiting && waiting->order.client == order.client;
                        });
   lock.unlock();
-  const Seat seat(*this, flight, waiter);
+  const WaitGuard guard(*this, flight, waiter);
   if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
   if (!has_job) Launch(flight, std::move(build), order);
 
@@ -156,7 +154,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::Landing> SingleFlight<K
   if (!outcome) {
     outcome = MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", flight->name);
   }
-  co_return Landing(std::move(*outcome), joined);
+  co_return FlightResult(std::move(*outcome), joined);
 }
 
 // mutex_ is not held: the pool may displace another flight's job.
@@ -167,8 +165,8 @@ void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, Build build
   try {
     job = std::make_shared<PoolJob>();
     job->order = order;
-    job->run = [this, flight, build = std::move(build)] { Fly(flight, build); };
-    job->displaced = [this, flight, self = job.get()] { Fail(flight, self, DisplacedError(flight->name)); };
+    job->run = [this, flight, build = std::move(build)] { RunFlight(flight, build); };
+    job->on_dropped = [this, flight, self = job.get()] { Fail(flight, self, DroppedJobError(flight->name)); };
     {
       const std::lock_guard lock(mutex_);
       flight->jobs.push_back(job);
@@ -188,12 +186,12 @@ void SingleFlight<Key, Value, Hash>::Fail(const FlightPtr& flight, const PoolJob
     std::erase_if(flight->jobs, [job](const auto& known) { return known.expired() || known.lock().get() == job; });
     if (flight->begun || !flight->jobs.empty()) return;
   }
-  Land(flight, tl::unexpected(std::move(error)));
+  Complete(flight, tl::unexpected(std::move(error)));
 }
 
 // On a worker thread.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Fly(const FlightPtr& flight, const Build& build) {
+void SingleFlight<Key, Value, Hash>::RunFlight(const FlightPtr& flight, const Build& build) {
   std::vector<std::weak_ptr<PoolJob>> others;
   {
     const std::lock_guard lock(mutex_);
@@ -201,11 +199,11 @@ void SingleFlight<Key, Value, Hash>::Fly(const FlightPtr& flight, const Build& b
     others.swap(flight->jobs);
   }
   for (const auto& job : others) pool_.Withdraw(job.lock());
-  Land(flight, Outcome(flight->name, build, flight->stop.get_token()));
+  Complete(flight, Outcome(flight->name, build, flight->stop.get_token()));
 }
 
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Land(const FlightPtr& flight, Result<Value> outcome) {
+void SingleFlight<Key, Value, Hash>::Complete(const FlightPtr& flight, Result<Value> outcome) {
   std::vector<WaiterPtr> waiters;
   {
     const std::lock_guard lock(mutex_);

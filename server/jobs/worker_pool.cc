@@ -30,7 +30,7 @@ Error FailureOf(std::string_view name, const std::exception& thrown) {
   }
 }
 
-Error DisplacedError(std::string_view name) {
+Error DroppedJobError(std::string_view name) {
   try {
     return Error{ErrorCode::kOverloaded, std::string(name) + ": displaced from the full queue of work"};
   } catch (const std::exception&) {
@@ -66,7 +66,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     if (displaced == job) return MakeError(ErrorCode::kOverloaded, "the queue of work is full");
   }
   wake_.notify_one();
-  if (displaced && displaced->displaced) displaced->displaced();
+  if (displaced && displaced->on_dropped) displaced->on_dropped();
   return {};
 }
 
@@ -105,7 +105,7 @@ void WorkerPool::Serve() {
     lock.unlock();
     job->run();
     job->run = nullptr;  // its captures are released outside the lock
-    job->displaced = nullptr;
+    job->on_dropped = nullptr;
     lock.lock();
     ++idle_;
     queue_.Finish(job, now_());

@@ -44,7 +44,7 @@ using Work = std::function<Result<T>(std::stop_token)>;
 // kUnavailable, with what the work `name` has thrown. Never throws.
 Error FailureOf(std::string_view name, const std::exception& thrown);
 // kOverloaded: the job of the work `name` was dropped for others. Never throws.
-Error DisplacedError(std::string_view name);
+Error DroppedJobError(std::string_view name);
 
 // The result of the work; an exception counts as kUnavailable. Never throws: on a worker that would end the program.
 template <typename T>
@@ -73,7 +73,7 @@ class WorkerPool {
   asio::awaitable<Result<T>> Run(Work<T> work, JobOrder order);
 
   // On an error the job does not run. kOverloaded: it cannot start before its deadline, or the queue is full.
-  // kUnavailable: the pool accepts no more jobs. May call another job's `displaced`.
+  // kUnavailable: the pool accepts no more jobs. May call another job's `on_dropped`.
   Result<void> Submit(PoolJobPtr job);
 
   // Removes a job that still waits; it never runs. Null: does nothing.
@@ -94,9 +94,9 @@ class WorkerPool {
 
  private:
   template <typename T>
-  struct Errand;
+  struct RunState;
   template <typename T>
-  class Seat;
+  class WaitGuard;
 
   void Serve();
 
@@ -115,10 +115,10 @@ class WorkerPool {
 
 // Shared by a call of Run and its job.
 template <typename T>
-struct WorkerPool::Errand {
+struct WorkerPool::RunState {
   static constexpr std::string_view kName = "work for one request";
 
-  Errand(Work<T> w, std::stop_token cancelled, WaiterPtr who)
+  RunState(Work<T> w, std::stop_token cancelled, WaiterPtr who)
       : work(std::move(w)), at_cancel(std::move(cancelled), [this] { stop.request_stop(); }), waiter(std::move(who)) {}
 
   void Finish(Result<T> result) {
@@ -139,27 +139,27 @@ struct WorkerPool::Errand {
 
 // The caller's part of an errand. Lives in the frame of Run, so that the job is given up however the coroutine ends.
 template <typename T>
-class WorkerPool::Seat {
+class WorkerPool::WaitGuard {
  public:
-  Seat(WorkerPool& pool, std::shared_ptr<Errand<T>> errand, PoolJobPtr job)
-      : pool_(pool), errand_(std::move(errand)), job_(std::move(job)) {
+  WaitGuard(WorkerPool& pool, std::shared_ptr<RunState<T>> state, PoolJobPtr job)
+      : pool_(pool), state_(std::move(state)), job_(std::move(job)) {
     pool_.runs_.fetch_add(1, std::memory_order_relaxed);
   }
-  Seat(const Seat&) = delete;
-  Seat& operator=(const Seat&) = delete;
-  ~Seat() {
+  WaitGuard(const WaitGuard&) = delete;
+  WaitGuard& operator=(const WaitGuard&) = delete;
+  ~WaitGuard() {
     pool_.runs_.fetch_sub(1, std::memory_order_relaxed);
-    std::unique_lock lock(errand_->mutex);
-    errand_->waiter = nullptr;
-    if (errand_->outcome) return;
+    std::unique_lock lock(state_->mutex);
+    state_->waiter = nullptr;
+    if (state_->outcome) return;
     lock.unlock();  // stopping runs the work's callbacks
     pool_.Withdraw(job_);
-    errand_->stop.request_stop();
+    state_->stop.request_stop();
   }
 
  private:
   WorkerPool& pool_;
-  const std::shared_ptr<Errand<T>> errand_;
+  const std::shared_ptr<RunState<T>> state_;
   const PoolJobPtr job_;
 };
 
@@ -167,20 +167,20 @@ template <typename T>
 asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
   const auto executor = co_await asio::this_coro::executor;
   const auto waiter = std::make_shared<asio::steady_timer>(executor, order.deadline);
-  const auto errand = std::make_shared<Errand<T>>(std::move(work), cancelled(), waiter);
+  const auto state = std::make_shared<RunState<T>>(std::move(work), cancelled(), waiter);
   const auto job = std::make_shared<PoolJob>();
   job->order = order;
-  job->run = [errand] { errand->Finish(Outcome(Errand<T>::kName, errand->work, errand->stop.get_token())); };
-  job->displaced = [errand] { errand->Finish(tl::unexpected(DisplacedError(Errand<T>::kName))); };
-  const Seat<T> seat(*this, errand, job);
+  job->run = [state] { state->Finish(Outcome(RunState<T>::kName, state->work, state->stop.get_token())); };
+  job->on_dropped = [state] { state->Finish(tl::unexpected(DroppedJobError(RunState<T>::kName))); };
+  const WaitGuard<T> guard(*this, state, job);
   if (Result<void> submitted = Submit(job); !submitted) co_return tl::unexpected(std::move(submitted.error()));
 
   boost::system::error_code ignored;  // finished, expired or cancelled: the outcome tells
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
-  const std::lock_guard lock(errand->mutex);
-  if (errand->outcome) co_return std::move(*errand->outcome);
-  co_return MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", Errand<T>::kName);
+  const std::lock_guard lock(state->mutex);
+  if (state->outcome) co_return std::move(*state->outcome);
+  co_return MakeError(ErrorCode::kCancelled, "{}: not ready before the request's deadline", RunState<T>::kName);
 }
 
 }  // namespace terrace::server

@@ -34,7 +34,7 @@ class Connection {
   virtual void Drain() = 0;
   virtual void Abort() = 0;
   // Refuses the current request, because others need the memory of its body.
-  virtual void Displace() { Abort(); }
+  virtual void Preempt() { Abort(); }
 };
 
 class ConnectionSet {

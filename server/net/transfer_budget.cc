@@ -29,7 +29,7 @@ constexpr std::chrono::duration<double> kHalfLife{10};
 // A local object of HoldWhenRoom; in waiters_ during its lifetime.
 class TransferBudget::Waiter {
  public:
-  Waiter(TransferBudget& owner, const Ask& asked, const asio::any_io_executor& executor)
+  Waiter(TransferBudget& owner, const HoldRequest& asked, const asio::any_io_executor& executor)
       : ask(asked), timer(std::make_shared<asio::steady_timer>(executor)), budget(owner) {
     const std::lock_guard lock(budget.mutex_);
     budget.waiters_.push_back(this);
@@ -39,34 +39,35 @@ class TransferBudget::Waiter {
   ~Waiter() {
     const std::lock_guard lock(budget.mutex_);
     std::erase(budget.waiters_, this);
-    budget.WakeNext(budget.RoomOf(ask), budget.now_());
+    budget.WakeNext(budget.PoolOf(ask), budget.now_());
   }
 
-  const Ask& ask;
+  const HoldRequest& ask;
   const std::shared_ptr<asio::steady_timer> timer;
   TransferBudget& budget;
 };
 
 TransferBudget::TransferBudget(std::size_t capacity, std::function<Clock::time_point()> now) : now_(std::move(now)) {
-  rooms_[kSmall].capacity = capacity / kRepliesPart;
-  rooms_[kLarge].capacity = rooms_[kOversized].capacity = capacity / kLargePart;
-  rooms_[kUploads].capacity = rooms_[kOversizedUpload].capacity = capacity / kUploadsPart;
-  rooms_[kOversized].takes_one = rooms_[kOversizedUpload].takes_one = true;
+  pools_[kSmall].capacity = capacity / kRepliesPart;
+  pools_[kLarge].capacity = pools_[kOversized].capacity = capacity / kLargePart;
+  pools_[kUploads].capacity = pools_[kOversizedUpload].capacity = capacity / kUploadsPart;
+  pools_[kOversized].takes_one = pools_[kOversizedUpload].takes_one = true;
 }
 
-std::size_t TransferBudget::RoomOf(const Ask& ask) const {
-  if (ask.kind == Kind::kUpload) return ask.bytes <= rooms_[kUploads].capacity ? kUploads : kOversizedUpload;
-  if (ask.bytes <= rooms_[kSmall].capacity / kSmallPart) return kSmall;
-  return ask.bytes <= rooms_[kLarge].capacity ? kLarge : kOversized;
+std::size_t TransferBudget::PoolOf(const HoldRequest& ask) const {
+  if (ask.kind == Kind::kUpload) return ask.bytes <= pools_[kUploads].capacity ? kUploads : kOversizedUpload;
+  if (ask.bytes <= pools_[kSmall].capacity / kSmallPart) return kSmall;
+  return ask.bytes <= pools_[kLarge].capacity ? kLarge : kOversized;
 }
 
-std::optional<TransferBudget::Hold> TransferBudget::TryHold(const Ask& ask) {
+std::optional<TransferBudget::Hold> TransferBudget::TryHold(const HoldRequest& ask) {
   if (ask.bytes <= kFreeBytes) return Hold();
   const std::lock_guard lock(mutex_);
   return Take(ask, now_(), nullptr);
 }
 
-asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoom(Ask ask, Clock::time_point deadline) {
+asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoom(HoldRequest ask,
+                                                                                  Clock::time_point deadline) {
   std::optional<Hold> hold;
   if (ask.bytes <= kFreeBytes) {
     hold.emplace();
@@ -87,14 +88,14 @@ asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoo
     }
     if (hold || now >= deadline) co_return hold;
     for (const auto& connection : victims.cut) connection->Abort();
-    for (const auto& connection : victims.displaced) connection->Displace();
+    for (const auto& connection : victims.displaced) connection->Preempt();
     waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kLook));
     boost::system::error_code ignored;  // woken, or time for a check
     co_await waiter.timer->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
 }
 
-std::size_t TransferBudget::HeldBy(std::uint64_t client, const Room& room) {
+std::size_t TransferBudget::HeldBy(std::uint64_t client, const Pool& room) {
   const auto own = room.shares.find(client);
   return own == room.shares.end() ? 0 : own->second.bytes;
 }
@@ -109,7 +110,7 @@ void TransferBudget::Age(Share& share, Clock::time_point now) {
 }
 
 // The client's recent use plus what it may use before it is late, in steps.
-std::uint64_t TransferBudget::Claim(std::uint64_t client, const Room& room, Clock::time_point now) {
+std::uint64_t TransferBudget::Claim(std::uint64_t client, const Pool& room, Clock::time_point now) {
   const auto own = room.shares.find(client);
   if (own == room.shares.end()) return 0;
   Share share = own->second;
@@ -120,7 +121,7 @@ std::uint64_t TransferBudget::Claim(std::uint64_t client, const Room& room, Cloc
 }
 
 // Returns the aged share. From time to time, drops shares that have decayed to nothing.
-TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Room& room, Clock::time_point now) {
+TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& room, Clock::time_point now) {
   if (room.shares.size() >= room.sweep_at) {
     std::erase_if(room.shares,
                   [&](const auto& other) { return other.second.holds == 0 && Claim(other.first, room, now) == 0; });
@@ -132,9 +133,9 @@ TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Room& room,
 }
 
 // `waiter`: the waiter that asks; null: a new request, which is last in the order.
-bool TransferBudget::MayTake(const Ask& ask, Clock::time_point now, const Waiter* waiter) const {
-  const std::size_t number = RoomOf(ask);
-  const Room& room = rooms_[number];
+bool TransferBudget::MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const {
+  const std::size_t number = PoolOf(ask);
+  const Pool& room = pools_[number];
   if (ask.body && charges_.contains(ask.body.get())) return true;
   if (!HasRoom(ask)) return false;
   if (waiters_.empty()) return true;
@@ -144,9 +145,9 @@ bool TransferBudget::MayTake(const Ask& ask, Clock::time_point now, const Waiter
 }
 
 // Any waiter.
-bool TransferBudget::HasRoom(const Ask& ask) const {
-  const std::size_t number = RoomOf(ask);
-  const Room& room = rooms_[number];
+bool TransferBudget::HasRoom(const HoldRequest& ask) const {
+  const std::size_t number = PoolOf(ask);
+  const Pool& room = pools_[number];
   if (room.takes_one) return room.held == 0;
   if (room.held + ask.bytes > room.capacity) return false;
   const std::size_t own = HeldBy(ask.client, room);
@@ -158,8 +159,8 @@ TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t room, Clock::time
   Waiter* next = nullptr;
   std::uint64_t least = 0;
   for (Waiter* waiter : waiters_) {
-    if (RoomOf(waiter->ask) != room) continue;
-    const std::uint64_t claim = Claim(waiter->ask.client, rooms_[room], now);
+    if (PoolOf(waiter->ask) != room) continue;
+    const std::uint64_t claim = Claim(waiter->ask.client, pools_[room], now);
     if (next == nullptr || claim < least) {
       next = waiter;
       least = claim;
@@ -168,12 +169,13 @@ TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t room, Clock::time
   return next;
 }
 
-std::optional<TransferBudget::Hold> TransferBudget::Take(const Ask& ask, Clock::time_point now, const Waiter* waiter) {
+std::optional<TransferBudget::Hold> TransferBudget::Take(const HoldRequest& ask, Clock::time_point now,
+                                                         const Waiter* waiter) {
   const bool fits = MayTake(ask, now, waiter);
   const bool is_beyond = !fits && ask.kind == Kind::kVitalReply && reserve_held_ + ask.bytes <= kReserve;
   if (!fits && !is_beyond) return std::nullopt;
-  const std::size_t number = RoomOf(ask);
-  Room& room = rooms_[number];
+  const std::size_t number = PoolOf(ask);
+  Pool& room = pools_[number];
   auto late_at = Clock::time_point::max();
   if (ask.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
   // Allocations come first, because they may fail.
@@ -206,9 +208,9 @@ bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>
 
 // Chooses all late replies of the client that holds most, including those that were told before and have not ended yet.
 // Vital replies may also take memory from their own client.
-void TransferBudget::ChooseLate(const Ask& ask, Clock::time_point now, Victims& victims) {
-  const std::size_t number = RoomOf(ask);
-  const Room& room = rooms_[number];
+void TransferBudget::ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
+  const std::size_t number = PoolOf(ask);
+  const Pool& room = pools_[number];
   const bool is_vital = ask.kind == Kind::kVitalReply;
   std::size_t most = is_vital ? 0 : HeldBy(ask.client, room);
   std::optional<std::uint64_t> client;
@@ -227,9 +229,9 @@ void TransferBudget::ChooseLate(const Ask& ask, Clock::time_point now, Victims& 
   }
 }
 
-void TransferBudget::ChooseUploads(const Ask& ask, Clock::time_point now, Victims& victims) {
-  const std::size_t number = RoomOf(ask);
-  const Room& room = rooms_[number];
+void TransferBudget::ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
+  const std::size_t number = PoolOf(ask);
+  const Pool& room = pools_[number];
   std::uint64_t largest = ask.client;
   for (const auto& [client, share] : room.shares) {
     const std::size_t most = HeldBy(largest, room);
@@ -264,7 +266,7 @@ void TransferBudget::Release(Entries::iterator entry) {
   const std::lock_guard lock(mutex_);
   const std::size_t number = entry->room;
   const std::uint64_t client = entry->client;
-  Room& room = rooms_[number];
+  Pool& room = pools_[number];
   const auto found = charges_.find(entry->charge);
   Charge& charge = found->second;
   Share& own = room.shares.at(client);
@@ -287,7 +289,7 @@ void TransferBudget::Release(Entries::iterator entry) {
   if (!waiters_.empty()) WakeNext(number, now);
 }
 
-void TransferBudget::Took(Entries::iterator entry, std::size_t bytes) {
+void TransferBudget::AddTaken(Entries::iterator entry, std::size_t bytes) {
   const auto now = now_();
   const std::lock_guard lock(mutex_);
   const auto latest = now + kGrace;
@@ -306,7 +308,7 @@ void TransferBudget::Settle(Entries::iterator entry) {
 TransferBudget::Stats TransferBudget::stats() const {
   const std::lock_guard lock(mutex_);
   std::size_t held = 0;
-  for (const Room& room : rooms_) held += room.held;
+  for (const Pool& room : pools_) held += room.held;
   return {held, waiters_.size(), refused_, cut_};
 }
 

@@ -60,7 +60,7 @@ class TransferBudget {
 
   enum class Kind : std::uint8_t { kReply, kVitalReply, kUpload };
 
-  struct Ask {
+  struct HoldRequest {
     Kind kind = Kind::kReply;
     std::size_t bytes = 0;
     std::shared_ptr<const std::string> body;  // kept alive while it counts; null: memory that is not shared
@@ -69,11 +69,11 @@ class TransferBudget {
   };
 
   // Takes memory until the hold is destroyed. Returns nothing if there is none now.
-  std::optional<Hold> TryHold(const Ask& ask);
+  std::optional<Hold> TryHold(const HoldRequest& ask);
 
   // Waits for memory until `deadline`; returns nothing then. `ask` should have no body, because a waiting body would
   // itself take memory. The coroutine must run on a single thread.
-  asio::awaitable<std::optional<Hold>> HoldWhenRoom(Ask ask, Clock::time_point deadline);
+  asio::awaitable<std::optional<Hold>> HoldWhenRoom(HoldRequest ask, Clock::time_point deadline);
 
   struct Stats {
     std::size_t held_bytes = 0;
@@ -91,14 +91,14 @@ class TransferBudget {
     double used = 0;
     Clock::time_point as_of;
   };
-  struct Room {
+  struct Pool {
     std::size_t capacity = 0;
     bool takes_one = false;  // of any size
     std::size_t held = 0;
     std::unordered_map<std::uint64_t, Share> shares = {};  // by client; those that hold anything or did so lately
     std::size_t sweep_at = 64;                             // shares
   };
-  enum RoomNumber : std::size_t { kSmall, kLarge, kOversized, kUploads, kOversizedUpload, kRooms };
+  enum PoolIndex : std::size_t { kSmall, kLarge, kOversized, kUploads, kOversizedUpload, kPools };
 
   struct Entry {
     const void* charge;  // key of its charge: the body, or the entry itself if it is not shared
@@ -119,30 +119,30 @@ class TransferBudget {
     std::vector<std::shared_ptr<Connection>> cut, displaced;
   };
 
-  std::size_t RoomOf(const Ask& ask) const;
+  std::size_t PoolOf(const HoldRequest& ask) const;
   // mutex_ is held, as for the following.
-  static std::size_t HeldBy(std::uint64_t client, const Room& room);
+  static std::size_t HeldBy(std::uint64_t client, const Pool& room);
   static void Age(Share& share, Clock::time_point now);
-  static std::uint64_t Claim(std::uint64_t client, const Room& room, Clock::time_point now);
-  static Share& ShareOf(std::uint64_t client, Room& room, Clock::time_point now);
-  bool HasRoom(const Ask& ask) const;
-  bool MayTake(const Ask& ask, Clock::time_point now, const Waiter* waiter) const;
+  static std::uint64_t Claim(std::uint64_t client, const Pool& room, Clock::time_point now);
+  static Share& ShareOf(std::uint64_t client, Pool& room, Clock::time_point now);
+  bool HasRoom(const HoldRequest& ask) const;
+  bool MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const;
   Waiter* NextWaiter(std::size_t room, Clock::time_point now) const;
-  void ChooseLate(const Ask& ask, Clock::time_point now, Victims& victims);
-  void ChooseUploads(const Ask& ask, Clock::time_point now, Victims& victims);
+  void ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims);
+  void ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims);
   bool Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom);
-  std::optional<Hold> Take(const Ask& ask, Clock::time_point now, const Waiter* waiter);
+  std::optional<Hold> Take(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter);
   void WakeNext(std::size_t room, Clock::time_point now);
 
   void Release(Entries::iterator entry);
-  void Took(Entries::iterator entry, std::size_t bytes);
+  void AddTaken(Entries::iterator entry, std::size_t bytes);
   void Settle(Entries::iterator entry);
 
   const std::function<Clock::time_point()> now_;
   mutable std::mutex mutex_;
   Entries entries_;  // the oldest first
   std::unordered_map<const void*, Charge> charges_;
-  std::array<Room, kRooms> rooms_;
+  std::array<Pool, kPools> pools_;
   std::list<Waiter*> waiters_;  // the oldest first
   std::size_t reserve_held_ = 0;
   std::uint64_t refused_ = 0, cut_ = 0;
@@ -165,8 +165,8 @@ class TransferBudget::Hold {
 
   // Call this when the client has taken further bytes of the reply. Its time begins with the first call: before that
   // the reply is being made.
-  void Took(std::size_t bytes) {
-    if (budget_) budget_->Took(entry_, bytes);
+  void AddTaken(std::size_t bytes) {
+    if (budget_) budget_->AddTaken(entry_, bytes);
   }
 
   // Call this when the upload is complete. It still counts until the hold is destroyed, but can no longer be late.

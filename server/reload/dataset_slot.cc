@@ -93,7 +93,7 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
   retry_at_ = {};
 }
 
-std::size_t DatasetSlot::LookAtFiles(std::size_t most) {
+std::size_t DatasetSlot::CheckFiles(std::size_t most) {
   if (!serving_ || stale_since_) return 0;
   if (HasToRecoverCache()) {
     spdlog::info("dataset {}: what was kept of its sources in cache_dir is gone; it is opened anew", wanted_.name);

@@ -46,7 +46,7 @@ class DatasetSlot {
   void Want(config::DatasetConfig wanted);
 
   // Checks up to `most` files for changes, beginning where the last call ended. Returns the number of files checked.
-  std::size_t LookAtFiles(std::size_t most);
+  std::size_t CheckFiles(std::size_t most);
 
   // Begins to open the wanted dataset if that is due. Waits until its files have not been written to for a moment.
   void OpenIfDue(const DatasetOpener& open);

@@ -124,11 +124,11 @@ void Reloader::Run() {
     lock.unlock();
     const Clock::time_point now = Clock::now();
     if (reload || (watch_ && now >= next_config)) {
-      LookAtConfig(reload);
+      CheckConfigFile(reload);
       next_config = now + (config_settles_ ? kConfigSettleTime : kPeriod);
     }
     if (look || (watch_ && now >= next_look)) {
-      LookAtFiles();
+      CheckFiles();
       next_look = now + kPeriod;
     }
     if (StepOpenings()) Publish();
@@ -153,7 +153,7 @@ config::ConfigResult Reloader::Load() const {
   }
 }
 
-void Reloader::LookAtConfig(bool asked) {
+void Reloader::CheckConfigFile(bool asked) {
   const bool may_differ = asked || config_settles_ || !hooks_.may_have_changed || hooks_.may_have_changed();
   if (!may_differ) return;
   config::ConfigResult next = Load();
@@ -206,11 +206,11 @@ void Reloader::Apply(config::Config next) {
   Publish();
 }
 
-void Reloader::LookAtFiles() {
-  std::size_t left = kMaxLooks;
+void Reloader::CheckFiles() {
+  std::size_t left = kMaxFileChecks;
   for (std::size_t i = 0; i < slots_.size() && left > 0; ++i) {
     next_slot_ %= slots_.size();
-    left -= slots_[next_slot_++].LookAtFiles(left);
+    left -= slots_[next_slot_++].CheckFiles(left);
   }
 }
 

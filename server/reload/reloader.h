@@ -1,5 +1,5 @@
 // Reopens datasets when the configuration or their files change.
-// Every second, a thread checks the configuration, including its globs and folders, and up to kMaxLooks files of
+// Every second, a thread checks the configuration, including its globs and folders, and up to kMaxFileChecks files of
 // datasets. It reopens changed datasets at low priority while the old ones are served, and publishes them when they are
 // complete. An invalid configuration changes nothing. All changes are logged.
 #pragma once
@@ -21,7 +21,7 @@ namespace terrace::server {
 class Reloader {
  public:
   // Files checked per second. If there are more, each is checked every few seconds.
-  static constexpr std::size_t kMaxLooks = 10'000;
+  static constexpr std::size_t kMaxFileChecks = 10'000;
 
   struct Hooks {
     // Loads the configuration as at a start of the server.
@@ -53,9 +53,9 @@ class Reloader {
 
  private:
   void Run();
-  void LookAtFiles();
+  void CheckFiles();
   config::ConfigResult Load() const;
-  void LookAtConfig(bool asked);
+  void CheckConfigFile(bool asked);
   void Apply(config::Config next);
   bool StepOpenings();
   void Publish();

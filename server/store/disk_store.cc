@@ -55,7 +55,7 @@ std::optional<std::string> DiskStore::Find(const std::string& key) {
   }
   Result<std::optional<std::string>> record = db->Get(key);
   if (record && *record) {
-    if (const auto value = tiler::Unseal(key, **record)) {
+    if (const auto value = tiler::StripChecksum(key, **record)) {
       hits_.fetch_add(1, std::memory_order_relaxed);
       (*record)->resize(value->size());  // the checksum is after the value
       return *std::move(record);
@@ -146,7 +146,7 @@ void DiskStore::Write(std::list<Job> jobs) {
       std::vector<RecordDb::Change> changes;
       for (Job& job : jobs) {
         changes.push_back({job.key, std::nullopt});
-        if (job.value) changes.back().value = tiler::Seal(job.key, job.value());
+        if (job.value) changes.back().value = tiler::AddChecksum(job.key, job.value());
       }
       done = db->Write(changes);
     } catch (const std::exception& exception) {  // std::bad_alloc

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/telemetry/shown_target.h"
+#include "server/telemetry/redact.h"
 
 namespace terrace::server {
 namespace {
@@ -54,7 +54,7 @@ std::string Latin1(std::string_view text) {
 std::string TargetOf(const ReplyRecord& record) {
   // A path that matches no URL of the server may contain anything, even a token.
   const bool is_known = !record.dataset.empty() || (record.route == "viewer" && record.status < 400);
-  return ShownTarget(record.target, is_known);
+  return RedactTarget(record.target, is_known);
 }
 
 // HTTP's methods are shorter than tokens.
@@ -104,7 +104,7 @@ std::string FormatAccessLine(const ReplyRecord& record) {
 std::string FormatCombinedLine(const ReplyRecord& record, SystemClock::time_point now) {
   return fmt::format("{} - - [{:%d/%b/%Y:%H:%M:%S} +0000] \"{} {} {}\" {} {} \"{}\" \"{}\"", ClientOf(record),
                      fmt::gmtime(SystemClock::to_time_t(now)), Escaped(MethodOf(record)), Escaped(TargetOf(record)),
-                     ProtocolOf(record), record.status, record.body_bytes, EscapedOrDash(ShownReferer(record.referer)),
+                     ProtocolOf(record), record.status, record.body_bytes, EscapedOrDash(RedactReferer(record.referer)),
                      EscapedOrDash(record.user_agent));
 }
 
@@ -124,7 +124,7 @@ std::string FormatJsonLine(const ReplyRecord& record, SystemClock::time_point no
   line["cache"] = record.cache;
   line["request_id"] = record.request_id;
   line["token"] = Latin1(record.token_name);
-  line["referer"] = Latin1(ShownReferer(record.referer));
+  line["referer"] = Latin1(RedactReferer(record.referer));
   line["user_agent"] = Latin1(record.user_agent);
   return line.dump(-1, ' ', /*ensure_ascii=*/true);
 }

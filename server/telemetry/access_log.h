@@ -20,7 +20,7 @@ namespace terrace::server {
 // bytes.
 struct ReplyRecord {
   std::string_view method;
-  std::string_view target;  // as sent by the client; logged in the form of ShownTarget
+  std::string_view target;  // as sent by the client; logged in the form of RedactTarget
   unsigned version = 11;    // of HTTP: 10 or 11
   int status = 0;           // 499: the client left before there was a reply
   std::size_t body_bytes = 0;
@@ -32,7 +32,7 @@ struct ReplyRecord {
   std::string_view peer;                 // address and port
   std::string_view client;               // the client that a trusted proxy reports; empty if the peer is the client
   std::string_view token_name;           // empty: none
-  std::string_view referer, user_agent;  // as sent; the referer is logged in the form of ShownReferer
+  std::string_view referer, user_agent;  // as sent; the referer is logged in the form of RedactReferer
 };
 
 inline constexpr std::size_t kMaxLoggedTargetBytes = 512;

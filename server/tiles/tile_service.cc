@@ -59,11 +59,11 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   order.level = request.key.level;
   order.kind = KindOfTile(key);
   order.deadline = deadline;
-  Flights::Landing landing = co_await flights_.Join(key, NameOf(request), std::move(build), order);
-  if (!landing.joined) misses_.fetch_add(1, std::memory_order_relaxed);
-  if (!landing.value) co_return tl::unexpected(std::move(landing.value.error()));
-  const CacheStatus found = (*landing.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
-  co_return ServedTile(std::move(*landing.value), landing.joined ? CacheStatus::kJoined : found);
+  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(build), order);
+  if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
+  if (!flight.value) co_return tl::unexpected(std::move(flight.value.error()));
+  const CacheStatus found = (*flight.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
+  co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
 
 // The tile as it is cached and sent.
@@ -86,7 +86,9 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
     cache_.Insert(key, tile);
     return tile;
   }
-  const Work<tiler::EncodedTile> work = [&](std::stop_token token) { return catalog.pipeline->Build(request, std::move(token)); };
+  const Work<tiler::EncodedTile> work = [&](std::stop_token token) {
+    return catalog.pipeline->Build(request, std::move(token));
+  };
   Result<tiler::EncodedTile> built = Outcome(NameOf(request), work, std::move(stop));
   Result<tiler::TilePtr> tile;
   if (built) {

@@ -27,7 +27,7 @@ using BuildObserver = std::function<void(const DatasetView&, const Result<tiler:
 
 // Writes the header lines of replies that describe the tile. Called once per tile, on a worker; the lines are cached
 // with the tile.
-using HeadWriter = tiler::HeadLines (*)(const tiler::TileRequest&, const tiler::EncodedTile&);
+using HeaderWriter = tiler::HeaderLines (*)(const tiler::TileRequest&, const tiler::EncodedTile&);
 
 struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
@@ -35,7 +35,7 @@ struct TileServiceOptions {
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
   // Tiers below memory, the first asked first. Each gets every tile that is built.
   std::vector<std::shared_ptr<tiler::TileStore>> stores = {};
-  HeadWriter write_head = nullptr;  // null: heads are left empty
+  HeaderWriter write_head = nullptr;  // null: heads are left empty
 };
 
 enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: EncodedTile::store
@@ -96,7 +96,7 @@ class TileService {
                                       const tiler::CacheKey& key, Clock::time_point asked, std::stop_token stop);
 
   const BuildObserver observer_;
-  const HeadWriter write_head_;
+  const HeaderWriter write_head_;
   tiler::TileCache cache_;
   const std::vector<std::shared_ptr<tiler::TileStore>> stores_;
   WorkerPool pool_;

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "engine/tin/extended/block_joiner.h"
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/greedy.h"
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/race.h"
@@ -29,7 +29,7 @@ inline Mesher GreedyMesher(const tin::GreedyOptions& options = {}) {
 
 // The same, cut into blocks where the engine thinks that this pays; all of them on this thread. An error is the goal.
 inline tin::TinMesh MeshInBlocks(const tin::HeightField& field, const tin::GreedyGoal& goal) {
-  const tin::FieldCut cut = tin::FieldCut::For(field, goal.max_error);
+  const tin::FieldPartition cut = tin::FieldPartition::For(field, goal.max_error);
   tin::BlockJoiner joiner(cut);
   while (joiner.added() < cut.size()) {
     joiner.Add(*tin::MeshBlock(field, cut.block(joiner.added()), goal.max_error));

@@ -32,7 +32,7 @@ Table MeasureLargeRasters(Environment& environment) {
     const std::vector<Score> scores = Race(std::array{&*field}, goal, environment.options().runs, contenders);
     std::vector<Cell> row = SpeedRow(name, {scores[0], peer.empty() ? std::optional<Score>() : scores[2]},
                                      field->width() < kTargetSide ? "" : "9x (15x)");
-    row.push_back(Count(tin::FieldCut::For(*field, kError).size()));
+    row.push_back(Count(tin::FieldPartition::For(*field, kError).size()));
     row.push_back(Milliseconds(scores[1].min_seconds));
     row.push_back(peer.empty() ? Cell() : Ratio(scores[2].min_seconds / scores[1].min_seconds));
     table.Add(std::move(row));

@@ -47,7 +47,7 @@ Table MeasureVertices(Environment& environment) {
       const std::optional<tin::HeightField> field = ReadLarge(raster);
       if (!field) continue;
       AddRow(table, name, MeshOf(*field, {error}).vertices.size(), MeshInBlocks(*field, {error}).vertices.size(),
-             Count(tin::FieldCut::For(*field, error).size()));
+             Count(tin::FieldPartition::For(*field, error).size()));
     }
   }
   return table;

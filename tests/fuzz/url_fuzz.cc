@@ -10,13 +10,13 @@
 #include "engine/core/check.h"
 #include "engine/geo/error_ladder.h"
 #include "server/api/tile_formats.h"
-#include "server/edge/client_address.h"
-#include "server/edge/gate.h"
+#include "server/frontend/admission_control.h"
+#include "server/frontend/client_address.h"
 #include "server/http/response.h"
 #include "server/http/text.h"
 #include "server/query/heights_query.h"
 #include "server/routes.h"
-#include "server/telemetry/shown_target.h"
+#include "server/telemetry/redact.h"
 #include "tests/fuzz/fuzz_input.h"
 
 namespace terrace::fuzz {
@@ -93,7 +93,7 @@ void TryTarget(std::string target) {
   (void)TakeToken(target);
   TERRACE_CHECK(!TakeToken(target));  // none is left for the log
   for (const bool is_known : {false, true}) {
-    const std::string shown = ShownTarget(target, is_known);
+    const std::string shown = RedactTarget(target, is_known);
     TERRACE_CHECK(std::all_of(shown.begin(), shown.end(), [](char c) { return c > 0x20 && c < 0x7f && c != ';'; }));
   }
   const auto route = Routes().Match(target);
@@ -104,10 +104,10 @@ void TryTarget(std::string target) {
   if (route->row->label != "tile") return;
   ExpectOneUrl(*route);
   const Request request;
-  Call call;
+  RequestContext call;
   call.request = &request;
   call.route = *route;
-  const auto wanted = Negotiate(call, Datasets());
+  const auto wanted = NegotiateTile(call, Datasets());
   if (!wanted) return ExpectClientError(wanted.error());
   TERRACE_CHECK(wanted->dataset == 0 && wanted->key == route->key && wanted->format == route->format->format);
   TERRACE_CHECK(wanted->error_step >= geo::kCoarsestStep && wanted->error_step <= geo::kFinestStep);

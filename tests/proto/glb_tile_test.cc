@@ -214,22 +214,22 @@ TEST(GlbTile, EveryTruncationIsNoticed) {
 }
 
 // Two flat triangles over a tile of level ocean cut below it by the sagitta of half the diagonal.
-TEST(TileMeter, CountsTheCurvatureOfTheEarthUnderFlatTriangles) {
+TEST(TileErrorMeter, CountsTheCurvatureOfTheEarthUnderFlatTriangles) {
   const GlobalGround ground({9, 512, 256}, 64, [](std::int64_t, std::int64_t) { return 0.0; });
   const tin::TinMesh mesh = RegularMesh(64, 64);
   const double step = 1.0 / 64;
-  const TileError error =
-      TileMeter(ground.view(), 1000).MeasureFlat(mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step));
+  const TileError error = TileErrorMeter(ground.view(), 1000)
+                              .MeasureFlat(mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step));
   const double side = geo::kSemiMajorAxis * geo::ToRadians(180.0 / 512);
   EXPECT_NEAR(error.max_m, side * side / (4 * geo::kSemiMajorAxis), 0.6);
   EXPECT_TRUE(error.misses.empty());
 }
 
-TEST(TileMeter, SeesTheGridsRounding) {
+TEST(TileErrorMeter, SeesTheGridsRounding) {
   const GlobalGround ground({13, 4300, 5700}, 64, Scattered(50));
   const tin::TinMesh mesh = RegularMesh(64, 1);
   const auto measured = [&](double step) {
-    return TileMeter(ground.view(), 1000)
+    return TileErrorMeter(ground.view(), 1000)
         .MeasureFlat(mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step))
         .max_m;
   };

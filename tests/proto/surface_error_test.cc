@@ -95,7 +95,7 @@ TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
     const RandomGround ground({12, 3000, 2000}, 32, 300, seed);
     const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 4 + seed * 20});
     const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
-    const double at_samples = TileMeter(ground.view(), 1e9).Measure(tile).max_m;
+    const double at_samples = TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m;
     const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile));
     const Largest sampled = SampledTile(ground.view(), tile);
     EXPECT_GE(measured, sampled.planar);
@@ -114,7 +114,7 @@ TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
   set(11, 11, 100);
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 200});
   const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
-  ASSERT_LT(TileMeter(ground.view(), 1e9).Measure(tile).max_m, 1);
+  ASSERT_LT(TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m, 1);
   EXPECT_GE(MeasureEdgeError(ground.view(), tile), SampledTile(ground.view(), tile).planar);
 }
 
@@ -127,7 +127,7 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
       const RandomGround ground({level, geo::TileColumns(level) / 3, row}, 64, 20000.0 / (1 << level), 7);
       const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 600});
       const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
-      const double at_samples = TileMeter(ground.view(), 1e9).Measure(tile).max_m;
+      const double at_samples = TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m;
       const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile));
       const Largest sampled = SampledTile(ground.view(), tile);
       EXPECT_GE(measured, std::max(sampled.drawn, sampled.planar)) << level << " " << latitude;
@@ -142,7 +142,7 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
         positions.push_back(
             geo::ToEcef(ground.view().Longitude(p.x), ground.view().Latitude(p.y), ground.view().At(p.x, p.y)));
       }
-      const double flat = std::max(TileMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m,
+      const double flat = std::max(TileErrorMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m,
                                    MeasureFlatEdgeError(ground.view(), mesh, positions));
       EXPECT_GE(flat, Sampled(ground.view(), places, {}, positions, mesh.triangles).drawn) << level << " " << latitude;
     }

@@ -56,7 +56,7 @@ double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
 TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
   const RandomGround ground({9, 300, 400}, 64, 256, 9);
   const QuantizedTile tile = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 120}), FineSteps());
-  const TileError error = TileMeter(ground.view(), 60).Measure(tile);
+  const TileError error = TileErrorMeter(ground.view(), 60).Measure(tile);
   ASSERT_FALSE(error.misses.empty());
   EXPECT_LE(error.misses.size(), tile.triangles.size());
   for (const tin::SamplePosition miss : error.misses) {
@@ -72,7 +72,7 @@ TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
       const RandomGround ground({9, 300, 400}, cells, 256, seed);
       const QuantizedTile tile =
           QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 40.0 + 20 * seed}), FineSteps());
-      const TileError error = TileMeter(ground.view(), 1e9).Measure(tile);
+      const TileError error = TileErrorMeter(ground.view(), 1e9).Measure(tile);
       const double planar = LargestError(ground.view(), tile);
       const FlatError drawn = LargestFlatError(ground.view(), DecodePositions(tile), tile.triangles);
       EXPECT_GE(error.max_m, std::max(planar, drawn.least) - 1e-6) << cells << ' ' << seed;
@@ -92,7 +92,7 @@ TEST(TileError, IsThatOfThePlumbLinesOfAllSamples) {
       const QuantizedTile tile = QuantizeTile(ground.view(), mesh, FineSteps());
       const double planar = LargestError(ground.view(), tile);
       const FlatError drawn = LargestFlatError(ground.view(), DecodePositions(tile), tile.triangles);
-      const double stated = TileMeter(ground.view(), 1e9).Measure(tile).max_m;
+      const double stated = TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m;
       EXPECT_GE(stated, std::max(planar, drawn.least) - 1e-6) << level << ' ' << row;
       EXPECT_LE(stated, std::max(planar, drawn.most) * 1.001 + 0.001) << level << ' ' << row;
 
@@ -102,7 +102,7 @@ TEST(TileError, IsThatOfThePlumbLinesOfAllSamples) {
             geo::ToEcef(ground.view().Longitude(p.x), ground.view().Latitude(p.y), ground.view().At(p.x, p.y)));
       }
       const FlatError flat = LargestFlatError(ground.view(), positions, mesh.triangles);
-      const double stated_flat = TileMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m;
+      const double stated_flat = TileErrorMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m;
       EXPECT_GE(stated_flat, flat.least - 1e-6) << level << ' ' << row;
       EXPECT_LE(stated_flat, flat.most * 1.001 + 0.001) << level << ' ' << row;
     }
@@ -119,9 +119,9 @@ void ExpectEqual(const TileError& a, const TileError& b) {
 
 // Round by round: what is inserted moves the tile's lowest and highest vertex, and with them all heights, in some
 // rounds and not in others. Then another reading, a mesh of other triangles, and the same one twice.
-TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
+TEST(TileErrorMeter, MeasuresAsIfItWereTheFirstTime) {
   const RandomGround ground({9, 300, 400}, 64, 256, 9);
-  TileMeter meter(ground.view(), 60);
+  TileErrorMeter meter(ground.view(), 60);
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
   QuantizedTile tile;
   int rounds = 0;
@@ -129,7 +129,7 @@ TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
     ASSERT_LT(rounds, 100);
     tile = QuantizeTile(ground.view(), mesh, FineSteps());
     const TileError error = meter.Measure(tile);
-    ExpectEqual(error, TileMeter(ground.view(), 60).Measure(tile));
+    ExpectEqual(error, TileErrorMeter(ground.view(), 60).Measure(tile));
     misses = !error.misses.empty();
     if (misses) mesh = tin::InsertSamples(mesh, {error.misses.data(), 1 + error.misses.size() / 3});
   }
@@ -140,19 +140,19 @@ TEST(TileMeter, MeasuresAsIfItWereTheFirstTime) {
   lifted.min_height += 64;
   lifted.max_height += 64;
   for (const QuantizedTile& next : {tile, other, other, tile, lifted, tile}) {
-    ExpectEqual(meter.Measure(next), TileMeter(ground.view(), 60).Measure(next));
+    ExpectEqual(meter.Measure(next), TileErrorMeter(ground.view(), 60).Measure(next));
   }
 }
 
-TEST(TileMeter, MeasuresFlatTrianglesAsIfItWereTheFirstTime) {
+TEST(TileErrorMeter, MeasuresFlatTrianglesAsIfItWereTheFirstTime) {
   const RandomGround ground({9, 300, 400}, 64, 256, 4);
-  TileMeter meter(ground.view(), 60);
+  TileErrorMeter meter(ground.view(), 60);
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
   std::size_t misses = 1;
   for (const double step : {1.0 / 16, 1.0 / 16, 1.0 / 16, 1.0 / 16, 8.0, 8.0, 1.0 / 64}) {
     const std::vector<geo::Vec3> positions = GridPositions(SnapVertices(ground.view(), mesh, step), step);
     const TileError error = meter.MeasureFlat(mesh, positions);
-    ExpectEqual(error, TileMeter(ground.view(), 60).MeasureFlat(mesh, positions));
+    ExpectEqual(error, TileErrorMeter(ground.view(), 60).MeasureFlat(mesh, positions));
     misses = error.misses.size();
     mesh = tin::InsertSamples(mesh, {error.misses.data(), misses / 3});
   }

@@ -104,40 +104,40 @@ TEST(QuantizeTile, KeepsAFlatTileFlat) {
   for (const std::uint16_t h : tile.h) EXPECT_EQ(h, 0);
 }
 
-TEST(TileMeter, FindsOneLiftedSample) {
+TEST(TileErrorMeter, FindsOneLiftedSample) {
   // So small a tile that the Earth is flat.
   const Ground ground({18, 138240, 184320}, 64, [](int i, int j) { return i == 20 && j == 31 ? 107.5 : 100; });
   const QuantizedTile tile = QuantizeTile(ground.view(), TwoTriangles(64), AllSteps(0.25));
-  const TileError error = TileMeter(ground.view(), 5).Measure(tile);
+  const TileError error = TileErrorMeter(ground.view(), 5).Measure(tile);
   EXPECT_NEAR(error.max_m, 7.5, 0.001);
   ASSERT_EQ(error.misses.size(), 1u);
   EXPECT_EQ(error.misses[0], (tin::SamplePosition{20, 31}));
-  EXPECT_TRUE(TileMeter(ground.view(), 7.501).Measure(tile).misses.empty());
+  EXPECT_TRUE(TileErrorMeter(ground.view(), 7.501).Measure(tile).misses.empty());
 }
 
-TEST(TileMeter, DoesNotOfferEdgeSamples) {
+TEST(TileErrorMeter, DoesNotOfferEdgeSamples) {
   const Ground ground({18, 138240, 184320}, 32, [](int i, int j) { return i == 0 && j == 7 ? 150 : 100; });
   const TileError error =
-      TileMeter(ground.view(), 5).Measure(QuantizeTile(ground.view(), TwoTriangles(32), AllSteps(0.25)));
+      TileErrorMeter(ground.view(), 5).Measure(QuantizeTile(ground.view(), TwoTriangles(32), AllSteps(0.25)));
   EXPECT_NEAR(error.max_m, 50, 0.001);
   EXPECT_TRUE(error.misses.empty());
 }
 
-TEST(TileMeter, SeesEverySampleOfAFullMesh) {
+TEST(TileErrorMeter, SeesEverySampleOfAFullMesh) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> height(0, 100);
   const Ground ground({13, 4300, 5700}, 128, [&](int, int) { return height(random); });
   const QuantizedTile tile = QuantizeTile(ground.view(), EverySample(128), AllSteps(1.0 / 64));
   // Half a height step, and half a unit of position in both axes on slopes of up to 100 m per cell.
-  EXPECT_LE(TileMeter(ground.view(), 1).Measure(tile).max_m, 1.0 / 128 + 2 * 100 * 128 / (2.0 * kQuantizedMax));
+  EXPECT_LE(TileErrorMeter(ground.view(), 1).Measure(tile).max_m, 1.0 / 128 + 2 * 100 * 128 / (2.0 * kQuantizedMax));
 }
 
 // Two flat triangles over an ocean tile cut below it by the sagitta: clients.md's table says 60 m at level 9, equator.
-TEST(TileMeter, CountsTheCurvatureOfTheEarth) {
+TEST(TileErrorMeter, CountsTheCurvatureOfTheEarth) {
   const Ground ground({9, 512, 256}, 64, [](int, int) { return 0; });
   const QuantizedTile tile = QuantizeTile(ground.view(), TwoTriangles(64), AllSteps(1));
   const double side = geo::kSemiMajorAxis * geo::ToRadians(180.0 / 512);
-  EXPECT_NEAR(TileMeter(ground.view(), 1000).Measure(tile).max_m, side * side / (4 * geo::kSemiMajorAxis), 0.6);
+  EXPECT_NEAR(TileErrorMeter(ground.view(), 1000).Measure(tile).max_m, side * side / (4 * geo::kSemiMajorAxis), 0.6);
 }
 
 TEST(AllCounterClockwise, NoticesATurnedTriangle) {

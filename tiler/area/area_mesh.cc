@@ -17,7 +17,7 @@
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh_error.h"
 #include "tiler/area/area_surface.h"
-#include "tiler/mesh/mend_mesh.h"
+#include "tiler/mesh/restore_error_bound.h"
 #include "tiler/strong_etag.h"
 
 namespace terrace::tiler {
@@ -147,7 +147,7 @@ Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mes
     return surface.MeasureError(field, rounded_mesh, ecef, std::max(bound_m, kRounding_m), stop);
   };
   const std::size_t every_sample = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
-  const Result<proto::TileError> error = MendMesh(mesh, measure, every_sample, stop);
+  const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, every_sample, stop);
   if (!error) return tl::unexpected(error.error());
   placed.max_error_m = RoundPosition({error->max_m, 0, 0}).x;
   return placed;

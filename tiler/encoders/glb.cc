@@ -13,7 +13,7 @@
 #include "proto/mesh/skirt.h"
 #include "proto/mesh/tile_normals.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/mend_mesh.h"
+#include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
 
 namespace terrace::tiler {
@@ -48,7 +48,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
                           double wanted_error_m, double skirt_error_m, proto::PositionWidth width,
                           const std::stop_token& stop) {
   const Clock::time_point start = Clock::now();
-  Result<StartedMesh> started = StartMesh(*dataset.source, lattice, refinement, dataset.rules, wanted_error_m, stop);
+  Result<ReplayedMesh> started = ReplayMesh(*dataset.source, lattice, refinement, dataset.rules, wanted_error_m, stop);
   if (!started) return tl::unexpected(std::move(started).error());
   MeshedGlb meshed;
   meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
@@ -56,7 +56,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   tin::TinMesh& mesh = started->mesh;
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
   const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
-  proto::TileMeter meter(lattice, started->error_m);
+  proto::TileErrorMeter meter(lattice, started->error_m);
   std::vector<proto::GridPoint> points;
   std::vector<geo::Vec3> positions;
   const auto measure = [&](const tin::TinMesh& rounded) {
@@ -65,7 +65,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
     positions = proto::GridPositions(points, step_m);
     return meter.MeasureFlat(rounded, positions);
   };
-  const Result<proto::TileError> error = MendMesh(mesh, measure, proto::kMaxTileVertices, stop);
+  const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));

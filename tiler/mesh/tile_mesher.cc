@@ -15,8 +15,8 @@
 #include "proto/mesh/edge_steps.h"
 #include "proto/mesh/tile_mesh.h"
 #include "tiler/mesh/inner_vertices.h"
-#include "tiler/mesh/mend_mesh.h"
-#include "tiler/mesh/refine_plan.h"
+#include "tiler/mesh/refine_options.h"
+#include "tiler/mesh/restore_error_bound.h"
 
 namespace terrace::tiler {
 namespace {
@@ -44,13 +44,13 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
 // Quantizes, and inserts the samples that quantization pushed over the bound.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
                           double error_m, const std::stop_token& stop) {
-  proto::TileMeter meter(lattice, error_m);
+  proto::TileErrorMeter meter(lattice, error_m);
   MeshedTile meshed;
   const auto measure = [&](const tin::TinMesh& rounded) {
     meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
     return meter.Measure(meshed.tile);
   };
-  const Result<proto::TileError> error = MendMesh(mesh, measure, proto::kMaxTileVertices, stop);
+  const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile));
@@ -112,25 +112,26 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   return *std::move(field);
 }
 
-tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion) {
-  tin::GreedyOptions plan = MakeRefinePlan(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
+tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
+                                   tin::Criterion criterion) {
+  tin::GreedyOptions plan = MakeRefineOptions(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
   plan.criterion = criterion;
   return plan;
 }
 
-Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
-                              const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                              const std::stop_token& stop) {
+Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+                                const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                                const std::stop_token& stop) {
   double error_m = wanted_error_m;
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
-          : RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, rules.criterion), 2, error_m, stop);
+          : RefineWithinFormat(FieldOf(lattice), RefineOptionsOf(source, lattice, rules.criterion), 2, error_m, stop);
   if (mesh && rules.compact) {
-    mesh = Compact(FieldOf(lattice), *mesh, PlanOf(source, lattice, rules.criterion), error_m, stop);
+    mesh = Compact(FieldOf(lattice), *mesh, RefineOptionsOf(source, lattice, rules.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  return StartedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
+  return ReplayedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
 }
 
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
@@ -138,7 +139,7 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
                             const std::stop_token& stop) {
   const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
   const Clock::time_point start = Clock::now();
-  Result<StartedMesh> started = StartMesh(source, lattice, refinement, rules, wanted_error_m, stop);
+  Result<ReplayedMesh> started = ReplayMesh(source, lattice, refinement, rules, wanted_error_m, stop);
   if (!started) return tl::unexpected(std::move(started).error());
   double error_m = started->error_m;
   const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
@@ -147,8 +148,8 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
   error_m = wanted_error_m;
-  Result<tin::TinMesh> mesh =
-      RefineWithinFormat(FieldOf(lattice), PlanOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
+  Result<tin::TinMesh> mesh = RefineWithinFormat(
+      FieldOf(lattice), RefineOptionsOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
   meshed = Finish(*std::move(mesh), lattice, steps, error_m, stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {

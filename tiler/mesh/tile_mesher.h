@@ -29,7 +29,7 @@ struct MeshedTile {
   std::chrono::microseconds replayed{};  // time until the mesh was replayed, before quantizing and measuring
 };
 
-struct StartedMesh {
+struct ReplayedMesh {
   tin::TinMesh mesh;
   double error_m =
       0;  // bound that holds inside the tile; larger than requested if the format's vertex limit was reached
@@ -41,19 +41,20 @@ tl::unexpected<Error> Cancelled();
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::LatticeView& lattice);
 
-// Options of the tile's refinement, which serves every error (refine_plan.h).
-tin::GreedyOptions PlanOf(const dem::DemSource& source, const proto::LatticeView& lattice, tin::Criterion criterion);
+// Options of the tile's refinement, which serves every error (refine_options.h).
+tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
+                                   tin::Criterion criterion);
 
 // Replays the refinement to the error and runs the drop pass if the rules ask for it. The mesh is not yet quantized.
 // `refinement` as for MeshTile. kCancelled: stopped.
-Result<StartedMesh> StartMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
-                              const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                              const std::stop_token& stop);
+Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+                                const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                                const std::stop_token& stop);
 
-// StartMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
-// run with PlanOf to this error or a finer one, or until the format's vertex limit; in that case the inside is coarser
-// than requested and the edges are not. If quantization would flip a triangle, the tile is meshed with the default
-// rules. kCancelled: stopped.
+// ReplayMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
+// run with RefineOptionsOf to this error or a finer one, or until the format's vertex limit; in that case the inside is
+// coarser than requested and the edges are not. If quantization would flip a triangle, the tile is meshed with the
+// default rules. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
                             const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
                             const std::stop_token& stop);

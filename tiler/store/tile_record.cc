@@ -138,13 +138,13 @@ Result<RefinedTile> ParseRefinedTile(std::string_view bytes) {
   return RefinedTile{std::move(heights), *std::move(refinement), error_m};
 }
 
-std::string Seal(std::string_view key, std::string value) {
+std::string AddChecksum(std::string_view key, std::string value) {
   const std::uint64_t checksum = Checksum(key, value);
   value.append(reinterpret_cast<const char*>(&checksum), sizeof(checksum));
   return value;
 }
 
-std::optional<std::string_view> Unseal(std::string_view key, std::string_view sealed) {
+std::optional<std::string_view> StripChecksum(std::string_view key, std::string_view sealed) {
   std::uint64_t checksum = 0;
   if (sealed.size() < sizeof(checksum)) return std::nullopt;
   const std::string_view value = sealed.substr(0, sealed.size() - sizeof(checksum));

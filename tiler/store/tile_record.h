@@ -28,9 +28,9 @@ std::string SerializeRefinedTile(const RefinedTile& tile);
 Result<RefinedTile> ParseRefinedTile(std::string_view bytes);
 
 // Values of a store with a checksum over key and value, so that a damaged or misplaced value is detected.
-std::string Seal(std::string_view key, std::string value);
+std::string AddChecksum(std::string_view key, std::string value);
 
 // The value within `sealed`, or nothing if its bits, length or key differ (with a probability of 1 - 2^-64).
-std::optional<std::string_view> Unseal(std::string_view key, std::string_view sealed);
+std::optional<std::string_view> StripChecksum(std::string_view key, std::string_view sealed);
 
 }  // namespace terrace::tiler

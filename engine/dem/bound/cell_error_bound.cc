@@ -40,7 +40,7 @@ class CellSurface {
   void Widen(double error) { widened_ += error; }
 
   // An upper bound of the distance between a sample and the surface; 0 if the position is outside the cell.
-  double Apart(const Position& at, double sample) const {
+  double DistanceBound(const Position& at, double sample) const {
     double u = 0.5, v = 0.5, u_slack = std::numeric_limits<double>::infinity(), v_slack = u_slack;
     constexpr int kSteps = 4;
     for (int step = 0; step < kSteps; ++step) {
@@ -92,8 +92,8 @@ SampleBox CellErrorBound::Clipped(SampleBox box) const {
 
 // The largest distance between the heights served at a cell's nodes and heights of the raster grid within these bounds,
 // in its vertical datum.
-double CellErrorBound::Apart(const TileCell& cell, double lowest, double highest) const {
-  double error = 0, geoid_error = geoid_.Over(cell.box());
+double CellErrorBound::DistanceBound(const TileCell& cell, double lowest, double highest) const {
+  double error = 0, geoid_error = geoid_.BoundOver(cell.box());
   std::array<double, 4> geoid{};
   if (!std::isfinite(geoid_error)) {  // not known at some node
     const HeightRange range = geoid_.RangeOf(cell.box());
@@ -109,7 +109,7 @@ double CellErrorBound::Apart(const TileCell& cell, double lowest, double highest
   return error + geoid_error;
 }
 
-double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
+double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) const {
   // If members are misplaced, samples of the cell may count as neighbouring ones. The last average of an axis may be up
   // to twice as near.
   const Position& off = tables_.misplacement();
@@ -139,12 +139,12 @@ double CellErrorBound::OfAverages(const TileCell& cell, bool& has_voids) const {
   const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
                           std::min(around.east, window.column + window.columns - 1),
                           std::min(around.south, window.row + window.rows - 1)};
-  const double error = OfBox(cell, read, has_voids);
+  const double error = BoundByBox(cell, read, has_voids);
   return read == around ? error : kUnknownError;
 }
 
 // A bound from the averages in a box of the window.
-double CellErrorBound::OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
+double CellErrorBound::BoundByBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
   const GridWindow& window = trace_.window;
   double lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = averages.north; row <= averages.south; ++row) {
@@ -161,11 +161,11 @@ double CellErrorBound::OfBox(const TileCell& cell, const SampleBox& averages, bo
       tables_.AveragingError(static_cast<double>(averages.west), static_cast<double>(averages.north),
                              static_cast<double>(averages.east), static_cast<double>(averages.south));
   if (lowest > highest) return averaging > 0 ? kUnknownError : 0;
-  return Apart(cell, lowest, highest) + averaging;
+  return DistanceBound(cell, lowest, highest) + averaging;
 }
 
 // A bound from the averages near the samples in a box of pixels; infinite if some were not read.
-double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& box) const {
+double CellErrorBound::BoundByAveragesNear(const TileCell& cell, const PixelBounds& box) const {
   const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
   std::int64_t left = index(box.west), right = index(box.east) + 1;
   // One average more, because the last average of an axis may cover fewer pixels and lie nearer.
@@ -184,7 +184,7 @@ double CellErrorBound::OfAveragesNear(const TileCell& cell, const PixelBounds& b
     if (turn != 0 && !grid_.wraps()) continue;
     if (left + shift < window.column || right + shift >= window.column + window.columns) continue;
     bool has_voids = false;
-    return OfBox(cell, {left + shift, top, right + shift, bottom}, has_voids);
+    return BoundByBox(cell, {left + shift, top, right + shift, bottom}, has_voids);
   }
   return kUnknownError;
 }
@@ -216,16 +216,16 @@ bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
   return meets(turn) || meets(-turn);
 }
 
-double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool fills,
-                                      std::optional<CellSamples>& place) const {
+double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
+                                           std::optional<CellSamples>& place) const {
   const HeightRange& all = grid_.heights();
   const auto corners = CornersOf(cell);
-  if (!corners) return Apart(cell, all.min, all.max);
+  if (!corners) return DistanceBound(cell, all.min, all.max);
   PixelBounds box;
   for (const Position& corner : *corners) box.Add(corner.x, corner.y);
   // A margin that exceeds the curvature of the cell's edges. Samples are at the pixels' centres.
   constexpr double kBulge = 1.0 / 32;
-  const double halo = gives_way ? 1 : 0;
+  const double halo = may_blend ? 1 : 0;
   const Position& off = tables_.misplacement();
   box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
   if (fills) {
@@ -235,7 +235,7 @@ double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool
     fills = grid_.Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
     if (fills) box = wide;
   }
-  if (IsOnBothEnds(box)) return Apart(cell, all.min, all.max);
+  if (IsOnBothEnds(box)) return DistanceBound(cell, all.min, all.max);
 
   BlockRange range;
   for (const int turn : {0, -1, 1}) {
@@ -246,21 +246,21 @@ double CellErrorBound::OfSurroundings(const TileCell& cell, bool gives_way, bool
                              static_cast<double>(in.south)));
   }
   if (range.min > range.max) return 0;
-  double error = Apart(cell, range.min, range.max);
+  double error = DistanceBound(cell, range.min, range.max);
   if (fills) return error;
-  error = std::min(error, OfAveragesNear(cell, box));
-  place = CellSamples{*corners, Clipped(CentresIn(box, 0)), gives_way};
+  error = std::min(error, BoundByAveragesNear(cell, box));
+  place = CellSamples{*corners, Clipped(CentresIn(box, 0)), may_blend};
   if (trace_.factor > 1) return error;
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;
-    error = std::min(error, OfSamples(cell, *place, trace_.window, trace_.samples,
-                                      turn * static_cast<std::int64_t>(grid_.columns())));
+    error = std::min(error, BoundBySamples(cell, *place, trace_.window, trace_.samples,
+                                           turn * static_cast<std::int64_t>(grid_.columns())));
   }
   return error;
 }
 
-double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
-                                 const std::vector<float>& samples, std::int64_t turn) const {
+double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+                                      const std::vector<float>& samples, std::int64_t turn) const {
   const SampleBox& in = place.samples;
   if (in.empty()) return 0;
   if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
@@ -273,7 +273,7 @@ double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place,
   const double slack = kPosition * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
   CellSurface surface(place.corners, is_separable, {off.x + slack, off.y + slack});
-  const double geoid_error = geoid_.Over(cell.box());
+  const double geoid_error = geoid_.BoundOver(cell.box());
   const bool is_known = std::isfinite(geoid_error);
   const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
   for (std::size_t k = 0; k < 4; ++k) {
@@ -290,11 +290,11 @@ double CellErrorBound::OfSamples(const TileCell& cell, const CellSamples& place,
       if (std::isnan(sample)) continue;
       lowest = std::min(lowest, sample), highest = std::max(highest, sample);
       if (place.between) continue;
-      error =
-          std::max(error, surface.Apart({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
+      error = std::max(
+          error, surface.DistanceBound({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
     }
   }
-  if (place.between && lowest <= highest) error = Apart(cell, lowest, highest);
+  if (place.between && lowest <= highest) error = DistanceBound(cell, lowest, highest);
   return error;
 }
 

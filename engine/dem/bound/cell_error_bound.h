@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/dem/bound/geoid_error_bound.h"
-#include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/grid_statistics.h"
 #include "engine/dem/bound/tile_cells.h"
 #include "engine/dem/mosaic/raster_grid.h"
 
@@ -35,7 +35,7 @@ struct SampleBox {
 class CellErrorBound {
  public:
   // The arguments must outlive this object.
-  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
+  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridStatistics& tables,
                  const GeoidErrorBound& geoid)
       : tile_(tile),
         grid_(grid),
@@ -48,7 +48,7 @@ class CellErrorBound {
   // Returns a bound from the averages that the cell's nodes are interpolated from: the surface lies between the
   // averages, and the samples lie within the averaging error of it. Sets `has_voids` if some averages are void.
   // Precondition: all nodes of the cell took their height from the raster grid.
-  double OfAverages(const TileCell& cell, bool& has_voids) const;
+  double BoundByAverages(const TileCell& cell, bool& has_voids) const;
 
   // The positions of a cell's nodes in pixels, and the samples that may lie in the cell.
   struct CellSamples {
@@ -57,28 +57,28 @@ class CellErrorBound {
     bool between = false;  // heights between samples count as well
   };
 
-  // Returns a bound for any cell from the tables, averages and samples that were read. `gives_way`: the raster grid is
+  // Returns a bound for any cell from the tables, averages and samples that were read. `may_blend`: the raster grid is
   // blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets `place`
-  // if OfSamples can give a tighter bound from samples that have not been read.
-  double OfSurroundings(const TileCell& cell, bool gives_way, bool fills, std::optional<CellSamples>& place) const;
+  // if BoundBySamples can give a tighter bound from samples that have not been read.
+  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, std::optional<CellSamples>& place) const;
 
   // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of
   // the window's columns against the cell's, in columns.
-  double OfSamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
-                   const std::vector<float>& samples, std::int64_t turn) const;
+  double BoundBySamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+                        const std::vector<float>& samples, std::int64_t turn) const;
 
  private:
   std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;
   bool IsOnBothEnds(const PixelBounds& box) const;
   SampleBox Clipped(SampleBox box) const;
-  double Apart(const TileCell& cell, double lowest, double highest) const;
-  double OfBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
-  double OfAveragesNear(const TileCell& cell, const PixelBounds& box) const;
+  double DistanceBound(const TileCell& cell, double lowest, double highest) const;
+  double BoundByBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
+  double BoundByAveragesNear(const TileCell& cell, const PixelBounds& box) const;
 
   const TileNodes tile_;
   const RasterGrid& grid_;
   const GridTrace& trace_;
-  const GridTables& tables_;
+  const GridStatistics& tables_;
   const GeoidErrorBound& geoid_;
   const std::int64_t columns_, rows_;  // of averages of the trace's factor
 };

@@ -52,7 +52,7 @@ GeoidErrorBound::GeoidErrorBound(const TileNodes& tile, const Undulations* geoid
   if (patch) patch_ = *std::move(patch);
 }
 
-double GeoidErrorBound::Over(const CellBox& box) const {
+double GeoidErrorBound::BoundOver(const CellBox& box) const {
   if (geoid_ == nullptr) return 0;
   if (patch_) return OverNodes(box);
   if (geoid_->geoid().grid() != nullptr) return OverCoarse(box);

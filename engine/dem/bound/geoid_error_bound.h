@@ -21,7 +21,7 @@ class GeoidErrorBound {
   double AddedAt(std::size_t node) const { return added_[node]; }
 
   // Returns the bound for a box. 0 if no geoid is added; infinite if undulations are not known there.
-  double Over(const CellBox& box) const;
+  double BoundOver(const CellBox& box) const;
 
   // Returns a range that contains all undulations in a box. Precondition: is_added().
   HeightRange RangeOf(const CellBox& box) const {

@@ -64,7 +64,7 @@ class Lanes {
 }  // namespace
 
 SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
-                                   const GridTables& tables, const GeoidErrorBound& geoid, bool blends)
+                                   const GridStatistics& tables, const GeoidErrorBound& geoid, bool blends)
     : tile_(tile),
       trace_(trace),
       tables_(tables),
@@ -229,14 +229,14 @@ bool SmoothErrorBound::MeasureNodes(const CellBox& box, Steps& steps, PixelBound
   return std::isfinite(finite);
 }
 
-double SmoothErrorBound::Over(const CellBox& box) const {
+double SmoothErrorBound::BoundOver(const CellBox& box) const {
   Steps steps;
   PixelBounds at;
   if (!Measure(box, steps, at)) return kUnknown;
   Bends bends;
   const SampleRange range = RangeOf(at);
   if (!Measure(range, bends)) return kUnknown;
-  return Largest(bends, steps) + geoid_.Over(box) + LargestBlend(box) +
+  return Largest(bends, steps) + geoid_.BoundOver(box) + LargestBlend(box) +
          tables_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
                                 static_cast<double>(range.right), static_cast<double>(range.bottom));
 }

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/dem/bound/geoid_error_bound.h"
-#include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/grid_statistics.h"
 #include "engine/dem/bound/tile_cells.h"
 #include "engine/dem/mosaic/raster_grid.h"
 
@@ -16,7 +16,7 @@ namespace terrace::dem {
 class SmoothErrorBound {
  public:
   // `blends`: raster grids are blended where one gives way to the next. The other arguments must outlive this object.
-  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridTables& tables,
+  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridStatistics& tables,
                    const GeoidErrorBound& geoid, bool blends);
 
   // Makes Over faster for boxes of cell rows `south` to `north`. Results do not depend on it.
@@ -24,7 +24,7 @@ class SmoothErrorBound {
 
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
   // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
-  double Over(const CellBox& box) const;
+  double BoundOver(const CellBox& box) const;
 
   // Returns the bounds of the box's nodes, in averages; empty if one of them is not evenly spaced.
   PixelBounds BoundsOf(const CellBox& box) const;
@@ -61,7 +61,7 @@ class SmoothErrorBound {
 
   const TileNodes tile_;
   const GridTrace& trace_;
-  const GridTables& tables_;
+  const GridStatistics& tables_;
   const GeoidErrorBound& geoid_;
   const bool blends_;
   const Position misplacement_;  // of samples, in averages

@@ -9,7 +9,7 @@
 
 #include "engine/dem/bound/cell_error_bound.h"
 #include "engine/dem/bound/geoid_error_bound.h"
-#include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/grid_statistics.h"
 #include "engine/dem/bound/smooth_error_bound.h"
 #include "engine/dem/dem_types.h"
 
@@ -59,7 +59,8 @@ class LooseCells {
       if (!samples) return tl::unexpected(samples.error());
       for (const Cell& loose : group.cells) {
         if (loose.error <= bound) continue;
-        bound = std::max(bound, std::min(loose.error, single_.OfSamples(loose.cell, loose.place, window, *samples, 0)));
+        bound = std::max(bound,
+                         std::min(loose.error, single_.BoundBySamples(loose.cell, loose.place, window, *samples, 0)));
       }
     }
     return {};
@@ -117,13 +118,13 @@ class GridErrorBound {
 
   // If raster grids are blended, every contributing raster grid is bounded separately, because blended heights lie
   // between them. Filled heights count, too.
-  bool GivesWay(const CellBox& box) const {
+  bool MayBlend(const CellBox& box) const {
     if (!tile_.blends_) return false;
     const PixelBounds at = smooth_.BoundsOf(box);
     const double factor = trace_.factor;
     if (!(at.west <= at.east)) return true;
     if (trace_.includes_filled && CountInFull(at)) return false;
-    return grid_.GivesWay({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
+    return grid_.MayBlend({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
                           trace_.factor);
   }
 
@@ -182,24 +183,24 @@ class GridErrorBound {
   // is a quarter of is blended.
   void AddBox(const CellBox& box, bool may_give_way) {
     if (!Touches(box)) return;
-    const bool gives_way = may_give_way && GivesWay(box), is_filled = gives_way && MayBeFilled(box);
+    const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
-    const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.Over(box);
-    if (!std::isfinite(error)) return Divide(box, gives_way);
+    const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
+    if (!std::isfinite(error)) return Divide(box, may_blend);
     Raise(error);
-    if (gives_way) return;
+    if (may_blend) return;
     for (int j = box.south; j < box.north; ++j) {
       const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
       std::fill_n(first, box.east - box.west, 1);
     }
   }
 
-  void Divide(const CellBox& box, bool gives_way) {
+  void Divide(const CellBox& box, bool may_blend) {
     constexpr int kSmallest = 2;
     if (box.east - box.west <= kSmallest) {
       for (int j = box.south; j < box.north; ++j) {
         for (int i = box.west; i < box.east; ++i) {
-          if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, gives_way && GivesWay({i, j, i + 1, j + 1}));
+          if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, may_blend && MayBlend({i, j, i + 1, j + 1}));
         }
       }
       return;
@@ -208,35 +209,35 @@ class GridErrorBound {
     for (const CellBox& quarter :
          {CellBox{box.west, box.south, middle_x, middle_y}, CellBox{middle_x, box.south, box.east, middle_y},
           CellBox{box.west, middle_y, middle_x, box.north}, CellBox{middle_x, middle_y, box.east, box.north}}) {
-      if (!IsCovered(quarter)) AddBox(quarter, gives_way);
+      if (!IsCovered(quarter)) AddBox(quarter, may_blend);
     }
   }
 
-  void AddCell(int i, int j, bool gives_way) {
-    const bool fills = gives_way && !trace_.includes_filled;
+  void AddCell(int i, int j, bool may_blend) {
+    const bool fills = may_blend && !trace_.includes_filled;
     const TileCell cell = nodes_.Cell(i, j);
     if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return std::isnan(trace_.heights[node]); })) {
-      if (Touches(cell.box())) AddUneven(cell, gives_way, fills, kUnknownError);
+      if (Touches(cell.box())) AddUneven(cell, may_blend, fills, kUnknownError);
       return;
     }
     bool has_voids = false;
-    double error = single_.OfAverages(cell, has_voids);
+    double error = single_.BoundByAverages(cell, has_voids);
     if (fills && (has_voids || MayBeFilled(cell.box()))) return AddUneven(cell, true, true, kUnknownError);
     double smooth = kUnknownError;
     if (!has_voids) {
-      if (!gives_way) tile_.covered_[CellIndex(i, j)] = 1;
-      smooth = smooth_.Over(cell.box());
+      if (!may_blend) tile_.covered_[CellIndex(i, j)] = 1;
+      smooth = smooth_.BoundOver(cell.box());
       if (smooth < error) error = smooth;
     }
     if (std::isfinite(smooth)) return Raise(error);
-    AddUneven(cell, gives_way, fills, error);
+    AddUneven(cell, may_blend, fills, error);
   }
 
   // `known`: a bound known so far.
-  void AddUneven(const TileCell& cell, bool gives_way, bool fills, double known) {
+  void AddUneven(const TileCell& cell, bool may_blend, bool fills, double known) {
     if (known <= tile_.bound_) return;
     std::optional<CellErrorBound::CellSamples> place;
-    const double error = std::min(known, single_.OfSurroundings(cell, gives_way, fills, place));
+    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, place));
     if (error <= tile_.bound_) return;
     if (!place || !LooseCells::MayRead(trace_.factor)) return Raise(error);
     if (!has_loose_group_) loose_.BeginGroup();
@@ -248,7 +249,7 @@ class GridErrorBound {
   const TileNodes nodes_;
   const RasterGrid& grid_;
   const GridTrace& trace_;
-  const GridTables tables_;
+  const GridStatistics tables_;
   const GeoidErrorBound geoid_;
   SmoothErrorBound smooth_;
   const CellErrorBound single_;

@@ -41,7 +41,7 @@ IdleList& OfProcess() {
 
 }  // namespace
 
-void SetMostIdle(std::size_t count) {
+void SetMaxIdle(std::size_t count) {
   Items gone;  // closed after the lock is released, here and below: closing a file may take long
   IdleList& list = OfProcess();
   const std::lock_guard lock(list.mutex);

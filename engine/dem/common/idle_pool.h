@@ -13,7 +13,7 @@
 namespace terrace::dem {
 
 // Sets the limit of idle objects in all pools of the process. The default is 256.
-void SetMostIdle(std::size_t count);
+void SetMaxIdle(std::size_t count);
 
 class AnyIdlePool {
  public:

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "engine/core/bytes.h"
-#include "engine/dem/common/all_cores.h"
 #include "engine/dem/common/open_file.h"
+#include "engine/dem/common/parallel_for.h"
 #include "engine/dem/common/source_log.h"
 
 namespace terrace::dem {
@@ -156,7 +156,7 @@ Result<ContentHash> HashFile(const std::string& path, const FileStamp& stamp, co
 
 Result<ContentHash> HashFiles(const StampedFiles& files, const FileContentOptions& options) {
   std::vector<std::optional<Result<ContentHash>>> hashes(files.size());
-  ForEachOnAllCores(files.size(), [&](std::size_t i) {
+  ParallelFor(files.size(), [&](std::size_t i) {
     hashes[i] = HashFile(files.path(i), files.stamp(i), options);
     return hashes[i]->has_value();
   });

@@ -116,7 +116,7 @@ void SetGdalCache(std::size_t bytes) {
 
 void SetOpenSources(std::size_t idle, std::size_t vrt_parts) {
   InitGdal();
-  SetMostIdle(idle);
+  SetMaxIdle(idle);
   CPLSetConfigOption("GDAL_MAX_DATASET_POOL_SIZE", std::to_string(vrt_parts).c_str());
 }
 

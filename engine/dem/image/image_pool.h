@@ -34,7 +34,7 @@ class ImagePool {
   Result<Borrowed> Borrow(int factor);
 
   // The largest factor that ImageBins can average to from the available sizes.
-  int MostAveraged() const;
+  int LargestFactor() const;
 
   // As HandlePool::CheckUnchanged.
   Result<void> CheckUnchanged();

@@ -88,7 +88,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
                          extent)) {
     return std::nullopt;
   }
-  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, impl_->spacing)), pool.MostAveraged());
+  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, impl_->spacing)), pool.LargestFactor());
   auto image = pool.Borrow(factor);
   if (!image) return tl::unexpected(image.error());
 

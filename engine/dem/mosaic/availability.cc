@@ -35,12 +35,12 @@ Ranges Merged(Ranges ranges, const Ranges& others) {
 
 }  // namespace
 
-std::vector<Ranges> AvailableTiles(std::span<const Reach> sources) {
-  const int deepest = std::ranges::max_element(sources, {}, &Reach::depth)->depth;
+std::vector<Ranges> AvailableTiles(std::span<const SourceExtent> sources) {
+  const int deepest = std::ranges::max_element(sources, {}, &SourceExtent::depth)->depth;
   std::vector<Ranges> levels(static_cast<std::size_t>(deepest) + 1);
   // Every level is derived from the tiles of the deepest one, so that rounding cannot lose an ancestor.
   std::vector<Ranges> worth(levels.size());  // of the deepest level, by the depth of their source
-  for (const Reach& source : sources) {
+  for (const SourceExtent& source : sources) {
     const Ranges tiles = TilesTouching(source.footprint, deepest);
     Ranges& those = worth[static_cast<std::size_t>(source.depth)];
     those.insert(those.end(), tiles.begin(), tiles.end());

@@ -10,7 +10,7 @@
 namespace terrace::dem {
 
 // A source's footprint, without padding, and the deepest level that its resolution justifies.
-struct Reach {
+struct SourceExtent {
   Footprint footprint;
   int depth = 0;
 };
@@ -22,6 +22,6 @@ struct Reach {
 //   hole.
 // A level with too many ranges for its documents gets fewer and larger ones, which include tiles outside all sources.
 // Precondition: `sources` is not empty.
-std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const Reach> sources);
+std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const SourceExtent> sources);
 
 }  // namespace terrace::dem

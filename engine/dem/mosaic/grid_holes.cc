@@ -99,7 +99,7 @@ Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const 
     const auto height = Interpolate(*guess, coarse, cells[i]);
     grid.heights[samples[i]] = height ? static_cast<float>(*height) : SampleRules::kVoid;
   }
-  Relax(samples, grid);
+  RelaxHarmonic(samples, grid);
   return {};
 }
 
@@ -116,7 +116,7 @@ Result<std::vector<float>> RasterGrid::ReadSmooth(int factor, const GridWindow& 
     const std::vector<VoidRegion> regions = RegionsIn(*grid, window, open);
     if (std::ranges::any_of(regions, &VoidRegion::is_open)) continue;
     for (const VoidRegion& region : regions) {
-      if (!region.is_large()) Solve(region, *grid);
+      if (!region.is_large()) SolveHarmonic(region, *grid);
     }
     const auto guessed = GuessLarge(factor, window, regions, *grid, stop);
     if (!guessed) return tl::unexpected(guessed.error());

@@ -169,7 +169,7 @@ void RasterGrid::AddTo(ContentHasher& hasher) const {
   }
 }
 
-bool RasterGrid::GivesWay(const Box& pixels, int factor) const {
+bool RasterGrid::MayBlend(const Box& pixels, int factor) const {
   Box wide = pixels;
   wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
   return wide.south < 0 || wide.north > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
@@ -208,7 +208,7 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
   for (Box& box : boxes) {
     leaves |= box.south < 0 || box.north > height_;
     if (options_.feather_m > 0) {
-      blends |= GivesWay(box, factor);
+      blends |= MayBlend(box, factor);
     }
     // Bilinear interpolation reaches one and a half samples of the grid.
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);

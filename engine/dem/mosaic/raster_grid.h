@@ -24,7 +24,7 @@
 #include "engine/dem/mosaic/grid_cover.h"
 #include "engine/dem/mosaic/grid_members.h"
 #include "engine/dem/mosaic/grid_voids.h"
-#include "engine/dem/mosaic/membrane.h"
+#include "engine/dem/mosaic/harmonic_fill.h"
 #include "engine/dem/raster/grid_cells.h"
 #include "engine/geo/mercator_grid.h"
 
@@ -133,7 +133,7 @@ class RasterGrid {
 
   // Returns true if samples in a box of pixels may have a blend weight below 1, averaged by this factor or a smaller
   // one: an edge or a void lies within the feather width of the box.
-  bool GivesWay(const Box& pixels, int factor) const;
+  bool MayBlend(const Box& pixels, int factor) const;
 
   // Returns the range of the pixels in a box. Pixels that no member covers are voids.
   BlockRange Ranges(const Box& pixels) const;

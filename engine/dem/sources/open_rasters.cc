@@ -12,7 +12,7 @@
 #include <string_view>
 #include <utility>
 
-#include "engine/dem/common/all_cores.h"
+#include "engine/dem/common/parallel_for.h"
 #include "engine/dem/common/source_log.h"
 #include "engine/dem/gdal/driver_list.h"
 #include "engine/dem/gdal/raster_file.h"
@@ -38,7 +38,7 @@ struct LeftOut {
 
 // Nothing: the file is used.
 std::optional<LeftOut> LeftOutOf(const DemFile& file) {
-  if (!file.may_be_other) return std::nullopt;
+  if (!file.skip_if_no_raster) return std::nullopt;
   if (!IsOneLine(file.path)) {
     return LeftOut{true, EscapeControls(file.path) + " (a control character in its name: rename it)"};
   }
@@ -63,7 +63,7 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
 // Removes files of folders that are no rasters. Returns those that look like rasters, with reasons.
 std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::optional<LeftOut>> verdicts(files.size());
-  ForEachOnAllCores(files.size(), [&](std::size_t i) {
+  ParallelFor(files.size(), [&](std::size_t i) {
     verdicts[i] = LeftOutOf(files[i]);
     return true;
   });
@@ -119,7 +119,7 @@ class Opening {
 
   // Datasets that are split into files may have files without a height.
   bool IsNothing(std::size_t i, const Opened& opened) const {
-    return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].may_be_other;
+    return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].skip_if_no_raster;
   }
 
   // Nothing: not begun.
@@ -160,7 +160,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
                      "{}: none of the files in this folder is a raster; name a folder of rasters or a raster", folder);
   }
   Opening opening(files, options);
-  ForEachOnAllCores(files.size(), [&opening](std::size_t i) { return opening.Open(i); });
+  ParallelFor(files.size(), [&opening](std::size_t i) { return opening.Open(i); });
   Rasters rasters;
   std::vector<DemFile> kept;
   std::vector<std::string> without_height;

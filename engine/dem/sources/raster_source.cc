@@ -252,7 +252,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (source->memory_averages_) source->info_.least_kept_factor = source->memory_averages_->least_factor();
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   source->info_.found_voids = found_voids;
-  source->info_.counts_from = source->vertical_.name;
+  source->info_.datum_in_use = source->vertical_.name;
   if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
   source->info_.spacing_m = spacing->finer;
   source->info_.bounds = source->footprint_.Bounds();

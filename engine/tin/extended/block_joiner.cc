@@ -7,7 +7,7 @@
 
 namespace terrace::tin {
 
-BlockJoiner::BlockJoiner(const FieldCut& cut)
+BlockJoiner::BlockJoiner(const FieldPartition& cut)
     : cut_(&cut), ids_by_x_(static_cast<std::size_t>(cut.width())), ids_by_y_(static_cast<std::size_t>(cut.height())) {
   const auto last_x = static_cast<std::uint16_t>(cut.width() - 1);
   const auto last_y = static_cast<std::uint16_t>(cut.height() - 1);

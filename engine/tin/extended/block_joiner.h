@@ -1,11 +1,11 @@
-// Joins the meshes of a field's blocks (field_cut.h) to one mesh.
+// Joins the meshes of a field's blocks (field_partition.h) to one mesh.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/mesh/tin_mesh.h"
 
 namespace terrace::tin {
@@ -17,7 +17,7 @@ namespace terrace::tin {
 class BlockJoiner {
  public:
   // `cut` must outlive this object.
-  explicit BlockJoiner(const FieldCut& cut);
+  explicit BlockJoiner(const FieldPartition& cut);
 
   // Precondition: `block_mesh` is MeshBlock's mesh of block number added(). All blocks are meshed to the same error.
   void Add(const TinMesh& block_mesh);
@@ -30,7 +30,7 @@ class BlockJoiner {
  private:
   std::uint32_t IdOf(SamplePosition vertex, const FieldBlock& block);
 
-  const FieldCut* cut_;
+  const FieldPartition* cut_;
   std::size_t added_ = 0;
   TinMesh mesh_;
 

@@ -77,8 +77,8 @@ Result<tiler::Dataset> OpenDataset(const BakeInput& input, const StopSignals& si
                                   : dem::SetSourcePolicy({input.config.data_roots, input.config.allowed_prefixes,
                                                           input.config.allowed_drivers});
   if (!policy) return tl::unexpected(policy.error());
-  if (const auto readable = TryReading(input.dataset); !readable) return tl::unexpected(readable.error());
-  if (const auto allowed = TryPolicy(input.dataset); !allowed) return tl::unexpected(allowed.error());
+  if (const auto readable = CheckReadable(input.dataset); !readable) return tl::unexpected(readable.error());
+  if (const auto allowed = CheckSourcePolicy(input.dataset); !allowed) return tl::unexpected(allowed.error());
   dem::SetGdalCache(input.config.gdal_cache_bytes);
   const dem::RasterCache cache = OpenCache(input.config);
   Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(input.dataset.sources),

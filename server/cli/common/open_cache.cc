@@ -10,7 +10,7 @@
 #include "config/common/cache_place.h"
 #include "engine/dem/statistics/averages_budget.h"
 #include "engine/dem/statistics/cache_folder.h"
-#include "server/cli/common/try_folder.h"
+#include "server/cli/common/check_folder.h"
 
 namespace terrace::cli {
 
@@ -28,7 +28,7 @@ dem::RasterCache OpenCache(const config::Config& config) {
     if (place.empty()) return none("as neither CACHE_DIRECTORY nor XDG_CACHE_HOME nor HOME names a folder");
     std::error_code unknown;
     const bool exists = std::filesystem::is_directory(place, unknown);
-    if (const auto folder = TryFolder(place); !exists && !folder) return none(folder.error().message);
+    if (const auto folder = CheckFolder(place); !exists && !folder) return none(folder.error().message);
   }
   spdlog::info("cache_dir: {}, for up to {} bytes of statistics and averages of sources", place,
                config.cache_dir_bytes);

@@ -26,7 +26,7 @@ std::string NameOf(const std::vector<config::SourceConfig>& sources) {
                      sources.size() == 2 ? "" : "s");
 }
 
-Result<void> TryReading(const config::DatasetConfig& dataset) {
+Result<void> CheckReadable(const config::DatasetConfig& dataset) {
   const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
     // GDAL resolves other names.
     if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
@@ -42,7 +42,7 @@ Result<void> TryReading(const config::DatasetConfig& dataset) {
   return read(dataset.water.mask, ", or for a sea level a number of metres");
 }
 
-Result<void> TryPolicy(const config::DatasetConfig& dataset) {
+Result<void> CheckSourcePolicy(const config::DatasetConfig& dataset) {
   const auto checked = [&](const Result<void>& allowed) -> Result<void> {
     if (allowed) return {};
     return MakeError(allowed.error().code, "dataset {}: {}", dataset.name, allowed.error().message);

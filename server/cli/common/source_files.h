@@ -19,8 +19,8 @@ std::string NameOf(const config::DatasetConfig& dataset);
 
 // Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
 // The error names the first one that is not.
-Result<void> TryReading(const config::DatasetConfig& dataset);
+Result<void> CheckReadable(const config::DatasetConfig& dataset);
 // Checks that the source policy in force (dem::SetSourcePolicy) allows all files of the dataset.
-Result<void> TryPolicy(const config::DatasetConfig& dataset);
+Result<void> CheckSourcePolicy(const config::DatasetConfig& dataset);
 
 }  // namespace terrace::cli

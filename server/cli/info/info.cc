@@ -55,7 +55,7 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   } else if (!info.overviews_unused.empty()) {
     advice.push_back("overviews not used: " + info.overviews_unused);
   }
-  if (info.counts_from.empty()) {
+  if (info.datum_in_use.empty()) {
     advice.push_back(
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
         "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
@@ -106,7 +106,7 @@ void PrintText(const dem::DemInfo& dataset) {
   line("bounds", TextOfBounds(info.bounds));
   line("heights", fmt::format("{} to {} m{}", PlainNumber(info.heights.min), PlainNumber(info.heights.max),
                               info.height_unit.empty() ? "" : ", unit " + info.height_unit));
-  line("datum", info.counts_from.empty() ? "not stated" : info.counts_from);
+  line("datum", info.datum_in_use.empty() ? "not stated" : info.datum_in_use);
   if (!info.vertical_operation.empty()) {
     line("converted", fmt::format("by {}: {:.2f} to {:.2f} m above the ellipsoid, or less", info.vertical_operation,
                                   info.ellipsoidal.min, info.ellipsoidal.max));
@@ -134,7 +134,7 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"data_type", info.data_type},
           {"crs", info.crs},
           {"vertical_datum", info.vertical_datum},
-          {"counts_from", info.counts_from},
+          {"counts_from", info.datum_in_use},
           {"vertical_operation", info.vertical_operation},
           {"ellipsoidal_heights", {{"min", info.ellipsoidal.min}, {"max", info.ellipsoidal.max}}},
           {"found_voids", info.found_voids},

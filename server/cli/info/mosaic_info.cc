@@ -89,7 +89,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
     const bool has_averages = s.least_kept_factor > 0 && s.least_kept_factor <= 4;
     return std::max(s.width, s.height) > 4096 && s.overview_factors.empty() && !has_averages;
   });
-  const auto no_datum = count([](const dem::RasterInfo& s) { return s.counts_from.empty(); });
+  const auto no_datum = count([](const dem::RasterInfo& s) { return s.datum_in_use.empty(); });
   const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
   std::vector<std::string> advice;
   if (const std::ptrdiff_t hidden = CountHidden(info.sources); hidden > 0) {
@@ -156,7 +156,7 @@ std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
                        {"height", source.height},
                        {"crs", source.crs},
                        {"vertical_datum", source.vertical_datum},
-                       {"counts_from", source.counts_from},
+                       {"counts_from", source.datum_in_use},
                        {"vertical_operation", source.vertical_operation},
                        {"spacing_m", source.spacing_m},
                        {"bounds", {source.bounds.west, source.bounds.south, source.bounds.east, source.bounds.north}},

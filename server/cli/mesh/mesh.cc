@@ -28,7 +28,7 @@
 #include "engine/dem/sources/read_raster.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/extended/block_joiner.h"
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
@@ -46,7 +46,7 @@ namespace {
 
 // Returns the joined mesh of all blocks. It does not depend on `threads`, which is at least 1. Shows the number of
 // finished blocks. If a thread throws, stops the others and rethrows.
-tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldCut& cut, double max_error_m,
+tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldPartition& cut, double max_error_m,
                         const tin::GreedyOptions& options, int threads) {
   std::atomic<std::size_t> next = 0;
   std::stop_source failed;
@@ -155,7 +155,7 @@ void RunTo(const tin::GreedyGoal& goal, std::size_t samples, tin::GreedyTriangul
 // Only an error goal applies to each block separately; the other goals apply to the whole raster.
 tin::TinMesh Triangulate(const MeshArguments& arguments, const tin::HeightField& field) {
   if (arguments.max_error >= 0) {
-    const tin::FieldCut cut = tin::FieldCut::For(field, arguments.max_error);
+    const tin::FieldPartition cut = tin::FieldPartition::For(field, arguments.max_error);
     if (cut.size() > 1) return MeshBlocks(field, cut, arguments.max_error, OptionsOf(arguments), arguments.threads);
   }
   tin::GreedyGoal goal;

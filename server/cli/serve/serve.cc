@@ -37,10 +37,10 @@
 #include "server/cli/common/option_flags.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
+#include "server/cli/serve/check_start.h"
 #include "server/cli/serve/descriptor_plan.h"
 #include "server/cli/serve/log.h"
 #include "server/cli/serve/service_manager.h"
-#include "server/cli/serve/try_start.h"
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
@@ -231,7 +231,7 @@ constexpr std::chrono::seconds kStopTime{1};
 
 // Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
 // returns, and its thread cannot be joined.
-class StopLimit {
+class ShutdownWatchdog {
  public:
   // Ends the process with status 1 after `limit`, whatever its threads do. Call once.
   void Begin(std::chrono::milliseconds limit) {
@@ -264,7 +264,7 @@ void MaskSignals(int how, const std::vector<int>& signals) {
 }
 
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
-  if (const int exit_code = TryStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
+  if (const int exit_code = CheckStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
       exit_code != kExitOk)
     return exit_code;
   const std::size_t count = config.datasets.size();
@@ -304,14 +304,14 @@ int Serve(const ServeArguments& arguments) {
   options.listen_socket = passed->value_or(-1);
   const bool tries_address = !passed->has_value();
   const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
-  if (const int exit_code = TryStart(config, options.config, budget, tries_address); exit_code != kExitOk)
+  if (const int exit_code = CheckStart(config, options.config, budget, tries_address); exit_code != kExitOk)
     return exit_code;
   WarnAboutFewDescriptors(config, *budget);
   options.config.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
-  StopLimit stop_limit;  // first, because it limits how long the others take to end
+  ShutdownWatchdog stop_limit;  // first, because it limits how long the others take to end
   Result<server::DiskCache> disk;
   if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());

@@ -33,7 +33,7 @@ void Keep(IdlePool<Thing>& pool, std::vector<int> numbers) {
 
 class IdlePools : public testing::Test {
  protected:
-  ~IdlePools() override { SetMostIdle(std::numeric_limits<std::size_t>::max()); }
+  ~IdlePools() override { SetMaxIdle(std::numeric_limits<std::size_t>::max()); }
 };
 
 TEST_F(IdlePools, GiveBackTheOneUsedLast) {
@@ -46,7 +46,7 @@ TEST_F(IdlePools, GiveBackTheOneUsedLast) {
 }
 
 TEST_F(IdlePools, LetGoOfThoseUsedLongestAgoWhosesoeverTheyAre) {
-  SetMostIdle(3);
+  SetMaxIdle(3);
   IdlePool<Thing> one, other;
   Keep(one, {0, 1, 2});
   EXPECT_TRUE(one.Take());
@@ -56,7 +56,7 @@ TEST_F(IdlePools, LetGoOfThoseUsedLongestAgoWhosesoeverTheyAre) {
   ASSERT_TRUE(kept);
   EXPECT_EQ(kept->number, 2);
   EXPECT_FALSE(one.Take());
-  SetMostIdle(1);
+  SetMaxIdle(1);
   EXPECT_EQ(Thing::alive, 2) << "what is in use does not count";
 }
 
@@ -83,7 +83,7 @@ TEST_F(IdlePools, TakeWhatTheyHaveWithThem) {
 }
 
 TEST_F(IdlePools, AreForManyThreads) {
-  SetMostIdle(5);
+  SetMaxIdle(5);
   IdlePool<Thing> pools[3];
   std::vector<std::thread> threads;
   for (int t = 0; t < 4; ++t) {

@@ -13,8 +13,8 @@
 #include <thread>
 #include <utility>
 
-#include "engine/dem/bound/grid_tables.h"
-#include "engine/dem/common/all_cores.h"
+#include "engine/dem/bound/grid_statistics.h"
+#include "engine/dem/common/parallel_for.h"
 #include "engine/dem/mosaic/grid_voids.h"
 #include "engine/dem/mosaic/raster_grid.h"
 #include "engine/dem/sources/raster_source.h"
@@ -74,7 +74,7 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
 
 // Asks for a box around every position of a trace. How many members were looked at, of one box at most and for all.
 std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
-  const GridTables tables(grid, trace);
+  const GridStatistics tables(grid, trace);
   std::size_t most = 0;
   for (std::size_t n = 0; n < trace.positions.columns() * trace.positions.rows(); ++n) {
     const Position p = trace.positions.At(n % trace.positions.columns(), n / trace.positions.columns());
@@ -362,7 +362,7 @@ TEST(AllCores, WorkIsDoneAtOnceAndOnce) {
   std::vector<int> done(100);
   std::latch both(2);
   bool met = true;
-  ForEachOnAllCores(done.size(), [&](std::size_t i) {
+  ParallelFor(done.size(), [&](std::size_t i) {
     ++done[i];
     if (i > 1) return true;
     // The first two wait for each other.
@@ -379,15 +379,15 @@ TEST(AllCores, WorkIsDoneAtOnceAndOnce) {
 TEST(AllCores, NothingBeginsAfterFalseAndWhatIsThrownComesOut) {
   std::size_t begun = 0;
   std::mutex mutex;
-  EXPECT_THROW(ForEachOnAllCores(100'000,
-                                 [&](std::size_t i) -> bool {
-                                   {
-                                     const std::lock_guard lock(mutex);
-                                     ++begun;
-                                   }
-                                   if (i == 3) throw std::runtime_error("three");
-                                   return true;
-                                 }),
+  EXPECT_THROW(ParallelFor(100'000,
+                           [&](std::size_t i) -> bool {
+                             {
+                               const std::lock_guard lock(mutex);
+                               ++begun;
+                             }
+                             if (i == 3) throw std::runtime_error("three");
+                             return true;
+                           }),
                std::runtime_error);
   EXPECT_LT(begun, 100'000U);
 }

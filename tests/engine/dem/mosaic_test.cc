@@ -400,7 +400,7 @@ TEST(Mosaic, KeepsFewFilesOpen) {
   for (int i = 0; i < 60; ++i) {
     files.push_back({WriteRaster(dir, FlatSquare(i % 10 * 4, 40 - i / 10 * 4, 8, 0.5, i), std::to_string(i) + ".tif")});
   }
-  SetMostIdle(5);
+  SetMaxIdle(5);
   const auto source = OpenOrFail(files), other = OpenOrFail(std::vector<DemFile>(files.begin(), files.begin() + 30));
   ASSERT_NE(source, nullptr);
   ASSERT_NE(other, nullptr);
@@ -416,7 +416,7 @@ TEST(Mosaic, KeepsFewFilesOpen) {
   }
   EXPECT_LE(open, 5u) << "of both together";
   EXPECT_GT(open, 0u);
-  SetMostIdle(std::numeric_limits<std::size_t>::max());
+  SetMaxIdle(std::numeric_limits<std::size_t>::max());
 }
 
 TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/dem/bound/geoid_error_bound.h"
-#include "engine/dem/bound/grid_tables.h"
+#include "engine/dem/bound/grid_statistics.h"
 #include "engine/dem/crs/node_positions.h"
 #include "engine/dem/mosaic/raster_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -46,7 +46,7 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
       GridTrace trace;
       ASSERT_TRUE(grid->Fill(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
       const TileNodes nodes{lattice, window, heights};
-      const GridTables tables(*grid, trace);
+      const GridStatistics tables(*grid, trace);
       const GeoidErrorBound geoid(nodes, nullptr, {});
       const SmoothErrorBound plain(nodes, *grid, trace, tables, geoid, false);
       SmoothErrorBound prepared(nodes, *grid, trace, tables, geoid, false);
@@ -55,7 +55,7 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
         for (int west = 0; west < lattice.cells; west += 8) {
           for (const CellBox& box :
                {CellBox{west, south, west + 8, south + 16}, CellBox{west, south + 4, west + 4, south + 8}}) {
-            const double expected = plain.Over(box), bound = prepared.Over(box);
+            const double expected = plain.BoundOver(box), bound = prepared.BoundOver(box);
             ASSERT_EQ(std::isfinite(expected), std::isfinite(bound));
             (std::isfinite(expected) ? known : unknown) += 1;
             if (!std::isfinite(expected)) continue;

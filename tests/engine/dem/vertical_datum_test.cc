@@ -52,7 +52,7 @@ TEST(VerticalDatum, ConvertsWhatTheConfigurationSays) {
   ExpectShifted(*raw, *converted);
   EXPECT_FALSE(raw->has_datum());
   EXPECT_TRUE(converted->has_datum());
-  EXPECT_EQ(converted->info().sources.front().counts_from, "EGM96 height");
+  EXPECT_EQ(converted->info().sources.front().datum_in_use, "EGM96 height");
   EXPECT_FALSE(converted->info().sources.front().vertical_operation.empty());
   EXPECT_NE(raw->fingerprint(), converted->fingerprint());
 }
@@ -82,7 +82,7 @@ TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
   }
   const auto source = OpenOrFail(old), now = OpenOrFail(path);
   ASSERT_TRUE(source && now);
-  EXPECT_EQ(source->info().sources.front().counts_from, "EGM96 height");
+  EXPECT_EQ(source->info().sources.front().datum_in_use, "EGM96 height");
   EXPECT_EQ(*source->ReadPoints(SomePoints()), *now->ReadPoints(SomePoints()));
 }
 
@@ -115,7 +115,7 @@ TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
   ASSERT_NE(source, nullptr);
   EXPECT_TRUE(source->has_datum());
   EXPECT_FALSE(source->converts());
-  EXPECT_EQ(source->info().sources.front().counts_from, "ellipsoid");
+  EXPECT_EQ(source->info().sources.front().datum_in_use, "ellipsoid");
 }
 
 // The unit of a compound CRS has a name; that of a third axis is only so long, and its feet are feet all the same.
@@ -133,7 +133,7 @@ TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   const auto feet = OpenOrFail(path);
   ASSERT_TRUE(feet && metres);
   EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
-  EXPECT_EQ(feet->info().sources.front().counts_from, "ellipsoid");
+  EXPECT_EQ(feet->info().sources.front().datum_in_use, "ellipsoid");
   const auto of_feet = feet->ReadPoints(SomePoints()), of_metres = metres->ReadPoints(SomePoints());
   ASSERT_TRUE(of_feet && of_metres);
   for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
@@ -177,7 +177,7 @@ TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {
   int inside = 0;
   for (int level = 0; level <= raw->max_level(); ++level) {
     for (const geo::TileKey& key : SomeTiles(*raw, level, 6)) {
-      const auto before = raw->Read(key), after = converted->Read(key), counted = converted->ReadAsCounted(key);
+      const auto before = raw->Read(key), after = converted->Read(key), counted = converted->ReadInSourceDatum(key);
       ASSERT_TRUE(before && after && counted);
       const geo::Lattice& lattice = before->lattice;
       const HeightRange bound = converted->RangeBound(key);

@@ -14,7 +14,7 @@
 #include "engine/core/check.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/extended/block_joiner.h"
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/rasterizer.h"
 #include "tests/engine/tin/test_fields.h"
@@ -58,7 +58,7 @@ HeightField RandomField(Sort sort, float scale, Random& random) {
 }
 
 TinMesh MeshInBlocks(const HeightField& field, int block_cells, double bound, const GreedyOptions& options) {
-  const FieldCut cut(field.width(), field.height(), block_cells);
+  const FieldPartition cut(field.width(), field.height(), block_cells);
   BlockJoiner joiner(cut);
   for (std::size_t i = 0; i < cut.size(); ++i) joiner.Add(*MeshBlock(field, cut.block(i), bound, options));
   return std::move(joiner).Take();

@@ -20,7 +20,7 @@
 #include "engine/core/check.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/extended/block_joiner.h"
-#include "engine/tin/extended/field_cut.h"
+#include "engine/tin/extended/field_partition.h"
 #include "engine/tin/greedy.h"
 #include "tests/engine/tin/rasterizer.h"
 #include "tests/support/test_data.h"
@@ -113,8 +113,8 @@ class RealBounds : public testing::TestWithParam<Dem> {
 };
 
 TinMesh MeshInBlocks(const HeightField& field, double error, Criterion criterion) {
-  FieldCut cut = FieldCut::For(field, error);
-  if (cut.size() == 1) cut = FieldCut(field.width(), field.height(), kBlock);  // where it would not pay as well
+  FieldPartition cut = FieldPartition::For(field, error);
+  if (cut.size() == 1) cut = FieldPartition(field.width(), field.height(), kBlock);  // where it would not pay as well
   BlockJoiner joiner(cut);
   GreedyOptions options;
   options.criterion = criterion;

@@ -1,4 +1,4 @@
-#include "server/edge/client_address.h"
+#include "server/frontend/client_address.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/edge/rate_limiter.h"
+#include "server/frontend/rate_limiter.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
-#include "tests/server/test_call.h"
+#include "tests/server/test_context.h"
 
 namespace terrace::server {
 
@@ -40,7 +40,7 @@ class TestHandlers : private ProcessState {
   const Handlers all;
 };
 
-inline Response AtOnce(Described described, const Request& request) {
+inline Response AtOnce(DocumentAnswer described, const Request& request) {
   const auto* plan = std::get_if<DocumentPlan>(&described);
   if (plan == nullptr) return std::get<Response>(std::move(described));
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding, tiler::kGzipOnly);

@@ -23,7 +23,7 @@ class LayerHandlerTest : public testing::Test {
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return AtOnce(DescribeLayer(handlers_->all, TestCall(target, request).call), request);
+    return AtOnce(DescribeLayer(handlers_->all, TestContext(target, request).context), request);
   }
 
   std::vector<DatasetView> datasets_{1};

@@ -23,7 +23,7 @@ class TileJsonHandlerTest : public testing::Test {
     request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
     const TestHandlers handlers(datasets_);
-    return std::get<Response>(AnswerTileJson(handlers.all, TestCall(target, request).call));
+    return std::get<Response>(AnswerTileJson(handlers.all, TestContext(target, request).context));
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 
@@ -39,7 +39,7 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
   EXPECT_EQ(Parse(response)["maxzoom"], 12);
   EXPECT_EQ(Parse(Get("/a%20b/tiles.json", ""))["tiles"][0], "/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
   EXPECT_EQ(Parse(Get("/a%20b/tiles.json", "h", true))["tiles"][0], "https://h/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
-  EXPECT_EQ(response.vary_too, "Forwarded");
+  EXPECT_EQ(response.vary_more, "Forwarded");
 }
 
 TEST_F(TileJsonHandlerTest, WritesParametersIntoTheTemplate) {

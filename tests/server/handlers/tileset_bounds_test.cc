@@ -65,17 +65,17 @@ class TilesetBoundsTest : public testing::Test {
   }
 
   std::string Get(const std::string& target) {
-    const TestCall sent("/earth/" + target);
-    const bool is_subtree = sent.call.route.row->label == "subtree";
+    const TestContext sent("/earth/" + target);
+    const bool is_subtree = sent.context.route.row->label == "subtree";
     const Handlers& from = handlers_->all;
     const Response response =
-        AtOnce(is_subtree ? DescribeSubtree(from, sent.call) : DescribeTileset(from, sent.call), sent.request);
+        AtOnce(is_subtree ? DescribeSubtree(from, sent.context) : DescribeTileset(from, sent.context), sent.request);
     EXPECT_EQ(response.status, 200) << target;
     return *response.body;
   }
 
   proto::DecodedGlb Glb(const std::string& target) {
-    const Result<tiler::TileRequest> tile = Negotiate(TestCall("/earth/" + target).call, catalog_->datasets);
+    const Result<tiler::TileRequest> tile = NegotiateTile(TestContext("/earth/" + target).context, catalog_->datasets);
     EXPECT_TRUE(tile) << target;
     const auto built = catalog_->pipeline->Build(*tile, {});
     EXPECT_TRUE(built) << target;

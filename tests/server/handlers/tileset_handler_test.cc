@@ -37,10 +37,11 @@ class TilesetHandlerTest : public testing::Test {
   Response Get(const std::string& target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    const TestCall sent(target, request);
-    const bool is_subtree = sent.call.route.row->label == "subtree";
-    return AtOnce(is_subtree ? DescribeSubtree(handlers_->all, sent.call) : DescribeTileset(handlers_->all, sent.call),
-                  request);
+    const TestContext sent(target, request);
+    const bool is_subtree = sent.context.route.row->label == "subtree";
+    return AtOnce(
+        is_subtree ? DescribeSubtree(handlers_->all, sent.context) : DescribeTileset(handlers_->all, sent.context),
+        request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
 

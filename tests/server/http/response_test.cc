@@ -88,7 +88,7 @@ TEST(Response, IsForItsReaderAloneWhereATokenDecides) {
   Response response;
   response.cache_control = "public, max-age=3600, s-maxage=9";
   response.vary = "Accept, Accept-Encoding";
-  response.for_grant = true;
+  response.depends_on_token = true;
   const std::string head = SerializeHead(response, {});
   EXPECT_NE(head.find("\r\nCache-Control: private, max-age=3600\r\n"), std::string::npos) << head;
   EXPECT_NE(head.find("\r\nVary: Accept, Accept-Encoding, Authorization\r\n"), std::string::npos) << head;

@@ -47,13 +47,13 @@ class SingleFlightTest : public testing::Test {
 
   void Join(Flights::Build build, JobClock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::Landing landing) { landings_.push_back(std::move(landing)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
     asio::co_spawn(io_, flights_.Join(0, "it", std::move(build), Until(deadline)),
                    asio::bind_cancellation_slot(slot, keep));
   }
   void JoinAs(std::size_t key, JobOrder order, Flights::Build build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::Landing landing) { landings_.push_back(std::move(landing)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
     asio::co_spawn(io_, flights_.Join(key, "it", std::move(build), order), asio::bind_cancellation_slot(slot, keep));
   }
   // As jobs of the first client.
@@ -76,7 +76,7 @@ class SingleFlightTest : public testing::Test {
   WorkerPool pool_;
   Flights flights_{pool_};
   asio::io_context io_{1};
-  std::vector<Flights::Landing> landings_;
+  std::vector<Flights::FlightResult> flights_done_;
 };
 
 // Builds run in the order in which the queue hands them out.
@@ -101,12 +101,12 @@ TEST_F(SingleFlightTest, BuildsOnceForTwoHundred) {
   asio::post(io_, [&gate] { gate.set_value(); });
   io_.run();
   EXPECT_EQ(builds, 1);
-  ASSERT_EQ(landings_.size(), 200u);
+  ASSERT_EQ(flights_done_.size(), 200u);
   int starters = 0;
-  for (const auto& landing : landings_) {
-    ASSERT_TRUE(landing.value);
-    EXPECT_EQ(*landing.value, *landings_[0].value);
-    starters += !landing.joined;
+  for (const auto& flight : flights_done_) {
+    ASSERT_TRUE(flight.value);
+    EXPECT_EQ(*flight.value, *flights_done_[0].value);
+    starters += !flight.joined;
   }
   EXPECT_EQ(starters, 1);
   EXPECT_EQ(flights_.joined_total(), 199u);
@@ -126,15 +126,15 @@ TEST_F(SingleFlightTest, GivesAFailureToAllAndForgetsIt) {
   }
   asio::post(io_, [&gate] { gate.set_value(); });
   io_.run();
-  ASSERT_EQ(landings_.size(), 5u);
-  for (const auto& landing : landings_) {
-    ASSERT_FALSE(landing.value);
-    EXPECT_EQ(landing.value.error().code, ErrorCode::kUnavailable);
+  ASSERT_EQ(flights_done_.size(), 5u);
+  for (const auto& flight : flights_done_) {
+    ASSERT_FALSE(flight.value);
+    EXPECT_EQ(flight.value.error().code, ErrorCode::kUnavailable);
   }
   io_.restart();
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, Soon());
   io_.run();
-  EXPECT_TRUE(landings_.back().value);
+  EXPECT_TRUE(flights_done_.back().value);
 }
 
 TEST_F(SingleFlightTest, StopsWhenTheLastWaiterLeaves) {
@@ -171,8 +171,8 @@ TEST_F(SingleFlightTest, StopsAtTheDeadlineOfWhoWaitsLongest) {
       JobClock::now() + 50ms);
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, JobClock::now() + 80ms);
   io_.run();
-  ASSERT_EQ(landings_.size(), 2u);
-  for (const auto& landing : landings_) EXPECT_EQ(landing.value.error().code, ErrorCode::kCancelled);
+  ASSERT_EQ(flights_done_.size(), 2u);
+  for (const auto& flight : flights_done_) EXPECT_EQ(flight.value.error().code, ErrorCode::kCancelled);
   EXPECT_TRUE(stopped.get_future().get());
 }
 
@@ -185,13 +185,13 @@ TEST_F(SingleFlightTest, ALateJoinerHasItsWholeDeadline) {
   };
   Join(build, JobClock::now() + 50ms);
   Join(build, JobClock::now() + 1h);
-  while (landings_.empty()) io_.run_one();  // the first gives up
-  EXPECT_EQ(landings_[0].value.error().code, ErrorCode::kCancelled);
+  while (flights_done_.empty()) io_.run_one();  // the first gives up
+  EXPECT_EQ(flights_done_[0].value.error().code, ErrorCode::kCancelled);
   gate.set_value();
   io_.run();
-  ASSERT_EQ(landings_.size(), 2u);
-  EXPECT_TRUE(landings_[1].joined);
-  EXPECT_TRUE(landings_[1].value) << "the deadline is not the first one's";
+  ASSERT_EQ(flights_done_.size(), 2u);
+  EXPECT_TRUE(flights_done_[1].joined);
+  EXPECT_TRUE(flights_done_[1].value) << "the deadline is not the first one's";
 }
 
 TEST_F(SingleFlightTest, WhoLeavesTakesItsJobOutOfTheQueue) {
@@ -254,8 +254,9 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
   };
   std::vector<Result<Value>> ends;
   const auto join = [&](std::size_t i, std::uint64_t client) {
-    asio::co_spawn(io_, flights.Join(i, "it", wait, Until(Soon(), client)),
-                   [&](std::exception_ptr, Flights::Landing landing) { ends.push_back(std::move(landing.value)); });
+    asio::co_spawn(
+        io_, flights.Join(i, "it", wait, Until(Soon(), client)),
+        [&](std::exception_ptr, Flights::FlightResult flight) { ends.push_back(std::move(flight.value)); });
     io_.poll();
     io_.restart();
   };
@@ -288,20 +289,20 @@ TEST_F(SingleFlightTest, StopsEverythingAtShutdown) {
     pool_.Cancel();
   });
   io_.run();
-  ASSERT_EQ(landings_.size(), 1u);
-  EXPECT_EQ(landings_[0].value.error().code, ErrorCode::kCancelled);
+  ASSERT_EQ(flights_done_.size(), 1u);
+  EXPECT_EQ(flights_done_[0].value.error().code, ErrorCode::kCancelled);
   io_.restart();
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, Soon());
   io_.run();
-  EXPECT_EQ(landings_[1].value.error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(flights_done_[1].value.error().code, ErrorCode::kUnavailable);
 }
 
 TEST_F(SingleFlightTest, RefusesWhatThePoolRefuses) {
   pool_.Shutdown();
   Join([](std::stop_token) -> Result<Value> { return SomeValue(); }, Soon());
   io_.run();
-  ASSERT_EQ(landings_.size(), 1u);
-  EXPECT_EQ(landings_[0].value.error().code, ErrorCode::kUnavailable);
+  ASSERT_EQ(flights_done_.size(), 1u);
+  EXPECT_EQ(flights_done_[0].value.error().code, ErrorCode::kUnavailable);
   EXPECT_EQ(flights_.in_flight(), 0u);
 }
 

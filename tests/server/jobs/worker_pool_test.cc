@@ -71,7 +71,7 @@ TEST(WorkerPool, TheNewestJobOfWhoHasMostGoesAtTheBound) {
   std::atomic<int> done{0}, displaced{0};
   for (int i = 0; i < 3; ++i) {
     const PoolJobPtr job = JobOf([&] { ++done; }, {1});
-    job->displaced = [&] { ++displaced; };
+    job->on_dropped = [&] { ++displaced; };
     EXPECT_TRUE(busy.pool.Submit(job));
   }
   const Result<void> refused = busy.pool.Submit(JobOf([&] { ++done; }, {1}));

@@ -19,7 +19,7 @@ struct FakeTransfer : Connection {
   void Evict() override {}
   void Drain() override {}
   void Abort() override { ++aborts; }
-  void Displace() override { ++displaced; }
+  void Preempt() override { ++displaced; }
   int aborts = 0, displaced = 0;
 };
 
@@ -33,13 +33,13 @@ class TransferBudgetTest : public testing::Test {
   using Hold = TransferBudget::Hold;
   using Kind = TransferBudget::Kind;
 
-  TransferBudget::Ask AskFor(Body body, std::uint64_t client = 1, Kind kind = Kind::kReply) {
-    TransferBudget::Ask ask = AskFor(body ? body->size() : 0, client, kind);
+  TransferBudget::HoldRequest AskFor(Body body, std::uint64_t client = 1, Kind kind = Kind::kReply) {
+    TransferBudget::HoldRequest ask = AskFor(body ? body->size() : 0, client, kind);
     ask.body = std::move(body);
     return ask;
   }
-  TransferBudget::Ask AskFor(std::size_t bytes, std::uint64_t client = 1, Kind kind = Kind::kUpload) {
-    TransferBudget::Ask ask;
+  TransferBudget::HoldRequest AskFor(std::size_t bytes, std::uint64_t client = 1, Kind kind = Kind::kUpload) {
+    TransferBudget::HoldRequest ask;
     ask.kind = kind;
     ask.bytes = bytes;
     ask.client = client;
@@ -53,7 +53,7 @@ class TransferBudgetTest : public testing::Test {
     return budget_.TryHold(AskFor(bytes, client));
   }
   // `name` is noted, and the hold kept, when there is room. Deadlines are an hour away unless they have passed.
-  void Wait(int name, TransferBudget::Ask ask, bool is_late = false,
+  void Wait(int name, TransferBudget::HoldRequest ask, bool is_late = false,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     const auto deadline = now_ + (is_late ? -1h : 1h);
     auto keep = [this, name](std::exception_ptr, std::optional<Hold> hold) {
@@ -72,7 +72,7 @@ class TransferBudgetTest : public testing::Test {
   std::optional<Hold> Offer(std::size_t bytes, std::uint64_t client, std::shared_ptr<FakeTransfer>& connection) {
     connection_ = connection = std::make_shared<FakeTransfer>();
     auto hold = Try(BodyOf(bytes), client);
-    if (hold) hold->Took(0);
+    if (hold) hold->AddTaken(0);
     return hold;
   }
 
@@ -293,7 +293,7 @@ TEST_F(TransferBudgetTest, TimeCountsByWhatIsTaken) {
   auto hold = Offer(30 * kMb, 1, slow);
   ASSERT_TRUE(hold);
   now_ += 1900ms;
-  hold->Took(8192);
+  hold->AddTaken(8192);
   Wait(1, AskFor(BodyOf(30 * kMb), 3));
   EXPECT_EQ(slow->aborts, 0);
   now_ += 200ms;
@@ -309,7 +309,7 @@ TEST_F(TransferBudgetTest, TimeCountsByWhatIsTaken) {
   hold = Offer(30 * kMb, 1, quick);
   for (int i = 0; i < 20; ++i) {
     now_ += 1s;
-    hold->Took(TransferBudget::kRate);
+    hold->AddTaken(TransferBudget::kRate);
   }
   Wait(3, AskFor(BodyOf(30 * kMb), 3));
   EXPECT_EQ(quick->aborts, 0) << "it keeps up";
@@ -318,7 +318,7 @@ TEST_F(TransferBudgetTest, TimeCountsByWhatIsTaken) {
   holds_.clear();
 
   hold = Offer(30 * kMb, 1, stopped);
-  hold->Took(20 * kMb);
+  hold->AddTaken(20 * kMb);
   now_ += 2s;
   Wait(4, AskFor(BodyOf(30 * kMb), 4));
   EXPECT_EQ(stopped->aborts, 1) << "what it took at once gives it no time for the rest";

@@ -120,24 +120,25 @@ TEST(TileRecord, KeysOfRefinementsDiffer) {
   EXPECT_EQ(different.size(), keys.size());
 }
 
-TEST(Seal, FindsEveryFlippedBitAndEveryLength) {
+TEST(AddChecksum, FindsEveryFlippedBitAndEveryLength) {
   const std::string key = "key", value = SerializeTile(RecordTile());
-  const std::string sealed = Seal(key, value);
-  ASSERT_EQ(Unseal(key, sealed), value);
+  const std::string sealed = AddChecksum(key, value);
+  ASSERT_EQ(StripChecksum(key, sealed), value);
   for (std::size_t bit = 0; bit < sealed.size() * 8; ++bit) {
     std::string damaged = sealed;
     damaged[bit / 8] = static_cast<char>(damaged[bit / 8] ^ (1 << (bit % 8)));
-    EXPECT_FALSE(Unseal(key, damaged)) << bit;
+    EXPECT_FALSE(StripChecksum(key, damaged)) << bit;
   }
-  for (std::size_t size = 0; size < sealed.size(); ++size) EXPECT_FALSE(Unseal(key, sealed.substr(0, size))) << size;
-  EXPECT_FALSE(Unseal(key, sealed + '\0'));
+  for (std::size_t size = 0; size < sealed.size(); ++size)
+    EXPECT_FALSE(StripChecksum(key, sealed.substr(0, size))) << size;
+  EXPECT_FALSE(StripChecksum(key, sealed + '\0'));
 }
 
-TEST(Seal, HoldsForItsKeyAlone) {
-  const std::string sealed = Seal("key", "value");
-  EXPECT_FALSE(Unseal("kez", sealed));
-  EXPECT_FALSE(Unseal("", sealed));
-  EXPECT_TRUE(Unseal("key", sealed));
+TEST(AddChecksum, HoldsForItsKeyAlone) {
+  const std::string sealed = AddChecksum("key", "value");
+  EXPECT_FALSE(StripChecksum("kez", sealed));
+  EXPECT_FALSE(StripChecksum("", sealed));
+  EXPECT_TRUE(StripChecksum("key", sealed));
 }
 
 }  // namespace

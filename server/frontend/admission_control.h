@@ -1,0 +1,98 @@
+// Decides on a request before any work is done for it: who sent it, at which rate, and what it may see.
+//
+// Thread-safe.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "server/api/request_context.h"
+#include "server/frontend/client_address.h"
+#include "server/frontend/rate_limiter.h"
+#include "server/http/request.h"
+#include "server/http/response.h"
+
+namespace terrace::server {
+
+// Immutable. Tokens are stored and compared as hashes, so that the time of a comparison reveals nothing about a token.
+class AccessPolicy {
+ public:
+  // Without tokens every dataset is public. With tokens only `public_datasets` are. kInvalidArgument: a text is not a
+  // hash, or a token occurs twice.
+  static Result<AccessPolicy> Make(const std::vector<config::TokenConfig>& tokens,
+                                   const std::vector<std::string>& public_datasets);
+
+  bool has_tokens() const { return !grants_.empty(); }
+
+  // The grant of requests without a token.
+  const GrantPtr& anonymous() const { return anonymous_; }
+
+  // Returns null if the token is unknown.
+  GrantPtr Find(std::string_view token) const;
+
+ private:
+  std::unordered_map<std::string, GrantPtr> grants_;  // by SHA-256
+  GrantPtr anonymous_;
+};
+
+// Removes every `token` parameter from the query of `target` and returns its decoded value; nothing if there is none.
+// Clients append the parameter each time they follow a link, so it may be repeated; if the values differ, the result is
+// a token that does not exist. Other spellings of the name are kept; they are refused with the request
+// (RouteTable::Match) or ignored.
+std::optional<std::string> TakeToken(std::string& target);
+
+// A client as it is logged and counted.
+struct ClientIdentity {
+  ClientIdentity() = default;
+  explicit ClientIdentity(const asio::ip::address& a)
+      : address(a), text(a.to_string()), block(ClientBlock(a)), number(std::hash<std::string>{}(block) | 1) {}
+
+  asio::ip::address address;
+  std::string text = "-", block;
+  std::uint64_t number = 1;  // of the block; never 0
+};
+
+struct AdmissionOptions {
+  Proxies proxies;
+  AccessPolicy access;
+  RateLimiter::Rate rate;  // of each token, and of each client without one
+};
+
+class AdmissionControl {
+ public:
+  explicit AdmissionControl(AdmissionOptions options) : options_(std::move(options)) {}
+
+  // Returns the client that sent the request, behind the proxies. Moves the token from the request's target to
+  // `context`, with its grant. Sets the request's scheme, host, `is_private` and `client`. `peer`: the remote end of
+  // the connection.
+  ClientIdentity Identify(Request& request, const ClientIdentity& peer, RequestContext& context) const;
+
+  // When the request may continue, at most after `longest_wait`: clients that exceed their rate wait. All requests
+  // count but probes, also those with unknown URLs.
+  RateLimiter::Turn TakeTurn(const RequestContext& context, const ClientIdentity& client,
+                             std::chrono::milliseconds longest_wait);
+  // 429, for a request whose turn was not granted.
+  static Response TooManyRequests(const RateLimiter::Turn& turn, const RequestContext& context);
+
+  // 401 or 403; nothing if the request may continue.
+  std::optional<Response> Refuse(const RequestContext& context) const;
+
+  // Whether the reply depends on the request's token.
+  bool DependsOnToken(const RequestContext& context) const;
+
+  const Proxies& proxies() const { return options_.proxies; }
+
+ private:
+  const AdmissionOptions options_;
+  RateLimiter limiter_;
+};
+
+}  // namespace terrace::server

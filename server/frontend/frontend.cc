@@ -1,0 +1,58 @@
+#include "server/frontend/frontend.h"
+
+#include <spdlog/spdlog.h>
+
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/this_coro.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <utility>
+
+namespace terrace::server {
+
+Frontend::Frontend(const config::Config& config, AdmissionOptions gate_options)
+    : connections(config.max_connections, config.max_connections_per_client),
+      transfers(config.transfer_bytes),
+      admission_control(std::move(gate_options)),
+      cors(config.cors_origins) {}
+
+Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
+  AdmissionOptions admission_control;
+  Result<AddressRanges> trusted = AddressRanges::Parse(config.trusted_proxies);
+  if (!trusted) return tl::unexpected(std::move(trusted.error()));
+  admission_control.proxies = {*std::move(trusted), config.forwarded_header};
+  std::vector<std::string> public_datasets;
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (dataset.is_public) public_datasets.push_back(dataset.name);
+  }
+  Result<AccessPolicy> access = AccessPolicy::Make(config.tokens, public_datasets);
+  if (!access) return tl::unexpected(std::move(access.error()));
+  admission_control.access = *std::move(access);
+  admission_control.rate.per_second = config.requests_per_second;
+  admission_control.rate.burst = config.request_burst > 0 ? config.request_burst : 2 * config.requests_per_second;
+
+  std::unique_ptr<TlsContext> tls;
+  if (!config.tls.certificate.empty()) {
+    Result<std::unique_ptr<TlsContext>> opened = TlsContext::Open(config.tls.certificate, config.tls.key);
+    if (!opened) return tl::unexpected(std::move(opened.error()));
+    tls = *std::move(opened);
+  }
+  auto frontend = std::make_unique<Frontend>(config, std::move(admission_control));
+  frontend->tls = std::move(tls);
+  return frontend;
+}
+
+asio::awaitable<void> WatchCertificate(TlsContext* tls) {
+  asio::steady_timer timer(co_await asio::this_coro::executor);
+  for (;;) {
+    timer.expires_after(std::chrono::seconds(2));
+    co_await timer.async_wait(asio::use_awaitable);
+    const Result<bool> reloaded = tls->ReloadIfChanged();
+    if (!reloaded) {
+      spdlog::warn("the certificate in use stays: {}", reloaded.error().message);
+    } else if (*reloaded) {
+      spdlog::info("new connections get the certificate that has just changed");
+    }
+  }
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,34 @@
+// The server's limits towards clients as one object: who is admitted, what they may request, and how many connections
+// and bytes may be in use at a time.
+#pragma once
+
+#include <memory>
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "server/asio.h"
+#include "server/frontend/admission_control.h"
+#include "server/http/cors.h"
+#include "server/net/connection_set.h"
+#include "server/net/tls.h"
+#include "server/net/transfer_budget.h"
+
+namespace terrace::server {
+
+struct Frontend {
+  // Errors quote the option's value, or name the file.
+  static Result<std::unique_ptr<Frontend>> Open(const config::Config& config);
+
+  Frontend(const config::Config& config, AdmissionOptions gate_options);
+
+  ConnectionSet connections;
+  TransferBudget transfers;
+  AdmissionControl admission_control;
+  CorsPolicy cors;
+  std::unique_ptr<TlsContext> tls;  // null: plain HTTP
+};
+
+// Looks for a new certificate every two seconds, until cancelled. `tls` must outlive it.
+asio::awaitable<void> WatchCertificate(TlsContext* tls);
+
+}  // namespace terrace::server

@@ -1,0 +1,175 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "proto/error_text.h"
+#include "server/api/caching.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
+#include "server/http/http_error.h"
+#include "server/http/text.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::server {
+namespace {
+
+Result<void> SetBox(tiler::AreaRequest& area, std::string_view text) {
+  constexpr std::array<const char*, 4> kNames = {"west", "south", "east", "north"};
+  std::array<double, 4> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const bool is_last = i + 1 == numbers.size();
+    const std::size_t comma = is_last ? text.size() : text.find(',');
+    if (comma == std::string_view::npos) {
+      return MakeError(ErrorCode::kInvalidArgument, "bbox must be west,south,east,north in degrees");
+    }
+    const std::optional<double> number = FiniteNumber(text.substr(0, comma));
+    const double most = i % 2 == 0 ? 180 : 90;
+    if (!number || std::abs(*number) > most) {
+      return MakeError(ErrorCode::kInvalidArgument, "bbox: {} must be a number from -{} to {}", kNames[i], most, most);
+    }
+    numbers[i] = *number;
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  const auto [west, south, east, north] = numbers;
+  if (south >= north) return MakeError(ErrorCode::kInvalidArgument, "bbox: south must be below north");
+  area.west = west;
+  area.south = south;
+  area.east = east < west ? east + 360 : east;
+  area.north = north;
+  if (area.west == area.east) {  // 180 and -180 are equal, too
+    return MakeError(ErrorCode::kInvalidArgument, "bbox is empty: west and east are the same");
+  }
+  return {};
+}
+
+Result<void> SetError(tiler::AreaRequest& area, std::string_view text) {
+  const std::optional<double> error = PositiveNumber(text);
+  if (!error) return MakeError(ErrorCode::kInvalidArgument, "error must be a finite number above 0");
+  area.error_m = *error;
+  return {};
+}
+
+Result<void> SetFormat(tiler::AreaRequest& area, std::string_view text) {
+  using proto::MeshFileFormat;
+  for (const auto& [name, format] : {std::pair("glb", MeshFileFormat::kGlb), std::pair("obj", MeshFileFormat::kObj),
+                                     std::pair("ply", MeshFileFormat::kPly)}) {
+    if (text != name) continue;
+    area.format = format;
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "format must be glb, obj or ply");
+}
+
+Result<void> SetCoordinates(tiler::AreaRequest& area, std::string_view text) {
+  for (const auto& [name, coordinates] :
+       {std::pair("enu", tiler::AreaCoordinates::kEnu), std::pair("ecef", tiler::AreaCoordinates::kEcef),
+        std::pair("geographic", tiler::AreaCoordinates::kGeographic)}) {
+    if (text != name) continue;
+    area.coordinates = coordinates;
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "coordinates must be enu, ecef or geographic");
+}
+
+std::string_view ContentTypeOf(proto::MeshFileFormat format) {
+  switch (format) {
+    case proto::MeshFileFormat::kGlb:
+      return "model/gltf-binary";
+    case proto::MeshFileFormat::kObj:
+      return "model/obj";
+    case proto::MeshFileFormat::kPly:
+      break;
+  }
+  return "application/octet-stream";
+}
+
+// The position of (0, 0, 0) of the file: latitude, longitude, metres above the ellipsoid.
+std::string FormatOrigin(const dem::GeoPosition& centre) {
+  const double longitude = centre.longitude > 180 ? centre.longitude - 360 : centre.longitude;
+  return fmt::format("{},{},0", centre.latitude, longitude);
+}
+
+// `response`: complete except for what depends on the mesh.
+asio::awaitable<Response> BuildArea(const Handlers& from, const RequestContext& context, std::uint32_t dataset,
+                                    tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
+                                    Response response) {
+  Work<tiler::EncodedTile> work = [catalog = from.catalog, dataset, area, plan, coding,
+                                   asked =
+                                       TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
+    const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
+    Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
+    if (!mesh) return mesh;
+    mesh->times.queue = queued;
+    if (coding == tiler::Coding::kIdentity) return mesh;
+    mesh->bytes = tiler::Compress(std::move(mesh->bytes), coding, stop);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
+    return mesh;
+  };
+  const auto deadline = from.Deadline();
+  Result<tiler::EncodedTile> mesh =
+      co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+  if (!mesh) co_return co_await BackendFailure(mesh.error(), context.request->id);
+  response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
+  if (area.coordinates == tiler::AreaCoordinates::kEnu) {
+    response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));
+  }
+  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", mesh->times));
+  response.body = std::make_shared<const std::string>(std::move(mesh->bytes));
+  co_return response;
+}
+
+}  // namespace
+
+Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  using Set = Result<void> (*)(tiler::AreaRequest&, std::string_view);
+  constexpr std::array<std::pair<const char*, Set>, 4> kKnown = {
+      {{"bbox", SetBox}, {"error", SetError}, {"format", SetFormat}, {"coordinates", SetCoordinates}}};
+  tiler::AreaRequest area;
+  std::array<bool, kKnown.size()> given{};
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    std::size_t i = 0;
+    while (i < kKnown.size() && name != kKnown[i].first) ++i;
+    if (i == kKnown.size()) {
+      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are bbox, error, format, coordinates");
+    }
+    if (std::exchange(given[i], true)) {
+      return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", kKnown[i].first);
+    }
+    if (const Result<void> set = kKnown[i].second(area, value); !set) return tl::unexpected(set.error());
+  }
+  if (!given[0] || !given[1]) {
+    return MakeError(ErrorCode::kInvalidArgument, "bbox=west,south,east,north and error=METRES are needed");
+  }
+  return area;
+}
+
+Answer AnswerArea(const Handlers& from, const RequestContext& context) {
+  const Request& request = *context.request;
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  const Result<tiler::AreaRequest> area = ParseAreaRequest(context.route.query);
+  if (!area) return ClientErrorResponse(area.error(), request.id);
+  const Result<tiler::AreaPlan> plan = from.catalog->pipeline->PlanArea(*dataset, *area, from.max_mesh_samples);
+  if (!plan) return ClientErrorResponse(plan.error(), request.id);
+
+  const DatasetView& view = from.catalog->datasets[*dataset];
+  const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
+  Response response;
+  response.content_type = ContentTypeOf(area->format);
+  response.content_encoding = tiler::NameOf(coding);
+  response.etag = tiler::RequestETag("mesh", view.name, view.generation, context.route.query, coding);
+  response.cache_control = CacheControlOf(context.route.query, view, from.cache_control);
+  response.vary = "Accept-Encoding";
+  if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
+  return BuildArea(from, context, *dataset, *area, *plan, coding, std::move(response));
+}
+
+}  // namespace terrace::server

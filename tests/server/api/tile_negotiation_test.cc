@@ -1,0 +1,303 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <set>
+#include <string>
+
+#include "engine/geo/error_ladder.h"
+#include "proto/mesh/skirt.h"
+#include "server/api/tile_formats.h"
+#include "tests/server/test_context.h"
+
+namespace terrace::server {
+namespace {
+
+TEST(NegotiateTile, ChoosesTheCodingByQuality) {
+  const struct {
+    const char* accept_encoding;
+    tiler::Coding coding;
+  } cases[] = {
+      {"", tiler::Coding::kIdentity},
+      {"gzip", tiler::Coding::kGzip},
+      {"GZIP", tiler::Coding::kGzip},
+      {"x-gzip", tiler::Coding::kGzip},
+      {"gzip, deflate, br, zstd", tiler::Coding::kBrotli},
+      {"gzip, deflate, zstd", tiler::Coding::kGzip},
+      {"zstd", tiler::Coding::kZstd},
+      {"gzip, deflate", tiler::Coding::kGzip},
+      {"deflate, br", tiler::Coding::kBrotli},
+      {"gzip, br;q=0.9", tiler::Coding::kGzip},
+      {"br;q=0, *", tiler::Coding::kGzip},
+      {"BR;q=0.5, identity;q=0.6", tiler::Coding::kIdentity},
+      {"identity", tiler::Coding::kIdentity},
+      {"*", tiler::Coding::kBrotli},
+      {"*;q=0", tiler::Coding::kIdentity},
+      {"gzip;q=0", tiler::Coding::kIdentity},
+      {"gzip;q=0.000, *", tiler::Coding::kBrotli},
+      {"gzip; q=0.5", tiler::Coding::kGzip},
+      {"gzip;q=0.5, identity;q=0.9", tiler::Coding::kIdentity},
+      {"identity;q=0.5, gzip;q=0.9", tiler::Coding::kGzip},
+      {"gzip;q=1, identity;q=1", tiler::Coding::kGzip},
+      {"identity;q=0", tiler::Coding::kIdentity},  // nothing is left: plain bytes rather than none
+      {"gzip;q=abc", tiler::Coding::kIdentity},
+      {"gzip;q=2", tiler::Coding::kIdentity},
+      {"gzip;q=nan", tiler::Coding::kIdentity},
+      {",,, gzip ,;;", tiler::Coding::kGzip},
+      {"gzipped", tiler::Coding::kIdentity},
+  };
+  for (const auto& c : cases) EXPECT_EQ(NegotiateCoding(c.accept_encoding), c.coding) << c.accept_encoding;
+}
+
+TEST(NegotiateTile, ChoosesAmongWhatIsOffered) {
+  EXPECT_EQ(NegotiateCoding("gzip, br, zstd", tiler::kGzipOnly), tiler::Coding::kGzip);
+  EXPECT_EQ(NegotiateCoding("br, zstd", tiler::kGzipOnly), tiler::Coding::kIdentity);
+  EXPECT_EQ(NegotiateCoding("gzip, br", {}), tiler::Coding::kIdentity);
+}
+
+TEST(NegotiateTile, FindsExtensionsWhereverClientsAskForThem) {
+  const proto::TileExtensions none, normals{true, false, false}, metadata{false, false, true},
+      normals_metadata{true, false, true}, all{true, true, true};
+  const struct {
+    const char* accept;
+    std::vector<std::string> query;
+    proto::TileExtensions wanted;
+  } cases[] = {
+      {"", {}, none},
+      {"*/*", {}, none},
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9,*/*;q=0.01", {}, none},
+      // CesiumJS
+      {"application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata,application/octet-stream;q=0.9,*/"
+       "*;q=0.01",
+       {},
+       all},
+      {"application/vnd.quantized-mesh;extensions=metadata,application/octet-stream;q=0.9", {}, metadata},
+      // 3DTilesRendererJS
+      {"application/vnd.quantized-mesh,application/octet-stream;q=0.9;extensions=octvertexnormals-metadata",
+       {},
+       normals_metadata},
+      // cesium-native
+      {"", {"octvertexnormals-metadata"}, normals_metadata},
+      {"*/*", {"metadata", "watermask-octvertexnormals"}, all},
+      {"a/b;extensions=octvertexnormals", {"watermask-metadata"}, all},
+      {"", {"octvertexnormalsx"}, none},
+      {"a/b; Extensions=\"octvertexnormals\"", {}, normals},
+      {"a/b;extensions=", {""}, none},
+      {"a/b;xextensions=octvertexnormals", {}, none},
+  };
+  for (const auto& c : cases) EXPECT_EQ(WantedExtensions(c.accept, c.query), c.wanted) << c.accept;
+}
+
+TEST(NegotiateTile, GivesNoExtensionThatTheTileHasNot) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "dry";
+  datasets[1].name = "wet";
+  datasets[1].has_water = true;
+  datasets[1].metadata_levels = 2;
+  for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
+  Request request;
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals-watermask-metadata");
+  const auto extensions = [&](const char* target) {
+    const tiler::TileRequest tile = *NegotiateTile(TestContext(target, request).context, datasets);
+    return proto::TileExtensions{tile.normals, tile.water_mask, tile.metadata};
+  };
+  EXPECT_EQ(extensions("/dry/0/0/0.terrain"), (proto::TileExtensions{true, false, false}));
+  EXPECT_EQ(extensions("/wet/0/0/0.terrain"), (proto::TileExtensions{true, true, true}));
+  EXPECT_EQ(extensions("/wet/1/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "between two levels";
+  EXPECT_EQ(extensions("/wet/2/0/0.terrain"), (proto::TileExtensions{true, true, false})) << "nothing is below";
+  request.fields.Set(&RequestFields::accept, "");
+  EXPECT_EQ(extensions("/wet/0/0/0.terrain"), proto::TileExtensions{});
+}
+
+RequestedError Requested(std::optional<double> error_m, bool at_least = false, std::optional<double> fraction = {}) {
+  RequestedError requested;
+  requested.error_m = error_m;
+  requested.at_least = at_least;
+  requested.fraction = fraction;
+  return requested;
+}
+
+TEST(NegotiateTile, PutsErrorsOnTheLadder) {
+  const double d = geo::DefaultError(10);
+  EXPECT_EQ(ErrorStep(Requested({}), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Requested(d), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Requested(d * 0.99), 10, false, 0.5), 1) << "down, never up";
+  EXPECT_EQ(ErrorStep(Requested(d / 2), 10, false, 0.5), 4);
+  EXPECT_EQ(ErrorStep(Requested(d * 4), 10, false, 0.5), -8);
+  EXPECT_EQ(ErrorStep(Requested(1e308), 24, false, 0.5), geo::kCoarsestStep);
+  EXPECT_EQ(ErrorStep(Requested(5e-324), 0, false, 0.5), geo::kFinestStep);
+}
+
+TEST(NegotiateTile, AtLeastNeverGoesBelowTheDefault) {
+  const double d = geo::DefaultError(10);
+  EXPECT_EQ(ErrorStep(Requested(d / 8, true), 10, false, 0.5), 0);
+  EXPECT_EQ(ErrorStep(Requested(d * 2, true), 10, false, 0.5), -4);
+}
+
+// Nothing finer follows the deepest level: layer.json?error=E would otherwise never show E. A tile of another level
+// without children is not deepest: clients stop there because of availability, and the neighbours go deeper.
+TEST(NegotiateTile, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
+  std::array<DatasetView, 1> datasets;
+  datasets[0].name = "maui";
+  datasets[0].available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 1, 1}}};
+  const auto error = [&](const std::string& target) {
+    const Result<tiler::TileRequest> tile = NegotiateTile(TestContext(target).context, datasets);
+    EXPECT_TRUE(tile) << target;
+    return tile ? geo::LadderError(tile->key.level, tile->error_step) : 0;
+  };
+  for (const std::string format : {".terrain", ".glb"}) {
+    EXPECT_LE(error("/maui/2/0/0" + format + "?error=500&atleast=1"), 500);
+    EXPECT_GT(error("/maui/2/0/0" + format + "?error=500&atleast=1"), 420) << "not finer than the ladder makes it";
+    EXPECT_EQ(error("/maui/2/0/0" + format + "?error=500&atleast=1"), error("/maui/2/0/0" + format + "?error=500"));
+    EXPECT_EQ(error("/maui/1/0/0" + format + "?error=500&atleast=1"), geo::DefaultError(1));
+    EXPECT_EQ(error("/maui/1/3/1" + format + "?error=500&atleast=1"), geo::DefaultError(1)) << "without children";
+    EXPECT_EQ(error("/maui/2/0/0" + format + "?error=20000&atleast=1"), error("/maui/2/0/0" + format + "?error=20000"));
+  }
+}
+
+TEST(NegotiateTile, AFractionScalesEveryLevelAlike) {
+  for (int level = 0; level <= 20; ++level) {
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.5), level, false, 0.5), 0);
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, false, 0.5), 4);
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, false, 0.25), 0);
+  }
+  EXPECT_EQ(ErrorStep(Requested({}, false, 1e308), 0, false, 0.5), geo::kCoarsestStep) << "the product overflows";
+  EXPECT_EQ(ErrorStep(Requested({}, false, 5e-324), 24, false, 0.5), geo::kFinestStep) << "the product underflows";
+}
+
+// A million requested errors must not make a million cache entries.
+TEST(NegotiateTile, ComesToFortyOneErrorsAtMost) {
+  constexpr int kErrors = 1'000'000;
+  std::set<int> steps;
+  for (int i = 0; i < kErrors; ++i)
+    steps.insert(ErrorStep(Requested(std::exp2(-400 + 800.0 * i / kErrors)), 7, false, 0.5));
+  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(i * 0.01 + 0.003), 7, false, 0.5));
+  EXPECT_EQ(*steps.begin(), geo::kCoarsestStep);
+  EXPECT_EQ(*steps.rbegin(), geo::kFinestStep);
+  RecordProperty("errors", 2 * kErrors);
+  RecordProperty("steps",
+                 static_cast<int>(steps.size()));  // 41, for there is nothing between the ends but whole numbers
+}
+
+TEST(NegotiateTile, HeightTilesAreThoseThatMeetTheBounds) {
+  std::array<DatasetView, 1> datasets;
+  datasets[0].name = "maui";
+  datasets[0].west = 170;  // across the antimeridian
+  datasets[0].east = -160;
+  datasets[0].south = 10;
+  datasets[0].north = 20;
+  datasets[0].max_mercator_depth = 5;
+  const auto find = [&](const char* target) {
+    Request request;
+    request.fields.Set(&RequestFields::accept_encoding, "gzip");
+    return NegotiateTile(TestContext(target, request).context, datasets);
+  };
+  for (const char* there : {"/maui/0/0/0.png", "/maui/1/0/0.png", "/maui/1/1/0.png", "/maui/5/31/14.png",
+                            "/maui/5/1/15.png", "/maui/4/15/7.png?size=512"}) {
+    const Result<tiler::TileRequest> tile = find(there);
+    ASSERT_TRUE(tile) << there << tile.error().message;
+    EXPECT_EQ(tile->format, tiler::TileFormat::kHeightPng);
+    EXPECT_EQ(tile->coding, tiler::Coding::kIdentity) << "PNG is compressed already";
+  }
+  EXPECT_EQ(find("/maui/4/15/7.png?size=512")->height_size, 512);
+  for (const char* missing : {"/maui/1/0/1.png", "/maui/5/16/14.png", "/maui/5/31/20.png", "/maui/6/63/29.png",
+                              "/maui/5/31/14.png?size=512", "/nope/0/0/0.png"}) {
+    const Result<tiler::TileRequest> tile = find(missing);
+    ASSERT_FALSE(tile) << missing;
+    EXPECT_EQ(tile.error().code, ErrorCode::kNotFound) << missing;
+  }
+  EXPECT_EQ(find("/maui/0/0/0.png?size=3").error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(NegotiateTile, MakesACanonicalRequest) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "etopo";
+  datasets[1].name = "maui";
+  datasets[1].available = {{{0, 0, 1, 0}}, {{0, 0, 1, 1}}};
+  Request request;
+  request.fields.Set(&RequestFields::accept_encoding, "gzip");
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
+  const auto negotiate = [&](const char* target) {
+    return NegotiateTile(TestContext(target, request).context, datasets);
+  };
+
+  const Result<tiler::TileRequest> tile = negotiate("/maui/1/1/0.terrain?v=3&error=100");
+  ASSERT_TRUE(tile);
+  EXPECT_EQ(tile->dataset, 1u);
+  EXPECT_EQ(tile->key, (geo::TileKey{1, 1, 0}));
+  EXPECT_EQ(tile->coding, tiler::Coding::kGzip);
+  EXPECT_TRUE(tile->normals);
+  EXPECT_EQ(tile->error_step, geo::SnapToLadder(1, 100));
+
+  EXPECT_EQ(negotiate("/oahu/0/0/0.terrain").error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(negotiate("/maui/1/2/0.terrain").error().code, ErrorCode::kNotFound) << "outside what it has";
+  EXPECT_EQ(negotiate("/maui/2/0/0.terrain").error().code, ErrorCode::kNotFound) << "deeper than it goes";
+  EXPECT_EQ(negotiate("/etopo/0/0/0.terrain").error().code, ErrorCode::kNotFound) << "has no tiles at all";
+  EXPECT_EQ(negotiate("/maui/0/0/0.terrain?error=nan").error().code, ErrorCode::kInvalidArgument);
+}
+
+TEST(NegotiateTile, GlbTilesAreCanonicalToo) {
+  DatasetView view;
+  view.name = "maui";
+  view.available = {{{0, 0, 1, 0}}};
+  view.glb_compression = proto::GlbCompression::kMeshopt;
+  const std::vector<DatasetView> datasets = {view};
+  Request request;
+  request.fields.Set(&RequestFields::accept_encoding, "gzip");
+  request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals");
+  const auto negotiate = [&](const char* target) {
+    return NegotiateTile(TestContext(target, request).context, datasets);
+  };
+
+  const Result<tiler::TileRequest> tile = negotiate("/maui/0/1/0.glb?extensions=octvertexnormals-metadata");
+  ASSERT_TRUE(tile);
+  EXPECT_EQ(tile->format, tiler::TileFormat::kGlb);
+  EXPECT_EQ(tile->compression, proto::GlbCompression::kMeshopt);
+  EXPECT_FALSE(tile->normals) << "they have normals whatever is asked for";
+  EXPECT_EQ(*tile, *negotiate("/maui/0/1/0.glb?compression=meshopt"));
+  EXPECT_FALSE(*tile == *negotiate("/maui/0/1/0.glb?compression=draco"));
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, tiler::Coding::kIdentity);
+  EXPECT_EQ(tile->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=none")->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=zip").error().code, ErrorCode::kInvalidArgument);
+  EXPECT_EQ(negotiate("/maui/0/1/0.terrain?compression=none").error().code, ErrorCode::kInvalidArgument);
+  // The dataset's word for GLB tiles makes no second variant of the others.
+  EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, tiler::TileRequest{}.compression);
+}
+
+// What skirts rely on (proto/mesh/skirt.h): whatever is asked for, a parent's error is at most twice what they are made
+// for.
+TEST(NegotiateTile, AParentIsAtMostTwiceAsCoarse) {
+  for (int level = 1; level <= geo::kMaxLevel; ++level) {
+    for (double error_m = 1e-5; error_m < 1e8; error_m *= 1.31) {
+      for (const RequestedError& requested : {RequestedError{error_m, {}, false}, RequestedError{error_m, {}, true},
+                                              RequestedError{{}, error_m / 1000, false}, RequestedError{}}) {
+        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(requested, at, false, 0.5), 0.5); };
+        EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << error_m;
+        const double skirt = proto::SkirtError(level, ErrorStep(requested, level, true, 0.5), true, 0.5);
+        EXPECT_LE(error(level - 1), 2 * skirt * (1 + 1e-12)) << "deepest: " << level << ", " << error_m;
+      }
+    }
+  }
+}
+
+TEST(NegotiateTile, GivesATextureOnlyToGlbTilesOfDatasetsWithImagery) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "bare";
+  datasets[1].name = "photo";
+  datasets[1].texture = proto::TextureFormat::kJpeg;
+  for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}};
+  const auto texture = [&](const char* target) {
+    return NegotiateTile(TestContext(target).context, datasets)->texture;
+  };
+  EXPECT_EQ(texture("/bare/0/0/0.glb"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/bare/0/0/0.glb?texture=webp"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.glb"), proto::TextureFormat::kJpeg);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=webp"), proto::TextureFormat::kWebp);
+  EXPECT_EQ(texture("/photo/0/0/0.glb?texture=none"), proto::TextureFormat::kNone);
+  EXPECT_EQ(texture("/photo/0/0/0.terrain"), proto::TextureFormat::kNone);
+}
+
+}  // namespace
+}  // namespace terrace::server

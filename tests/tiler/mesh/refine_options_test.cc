@@ -1,0 +1,33 @@
+#include "tiler/mesh/refine_options.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <iterator>
+#include <vector>
+
+#include "engine/geo/tile_key.h"
+
+namespace terrace::tiler {
+namespace {
+
+// What Sagitta checks. At the equator of deep levels rows differ by less than rounding.
+TEST(RefinePlan, HasOneWidestRow) {
+  for (const int cells : {32, 256}) {
+    for (int level = 0; level <= geo::kMaxLevel; ++level) {
+      const std::int64_t rows = geo::TileRows(level), middle = rows / 2;
+      for (std::int64_t y = std::max(middle - 100, std::int64_t{0}); y < std::min(middle + 100, rows); ++y) {
+        const std::vector<float> heights(static_cast<std::size_t>((cells + 3) * (cells + 3)), 0.0F);
+        const proto::LatticeView lattice{{level, 0, y}, {level, cells}, heights};
+        const std::vector<double> east_m2 = MakeRefineOptions(lattice, {}).curvature.east_m2;
+        const auto widest = std::max_element(east_m2.begin(), east_m2.end());
+        ASSERT_TRUE(std::is_sorted(east_m2.begin(), widest)) << level << "/" << y;
+        ASSERT_TRUE(std::is_sorted(east_m2.rbegin(), std::reverse_iterator(widest))) << level << "/" << y;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tiler

@@ -1,0 +1,102 @@
+#include "tiler/mesh/refine_options.h"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <numeric>
+#include <vector>
+
+#include "engine/geo/ellipsoid.h"
+#include "proto/mesh/quantized_mesh.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr double kSmallestCurvatureRadius =
+    geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;  // meridian, at the equator
+constexpr double kLargestCurvatureRadius =
+    geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
+
+// A bound in metres on the sagitta of the right triangles of a grid of `divisions` x `divisions` over a tile of this
+// level. Tiles count as wide as at the equator, so that all tiles of a level, and therefore neighbours, use the same
+// grids.
+double GridSagitta(int level, int divisions) {
+  const double side = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level) / divisions;
+  return side * side / (4 * kSmallestCurvatureRadius);
+}
+
+tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
+  const double step = lattice.lattice.StepDegrees();
+  tin::Curvature curvature;
+  for (int j = 0; j <= lattice.cells(); ++j) {
+    const double east = geo::MetresPerDegreeEast(lattice.Latitude(j)) * step;
+    curvature.east_m2.push_back(east * east);
+  }
+  // Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the
+  // widest row and decrease after it, as Curvature requires.
+  const auto wider = [](double a, double b) { return std::max(a, b); };
+  const auto begin = curvature.east_m2.begin(), widest = std::max_element(begin, curvature.east_m2.end());
+  std::inclusive_scan(begin, widest, begin, wider);
+  const auto back = curvature.east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
+  std::inclusive_scan(back, widest_back, back, wider);
+  const double north = geo::ToRadians(step) * kLargestCurvatureRadius;
+  curvature.north_m2 = north * north;
+  curvature.radius_m = kSmallestCurvatureRadius;
+  return curvature;
+}
+
+// Triangles with a sagitta above half of the error leave too little of the error for relief. Therefore the next finer
+// grid is due when the error falls below twice their sagitta. Insertion then has triangles that are small enough to
+// select samples by relief.
+std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
+  std::vector<tin::SeedGrid> grids;
+  for (int divisions = 2; divisions <= lattice.cells() / 2; divisions *= 2) {
+    grids.push_back({2 * GridSagitta(lattice.key.level, divisions / 2), lattice.cells() / divisions});
+  }
+  return grids;
+}
+
+// Half the second difference of the ground along an edge, per sample squared.
+double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
+  const double step = geo::ToRadians(lattice.lattice.StepDegrees());
+  if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * kLargestCurvatureRadius / 2;
+  const double latitude = lattice.Latitude(side == tin::Side::kSouth ? 0 : lattice.cells());
+  const double cosine = geo::SurfaceNormal(0, latitude).x;
+  return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;
+}
+
+// The error of an edge from the rounding of positions: half a unit times its steepest slope.
+double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
+  const int cells = lattice.cells();
+  const bool along_x = side == tin::Side::kSouth || side == tin::Side::kNorth;
+  const int fixed = side == tin::Side::kSouth || side == tin::Side::kWest ? 0 : cells;
+  double steepest = 0;
+  for (int k = 0; k < cells; ++k) {
+    const double a = along_x ? lattice.At(k, fixed) : lattice.At(fixed, k);
+    const double b = along_x ? lattice.At(k + 1, fixed) : lattice.At(fixed, k + 1);
+    steepest = std::max(steepest, std::abs(b - a));
+  }
+  return steepest * cells / (2.0 * proto::kQuantizedMax);
+}
+
+}  // namespace
+
+// Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
+// error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
+// second.
+tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
+  tin::GreedyOptions options;
+  options.curvature = MakeCurvature(lattice);
+  options.seeds = MakeSeedGrids(lattice);
+  options.record = true;
+  for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
+    tin::BorderOptions& border = options.borders[static_cast<std::size_t>(side)];
+    border.weight = 16.0 / 15;
+    border.padding_m = PositionRounding(lattice, side);
+    border.step_m = needed.Coarsest(side) / 2;
+    border.sagitta_m = BorderSagitta(lattice, side);
+  }
+  return options;
+}
+
+}  // namespace terrace::tiler

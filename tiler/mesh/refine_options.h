@@ -1,0 +1,16 @@
+// Options of a tile's refinement, such that the tile keeps any error and its edges match its neighbours. They depend on
+// the level, the tile's own border samples, and the height ranges of the neighbours. They do not depend on the error: a
+// refinement serves every error (engine/tin/refinement.h).
+#pragma once
+
+#include "engine/tin/greedy.h"
+#include "proto/lattice_view.h"
+#include "proto/mesh/edge_steps.h"
+
+namespace terrace::tiler {
+
+// The edges depend on the level and on their own samples and steps alone.
+// `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
+tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
+
+}  // namespace terrace::tiler

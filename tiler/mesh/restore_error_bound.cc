@@ -1,0 +1,33 @@
+#include "tiler/mesh/restore_error_bound.h"
+
+#include "engine/tin/insert_samples.h"
+#include "tiler/mesh/tile_mesher.h"
+
+namespace terrace::tiler {
+namespace {
+
+// Every round but the last inserts a sample.
+Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                      const std::stop_token& stop) {
+  tin::SampleInserter inserter;
+  for (;;) {
+    if (stop.stop_requested()) return Cancelled();
+    proto::TileError error = measure(mesh);
+    if (error.misses.empty() || mesh.vertices.size() + error.misses.size() > max_vertices) return error;
+    inserter.InsertInto(mesh, error.misses);
+  }
+}
+
+}  // namespace
+
+// In a Delaunay triangulation, a vertex is joined to its four neighbours if they are vertices, because the circle over
+// each of these edges is empty. In other triangulations an edge may pass between.
+Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                           const std::stop_token& stop) {
+  Result<proto::TileError> error = InsertMisses(mesh, measure, max_vertices, stop);
+  if (!error || !error->is_cut_through) return error;
+  mesh = tin::DelaunayOf(mesh);
+  return InsertMisses(mesh, measure, max_vertices, stop);
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,28 @@
+// Restores the error bound of a mesh after its vertices were rounded.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <stop_token>
+
+#include "engine/core/result.h"
+#include "engine/tin/mesh/tin_mesh.h"
+#include "proto/error/tile_error.h"
+
+namespace terrace::tiler {
+
+// Rounds the vertices of a mesh as its format does, and measures the decoded mesh.
+using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
+
+// Inserts samples inside the mesh until all keep the bound of `measure`. Returns the measurement of the final mesh. The
+// largest error exceeds the bound only
+// - at vertices whose rounded positions lie beside their samples and whose neighbours are all vertices: by the height
+//   differences between these samples over the offset of the positions;
+// - by the format's rounding of heights;
+// - on the tile's edges, which do not change;
+// - if the mesh would need more than `max_vertices`.
+// kCancelled: stopped.
+Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                           const std::stop_token& stop);
+
+}  // namespace terrace::tiler
