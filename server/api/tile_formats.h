@@ -1,5 +1,5 @@
 // The tile formats, one row each: how a URL names one, what a request asks of it, and how a reply describes it. And
-// what all formats share: parameters, codings, errors. tiler::EncoderOf has the rows of how they are made.
+// what all formats share: parameters, codings, errors. tiler/encoders.h has the rows of how they are made.
 #pragma once
 
 #include <cstdint>

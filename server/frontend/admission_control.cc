@@ -111,8 +111,7 @@ std::optional<std::string> TakeToken(std::string& target) {
 ClientIdentity AdmissionControl::Identify(Request& request, const ClientIdentity& peer, RequestContext& context) const {
   std::optional<std::string> in_query = TakeToken(request.target);
   const RequestFields& fields = *request.fields;
-  // Returns false if the request has no Authorization header, no token in the query, and nothing that may be a token in
-  // another spelling.
+  // Not private: no Authorization header, no token in the query, and nothing that may be a token in another spelling.
   request.is_private = fields.has_authorization || in_query || !IsPlainTarget(request.target);
   context.token_in_query = !fields.bearer && in_query.has_value();
   context.token = fields.bearer ? *fields.bearer : std::move(in_query).value_or("");
