@@ -1,7 +1,7 @@
 # The few commands a contributor needs. CMake does the work; `make help` lists them.
 JOBS ?= $(shell nproc)
 CONFIG ?= config/samples/samples.json
-# Address of `make run`, HOST:PORT; empty: what CONFIG says.
+# Address of `make run`, HOST:PORT; empty: the one in CONFIG.
 LISTEN ?=
 # Options of `make bench` and `make bench-serve`, for instance BENCH="--peer 'COMMAND' --filter 'T1 '": see docs/performance.md.
 BENCH ?=
@@ -18,32 +18,32 @@ help:  ## list these targets
 deps:  ## install what building needs (Debian 12; root or sudo)
 	@tools/install_deps.sh
 
-test-deps:  ## and what the tests need
+test-deps:  ## install also what the tests need
 	@tools/install_deps.sh --test
 
 build: deps  ## build the server into build/release
 	cmake --preset release -DTERRACE_BUILD_TESTS=OFF --log-level=WARNING
 	cmake --build build/release -j $(JOBS)
 
-run: build  ## build, then serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
+run: build  ## build, and serve the sample data (LISTEN=HOST:PORT, CONFIG=FILE)
 	@echo "Open the address below in a browser. Ctrl-C ends the server."
 	@exec $(TERRACE) serve --config $(CONFIG) $(if $(LISTEN),--listen $(LISTEN))
 
 test: test-deps  ## build and run every test
 	@tools/run_tests.py release --jobs $(JOBS)
 
-sanitize: test-deps  ## the unit tests under ASan + UBSan, and those with threads under TSan
+sanitize: test-deps  ## run the unit tests under ASan + UBSan, and those with threads under TSan
 	@tools/run_tests.py asan tsan --jobs $(JOBS)
 
-coverage: test-deps  ## build with counters, run the tests, print which lines of each room they run
+coverage: test-deps  ## build with counters, run the tests, print which lines of each module they run
 	@tools/run_coverage.py --missed --jobs $(JOBS)
 
-reliability: test-deps  ## try on the real binary what docs/reliability.md promises about clients; a few minutes
+reliability: test-deps  ## test on the real binary what docs/reliability.md promises about clients; a few minutes
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
 	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py
 
-reliability-long: test-deps  ## the same, each row as often as the scorecard says
+reliability-long: test-deps  ## the same, each row as often as its target says
 	cmake --preset release -DTERRACE_BUILD_TESTS=ON --log-level=WARNING
 	cmake --build build/release -j $(JOBS) --target terrace reliability_tests
 	@tests/reliability/run.py --long
@@ -51,7 +51,7 @@ reliability-long: test-deps  ## the same, each row as often as the scorecard say
 bench: test-deps  ## build and run the benchmarks; JSON results in build/bench/results
 	@tools/run_benchmarks.sh $(JOBS) $(BENCH)
 
-bench-serve: build  ## tiles end to end by level and stage, data from ../shared/data; BENCH="BEFORE/terrace": beside another build
+bench-serve: build  ## time of tiles by level and stage, data from ../shared/data; BENCH="BEFORE/terrace": compare with another build
 	@tests/load/bench_serve.py $(BENCH) $(TERRACE)
 
 paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into build/paper
@@ -65,10 +65,10 @@ docs: deps  ## write config.schema.json and the tables of docs/configuration.md 
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i
 
-lint: test-deps  ## layers, leftovers, formatting, self-contained headers
+lint: test-deps  ## check layers, leftovers, formatting, self-contained headers
 	@tools/lint.sh $(JOBS)
 
-tidy: test-deps  ## clang-tidy over the product
+tidy: test-deps  ## run clang-tidy over the product
 	@tools/tidy.sh $(JOBS)
 
 clean:  ## remove everything that was built

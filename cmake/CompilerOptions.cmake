@@ -19,9 +19,10 @@ set_property(CACHE TERRACE_SANITIZER PROPERTY STRINGS "" address thread)
 add_library(terrace_options INTERFACE)
 target_compile_options(terrace_options INTERFACE
   -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror=return-type
-  # The same input gives the same bytes: GCC fuses a*b+c into one rounding where the CPU can.
+  # Otherwise GCC fuses a*b+c into one rounding on processors that can, and bytes differ between machines.
   -ffp-contract=off
-  # What is local to one source of a unity build is not to the next: shadowed names are told where sources stand alone.
+  # In a unity build, file-local names of one source are visible in the next. Builds of single sources report shadowed
+  # names.
   $<$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>:-Wno-shadow>
   $<$<AND:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>)
 target_include_directories(terrace_options INTERFACE "${PROJECT_SOURCE_DIR}")

@@ -1,9 +1,9 @@
-# Every third-party library, looked up once. Debian 12 packages; tools/install_deps.sh installs them.
+# Finds every third-party library. They are Debian 12 packages; tools/install_deps.sh installs them.
 find_package(Threads REQUIRED)
 find_package(PkgConfig REQUIRED)
 
-# Boost: Debian's default 1.74 comes with GDAL's headers and lacks what the server needs; 1.81 cannot be installed beside it.
-# tools/install_deps.sh unpacks the 1.81 headers into .deps/boost.
+# Boost: GDAL's headers depend on Debian's default 1.74, which lacks features that the server needs, and 1.81 cannot be
+# installed beside it. So tools/install_deps.sh unpacks the 1.81 headers into .deps/boost.
 set(TERRACE_BOOST_ROOT "${PROJECT_SOURCE_DIR}/.deps/boost/usr" CACHE PATH "Prefix that holds the Boost 1.81 headers")
 if(EXISTS "${TERRACE_BOOST_ROOT}")
   find_package(Boost 1.81 CONFIG REQUIRED COMPONENTS headers PATHS "${TERRACE_BOOST_ROOT}" NO_DEFAULT_PATH)
@@ -11,8 +11,8 @@ else()
   find_package(Boost 1.81 CONFIG REQUIRED COMPONENTS headers)
 endif()
 
-# Coroutine frames that a thread keeps for the next ones. A request passes through more than Asio's usual two at a time,
-# and every further one would go through malloc.
+# Number of coroutine frames that a thread keeps for reuse. A request has more than Asio's default of two at a time, and
+# every further one would call malloc.
 target_compile_definitions(Boost::headers INTERFACE BOOST_ASIO_RECYCLING_ALLOCATOR_CACHE_SIZE=8)
 
 find_package(tl-expected REQUIRED)

@@ -7,9 +7,9 @@ function(terrace_library name)
   target_link_libraries(terrace_${name} PUBLIC terrace_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
 endfunction()
 
-# terrace_test(NAME SOURCES a_test.cc [DEPS ...] [LABELS ...] [TIMEOUT seconds] [SHARDS n])
-# One GoogleTest binary, one ctest entry; with SHARDS its tests are dealt out to n entries that can run at once. Its sources
-# are compiled several at a time (CMake's unity build), so file-local names differ between them.
+# terrace_test(NAME SOURCES a_test.cc [DEPS ...] [LABELS ...] [TIMEOUT seconds] [SHARDS n]) One GoogleTest binary, one
+# ctest entry. With SHARDS its tests are distributed over n entries that can run in parallel. Its sources are compiled
+# together (CMake's unity build), so file-local names must differ between them.
 function(terrace_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT;SHARDS" "SOURCES;DEPS;LABELS" ${ARGN})
   if(NOT ARG_TIMEOUT)

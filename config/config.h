@@ -44,7 +44,7 @@ struct WaterConfig {
   friend bool operator==(const WaterConfig&, const WaterConfig&) = default;
 };
 
-// The image that textures of GLB tiles are cut from.
+// The image from which textures of GLB tiles are made.
 struct ImageryConfig {
   std::string image;  // empty: none
   std::string attribution;

@@ -1,5 +1,5 @@
 #!/bin/sh
-# What terrace serves, asked for with curl. Files go into a new folder, listed at the end.
+# Requests what terrace serves with curl. Writes files into a new folder, and lists them at the end.
 #
 #     examples/curl.sh [http://HOST:PORT] [DATASET]
 set -eu
@@ -20,17 +20,17 @@ get "$server/datasets"
 get "$server/$dataset/layer.json"
 get "$server/$dataset/tiles.json"
 
-# The height in the middle of the dataset, and which tile of the deepest level is there.
+# The height at the centre of the dataset, and the tile of the deepest level there.
 bounds=$(curl -fsS "$server/$dataset/tiles.json" | sed 's/.*"bounds":\[\([^]]*\)\].*/\1/')
 middle=$(echo "$bounds" | awk -F, '{ printf "%.6f,%.6f", ($2 + $4) / 2, ($1 + $3) / 2 }')
 get "$server/$dataset/heights?locations=$middle&certify=deepest"
 tile=$(curl -fsS "$server/$dataset/heights?locations=$middle&certify=deepest" | sed 's/.*"tile":"\([^"]*\)".*/\1/')
 
-# That tile as quantized-mesh with normals, and as glTF. The headers tell its error and how long each step took.
+# That tile as quantized-mesh with normals, and as glTF. The headers state its error and the time of each step.
 get -D - -o "$folder/tile.terrain" --compressed -H 'Accept: application/vnd.quantized-mesh;extensions=octvertexnormals' "$server/$dataset/$tile.terrain"
 get -D - -o "$folder/tile.glb" "$server/$dataset/$tile.glb?compression=none"
 
-# Asked for again with the ETag of the first reply it is not sent again: 304.
+# The same tile with the ETag of the first reply: the server answers 304 and does not send it again.
 etag=$(curl -fsS -o "$folder/plain.terrain" -D - "$server/$dataset/$tile.terrain" | tr -d '\r' | sed -n 's/^ETag: //p')
 get -o "$folder/not_sent" -w '%{http_code}' -H "If-None-Match: $etag" "$server/$dataset/$tile.terrain"
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Asks a terrace server for heights, then decodes the quantized-mesh tile at each place and reads the height off it.
+"""Requests heights from a terrace server, then decodes the quantized-mesh tile at each point and interpolates its height there.
 
     examples/heights.py [--server URL] [--dataset NAME] [LAT,LON ...]
 """
@@ -23,7 +23,7 @@ def decode(tile):
     count, = struct.unpack_from("<I", tile, 88)
     codes = struct.unpack_from(f"<{3 * count}H", tile, 92)
 
-    def numbers(first):  # zigzag, each number from the one before
+    def numbers(first):  # zigzag-coded differences from the number before
         return (value / 32767 for value in accumulate((code >> 1) ^ -(code & 1) for code in codes[first:first + count]))
 
     vertices = [(u, v, low + h * (high - low)) for u, v, h in zip(numbers(0), numbers(count), numbers(2 * count))]
@@ -31,7 +31,7 @@ def decode(tile):
     if count > 65536:
         at, letter = (at + 3) & ~3, "I"
     triangles, = struct.unpack_from("<I", tile, at)
-    indices, unused = [], 0  # a code counts back from the first vertex that no triangle has had yet
+    indices, unused = [], 0  # a code is the distance back from the first vertex that no triangle has used yet
     for code in struct.unpack_from(f"<{3 * triangles}{letter}", tile, at + 4):
         indices.append(unused - code)
         unused += code == 0
@@ -39,7 +39,7 @@ def decode(tile):
 
 
 def height_at(vertices, triangles, u, v):
-    """Of the triangle that holds the place, by its barycentric coordinates."""
+    """The height in the triangle that contains (u, v), by its barycentric coordinates."""
     for triangle in triangles:
         (ax, ay, az), (bx, by, bz), (cx, cy, cz) = (vertices[index] for index in triangle)
         area = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)

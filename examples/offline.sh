@@ -1,5 +1,6 @@
 #!/bin/sh
-# Copies the pages and what they load from the net into a folder, for use without it. Needs npm, and the net once.
+# Copies the pages and the libraries that they load into a folder, for use without the Internet. Needs npm, and the
+# Internet once.
 #
 #     examples/offline.sh site && python3 -m http.server --directory site 8000
 set -eu

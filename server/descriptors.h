@@ -18,7 +18,7 @@ struct DescriptorDemand {
   std::size_t stores = 0;       // of the disk cache
   std::size_t store_files = 0;  // record files of each that are open at a time
   std::size_t open_sources = 0;
-  bool has_vrts = false;  // whose parts GDAL keeps open beside
+  bool has_vrts = false;  // GDAL also keeps their parts open
   std::size_t connections = 1;
   std::size_t archive_files = 0;
 };

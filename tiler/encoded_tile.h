@@ -42,7 +42,7 @@ struct EncodedTile {
   StageTimes times;  // of the build
   RefinementUse refinement = RefinementUse::kMade;
   const char* store = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
-  HeaderLines head;             // see MakeTileHeaders
+  HeaderLines head;             // MakeTileHeaders of server/api/tile_formats.h
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.head.text.size(); }

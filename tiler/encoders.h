@@ -1,4 +1,5 @@
-// How tiles of each format are made, one row each; server/api/tile_formats.cc has the rows of how clients ask for them.
+// The encoder of each tile format, one row each; server/api/tile_formats.cc has one row for the requests of each
+// format.
 #pragma once
 
 #include <stop_token>
@@ -19,10 +20,10 @@ struct EncoderInput {
   const Dataset& dataset;
   const TileRequest& request;
   const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
-  double error_m = 0;                    // that the mesh keeps
+  double error_m = 0;                    // the bound that the mesh keeps
 };
 
-// Sets all of `encoded` but the ETag, the compression and what making the refinement took.
+// Sets all of `encoded` except the ETag, the compression and the times of the refinement.
 struct Encoder {
   TileFormat format;
   bool needs_refinement;

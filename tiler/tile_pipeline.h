@@ -66,7 +66,7 @@ struct PointHeights {
 };
 
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
-// that make answers are virtual for tests, which steer what a server serves.
+// that compute results are virtual, so that tests can replace them.
 //
 // Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another error, format or
 // coding of a kept tile costs a replay and an encoding. The bytes of a tile do not depend on the cache.

@@ -1,4 +1,4 @@
-// A tile request in canonical form: all parameters that change the bytes, and nothing else.
+// A tile request in canonical form: exactly the parameters that change the bytes.
 #pragma once
 
 #include <array>

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Checks who includes whom: the rooms' order, and where third-party libraries may appear.
+"""Checks includes: the order of the modules, and where third-party libraries may appear.
 
     tools/check_layers.py               check the tree; exit status 1 and one line for each violation
     tools/check_layers.py --self-test   check the checker
 
-Reads the #include lines alone. A quoted include names a file from the root of the repository. Tests may include everything.
+Reads only the #include lines. A quoted include names a file from the root of the repository. Tests may include everything.
 """
 import collections
 import os
@@ -16,21 +16,21 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- {bake, server}, and core <- config <- server (config knows VALUES as
-# well). In the server, asio.h stands below all, the files of the folder itself put the rooms together, and the command
-# line is above all:
-# net <- http, which know no product; jobs; store, jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api};
-# {telemetry, api} <- edge; {query, api} <- documents <- handlers; {edge, handlers} <- server <- cli, and tiles <- reload
-# <- cli. In the command line common <- {serve, mesh, info, bake} <- cli, and bake <- cli/bake.
+# A room is a module. The order is core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- {bake, server}, and core <-
+# config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
+# itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
+# jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
+# <- handlers; {frontend, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
+# mesh, info, bake} <- cli, and bake <- cli/bake.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
-# Of elevation models, each may know those before it.
+# Modules of elevation models: each may include those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
-# Headers of rooms below a front room: whoever may know the front room may include these.
+# Headers below a module that count as that module's own: every module that may include it may include these.
 DOORS = {front + "/" + name: front for front, names in {
     "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
                    "gdal/gdal_runtime.h", "gdal/remote_file.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
@@ -38,7 +38,7 @@ DOORS = {front + "/" + name: front for front, names in {
     "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
                "options/options.h"),
 }.items() for name in names}
-# Plain values that the configuration holds as they are: of these rooms config may include nothing else.
+# Plain values in the configuration's structs: config may include nothing else of these modules.
 VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
 HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
@@ -80,7 +80,7 @@ ROOMS = {
     "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
-# Library: which headers are its own, and which files may name them (regular expressions on paths). The first match counts.
+# Library: its headers, and the files that may include them (regular expressions on paths). The first match counts.
 Library = collections.namedtuple("Library", "name headers files")
 LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
@@ -107,7 +107,7 @@ LIBRARIES = [
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
-    # What a room promises not to know: threads and clocks, files, sockets.
+    # Libraries that a module promises not to use: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|server)/"),
     Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
@@ -117,15 +117,15 @@ LIBRARIES = [
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 
-# May show in a header that another room includes; inside the server Boost may, too (awaitable results), and between the
-# rooms of engine/dem GDAL, between those of config JSON.
+# These may appear in headers that other modules include. So may Boost inside the server (awaitable results), GDAL
+# between the modules of engine/dem, and JSON between those of config.
 PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
 
 
 def room_of(path):
-    """The room a file belongs to: itself, or the longest that is a folder of its path."""
+    """The module of a file: the file itself, or the longest module that is a folder of its path."""
     rooms = [room for room in ROOMS if path == room or path.startswith(room + "/")]
     return max(rooms, key=len, default=None)
 
@@ -152,7 +152,7 @@ class Tree:
                 for match in INCLUDE.finditer(text)]
 
     def libraries_behind(self, path, seen=None):
-        """Names of every library that including `path` brings in."""
+        """Names of all libraries that including `path` includes."""
         seen = set() if seen is None else seen
         names = set()
         if path in seen:

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks what no compiler sees: machine paths, package hosts and leftovers in any text file of the tree.
+"""Checks what compilers do not: machine paths, package hosts and leftovers in all text files of the tree.
 
     tools/check_tree.py               check; exit status 1 and one line for each finding
     tools/check_tree.py --self-test   check the checker
@@ -12,11 +12,11 @@ import sys
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-# Inputs of fuzz targets, byte by byte as they must be.
+# Inputs of fuzz targets, whose bytes must not change.
 CORPUS = re.compile(r"tests/fuzz/corpus/\w+/")
 SKIPPED_FOLDERS = {".git", ".deps", "build", "node_modules", "data"}
 
-# In pieces, so that this file does not find itself.
+# Split, so that this file does not match itself.
 HOSTS = "|".join(("registry" r"\.npmjs", "registry" r"\.yarnpkg", "deb" r"\.debian\.org", "snapshot" r"\.debian", "security" r"\.debian\.org",
                   "pypi" r"\.org", "files" r"\.pythonhosted", "deb" r"\.nodesource", "crates" r"\.io", "proxy" r"\.golang"))
 RULES = [
@@ -26,7 +26,7 @@ RULES = [
     (re.compile(r"\b(?:TO" r"DO|FIX" r"ME|X" r"XX)\b"), "is a note to oneself: do it, or open an issue"),
     (re.compile(r"[ \t]+$"), "ends in blanks"),
 ]
-# Words of this project's own that the field has other words for, in code and documents: (pattern, the field's word).
+# Words of this project for which the field has other words, in code and documents: (pattern, the field's word).
 RULES += [(re.compile(pattern), f"is a word of our own: the field says {word}") for pattern, word in (
     (r"\b[Ss]hee" r"ts?\b|\bShee" r"t[A-Z]|[a-z]Shee" r"ts?\b", "raster grid"),
     (r"\b(?:Raster|Chunk)Sur" r"vey|\bsur" r"vey (?:rec" r"ord|table)|Sur" r"vey(?:Pages|Assembler)", "raster statistics"),
@@ -37,12 +37,12 @@ RULES += [(re.compile(pattern), f"is a word of our own: the field says {word}") 
     (r"\bforeto" r"ld\b|\bforete" r"ll", "predicted"),
     (r"\b(?:GoO" r"n|She" r"d|HoldBa" r"ck|Loo" r"ker|Stra" r"y|Count" r"ing::)\b", "what it is"),
 )]
-# Of the product's own code; headers and documents of proto state numbers as JSON does.
+# For the product's code. Headers and documents that proto writes may have exponents, as in JSON.
 EXPONENT = re.compile(r"^(?!proto/|tests/).*\.(?:cc|h)$"), re.compile(r"\{\w*:[^{}\" ]*[eg]\}")
 
 
 def files():
-    """What git knows or would know; without git everything that was not built or fetched."""
+    """Files that git tracks or would track; without git all files that were not built or downloaded."""
     listing = subprocess.run(["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"], cwd=ROOT,
                              stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
     if listing.returncode == 0:
@@ -61,7 +61,7 @@ def findings(name, text):
                 yield f"{name}:{number}: '{match[0].strip()}' {message}"
         if EXPONENT[0].match(name) and (match := EXPONENT[1].search(line)):
             yield f"{name}:{number}: '{match[0]}' prints exponents such as 1e+06: use PlainNumber"
-    if name.endswith("-inl.h"):  # included once for each set of instructions
+    if name.endswith("-inl.h"):  # included once for each instruction set
         if "HWY_TARGET_TOGGLE" not in text:
             yield f"{name}:1: a header of instruction sets without the guard of HWY_TARGET_TOGGLE"
     elif name.endswith(".h") and "#pragma once" not in text:

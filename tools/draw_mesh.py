@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Draws a coloured mesh as Gouraud triangles and says how far it is from the image it was made of.
+"""Draws a coloured mesh as Gouraud triangles and prints its distance from the image of which it was made.
 
   terrace mesh photo.ppm --image --out photo.ply --points 4000 --coordinates pixel
   tools/draw_mesh.py photo.ppm drawn.ppm --mesh photo.ply           the triangles
   tools/draw_mesh.py photo.ppm drawn.ppm --mesh photo.ply --edges   their edges
   tools/draw_mesh.py photo.ppm drawn.ppm --uniform 64               64 x 64 samples, evenly spread, for comparison
 
-Images are binary PPM (P6, 255 levels): gdal_translate -of PNM makes them, gdal_translate -of PNG shows them. Needs
-nothing but Python.
+Images are binary PPM (P6, 255 levels); gdal_translate -of PNM makes them, and gdal_translate -of PNG converts them. Needs
+only Python.
 """
 import argparse
 import math
@@ -25,7 +25,7 @@ def read_ppm(path):
 
 
 def read_ply(path):
-    """What terrace writes: positions in doubles with three bytes of colour, then triangles."""
+    """Reads the PLY of terrace: positions as doubles with three bytes of colour, then triangles."""
     data = pathlib.Path(path).read_bytes()
     header, body = data.split(b"end_header\n", 1)
     if b"property uchar red" not in header:

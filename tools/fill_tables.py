@@ -1,16 +1,15 @@
 #!/usr/bin/env python3
-"""Puts measured tables into documentation, so that nobody copies numbers by hand.
+"""Writes measured tables into documentation, so that nobody copies numbers by hand.
 
     tools/fill_tables.py RESULTS.json PAGE.md
 
-RESULTS.json is what terrace_tin_bench or terrace_paper wrote. In the page, whatever stands between the lines
+RESULTS.json is the output of terrace_tin_bench or terrace_paper. In the page, the text between the lines
 
     <!-- table T1 -->
     <!-- end -->
 
-becomes the table of that id, and between `<!-- context -->` and `<!-- end -->` the machine, its load when the run began, and
-the compiler. Tables that
-the file does not hold stay as they are. An id of the file without a place in the page is an error.
+becomes the table of that id, and the text between `<!-- context -->` and `<!-- end -->` the machine, its load at the start of the run, and
+the compiler. Tables that are not in the file do not change. An id of the file without a place in the page is an error.
 """
 import json
 import pathlib

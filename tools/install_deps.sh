@@ -1,10 +1,7 @@
 #!/usr/bin/env bash
-# Installs what terrace needs on Debian 12: packages, the Boost 1.81 headers (.deps/boost), and the viewer's npm modules.
-# Does only what is missing, so that a second run takes a moment. Run as root, or as a user who may use sudo.
-#
-#   tools/install_deps.sh            what building and running need
-#   tools/install_deps.sh --test     and what the tests, benchmarks, formatting and load tests need
-#   tools/install_deps.sh --runtime  nothing but what a binary needs that was built elsewhere (docker/Dockerfile)
+# Installs what terrace needs on Debian 12: packages, the Boost 1.81 headers (.deps/boost), and the viewer's npm
+# modules. Installs only what is missing, so a second run takes a moment. Run it as root, or as a user who may use sudo.
+#   tools/install_deps.sh            everything for building and running   tools/install_deps.sh --test     also everything for tests, benchmarks, formatting and load tests   tools/install_deps.sh --runtime  only what a binary needs that was built elsewhere (docker/Dockerfile)
 set -euo pipefail
 export LC_ALL=C DEBIAN_FRONTEND=noninteractive
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -56,7 +53,7 @@ install_packages() {
   local wanted=("${build_packages[@]}") missing=() package
   $with_tests && wanted+=("${test_packages[@]}")
   $runtime_only && wanted=("${runtime_packages[@]}")
-  # Node from another source serves as well as Debian's, and would be removed by it.
+  # Node from another source is good enough, and Debian's package would remove it.
   if $runtime_only; then :
   elif ! command -v node > /dev/null || ! command -v npm > /dev/null; then wanted+=(nodejs npm); fi
   for package in "${wanted[@]}"; do is_installed "$package" || missing+=("$package"); done
@@ -65,7 +62,7 @@ install_packages() {
   refresh_package_lists
   echo "install_deps: apt-get install ${missing[*]}"
   as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
-  # The tests start one of their own; nobody asked for a web server on port 80.
+  # The tests start their own nginx; the service on port 80 is not wanted.
   if [[ " ${missing[*]} " == *" nginx-light "* && -d /run/systemd/system ]]; then as_root systemctl disable --quiet --now nginx || true; fi
 }
 

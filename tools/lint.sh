@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Everything that judges the sources without running them: layers, leftovers, Python, formatting, self-contained headers.
-# All checks run, whatever fails; the last line says how many did. `make lint` installs what they need first.
+# Static checks of the sources: layers, leftovers, Python, formatting, self-contained headers. All checks run, also
+# after a failure; the last line has the number of failures. `make lint` installs what they need first.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 jobs=${1:-$(nproc)} passed=0 failed=0

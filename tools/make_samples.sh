@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Makes the two sample elevation models of config/samples from Debian packages that carry public-domain data.
-# Needs apt-get, dpkg and gdal-bin; installs nothing, and leaves nothing behind but the two files.
+# Makes the two sample elevation models of config/samples from Debian packages that carry public-domain data. Needs
+# apt-get, dpkg and gdal-bin. Installs nothing, and leaves only the two files.
 #
 #   tools/make_samples.sh [OUTPUT_DIRECTORY]     default: config/samples
 set -euo pipefail
@@ -37,15 +37,15 @@ cat > shifted.vrt <<VRT
   </VRTRasterBand>
 </VRTDataset>
 VRT
-# Every second node: the centres of the new 10' pixels lie on centres of old ones, where "nearest" has no choice.
+# Takes every second node: the centres of the new 10' pixels are centres of old ones, so "nearest" is exact.
 gdalwarp -q -r near -ot Int16 -te -180.08333333333333 -90.08333333333333 179.91666666666667 90.08333333333333 \
   -ts 2160 1081 -of VRT shifted.vrt thinned.vrt
 gdal_translate -q -mo AREA_OR_POINT=Point "${geotiff[@]}" thinned.vrt "$out/etopo5.tif"
 
-# The DEM that matplotlib's shading examples use: 344 rows of 403 little-endian 16-bit heights behind a NumPy header, the
-# northern row first. xmin and xmax are the outer pixel edges (403 * 3"). ymax is the northern edge; the file's ymin,
-# ymax + 344 * 3", lies on the wrong side of it: the southern edge is ymax - 344 * 3". The highest sample, 1076 m, then falls on
-# Cross Mountain (1077 m at 36.1983 N 84.2306 W); with the file's own ymin it would lie 32 km to the north.
+# The DEM that matplotlib's shading examples use: 344 rows of 403 little-endian 16-bit heights behind a NumPy header,
+# the northern row first. xmin and xmax are the outer pixel edges (403 * 3"). ymax is the northern edge; the file's
+# ymin, ymax + 344 * 3", is on the wrong side of ymax: the southern edge is ymax - 344 * 3". Then the highest sample,
+# 1076 m, is on Cross Mountain (1077 m at 36.1983 N 84.2306 W); with the file's ymin it would be 32 km to the north.
 python3 - "$jacksboro" > jacksboro.raw <<'PYTHON'
 import struct, sys, zipfile
 with zipfile.ZipFile(sys.argv[1]) as archive:

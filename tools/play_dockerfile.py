@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Plays docker/Dockerfile where no container engine runs: each stage in a copy of a bare Debian root, by chroot.
+"""Runs docker/Dockerfile without a container engine: each stage in a copy of a bare Debian root, by chroot.
 
     sudo tools/play_dockerfile.py BASE FOLDER [--built PREFIX]
                        BASE: a tar of the image that FROM names, or of a debootstrap root
 
-With --built the stage that compiles is left out: what it installs is taken from PREFIX (cmake --install build/release --prefix).
+With --built the stage that compiles is skipped, and its installed files come from PREFIX (cmake --install build/release --prefix).
 
-Knows what the Dockerfile uses: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK; others are an error. Leaves the
-last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER, waits until HEALTHCHECK passes, fetches a tile, and ends it
-with SIGTERM, which must give exit code 0. Port 8080 must be free. Needs root; the network is the machine's.
+Supports the instructions of the Dockerfile: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK; others are an error. Leaves the
+last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER, waits until HEALTHCHECK passes, fetches a tile, and sends
+SIGTERM, which must give exit code 0. Port 8080 must be free. Needs root, and uses the machine's network.
 """
 import argparse
 import fnmatch
@@ -36,7 +36,7 @@ def instructions(text):
 
 
 def context():
-    """What COPY may see: the files of the repository that .dockerignore leaves, copied."""
+    """Copies the files that COPY may read: those of the repository that .dockerignore does not exclude."""
     ignored = [line for line in (ROOT / ".dockerignore").read_text().splitlines() if line]
     names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout.split("\0")
     folder = pathlib.Path(tempfile.mkdtemp(prefix="context-"))
@@ -50,7 +50,7 @@ def context():
 
 
 def inside(root, command, user=None, workdir="/"):
-    """The command line of a process in `root`, with mounts and processes of its own that end with it."""
+    """The command line of a process in `root` with its own mounts and process namespace, which end with it."""
     mounts = "mount --make-rprivate / && mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && "
     drop = f"--userspec={user} " if user else ""
     enter = "exec env -i PATH={1} HOME=/tmp chroot {2}{0} /bin/sh -c 'cd \"$0\" && exec \"$@\"' {3} \"$@\""
@@ -60,7 +60,7 @@ def inside(root, command, user=None, workdir="/"):
 
 def copy(source_root, root, workdir, rest):
     *sources, target = rest.split()
-    base = pathlib.Path(workdir) / target  # an absolute target stays
+    base = pathlib.Path(workdir) / target  # an absolute target replaces workdir
     destination = pathlib.Path(str(root) + str(base))
     into_folder = target.endswith("/") or len(sources) > 1 or target == "."
     for source in sources:
@@ -100,7 +100,7 @@ def play(base, folder, built):
             if rest.startswith("--from="):
                 stage, _, rest = rest[len("--from="):].partition(" ")
                 source = stages[stage]
-                if built:  # holds what the stage would have below /opt/terrace
+                if built:  # contains what the stage would install below /opt/terrace
                     rest = rest.replace("/opt/terrace", "/", 1)
             copy(source, root, workdir, rest)
         elif word == "RUN":

@@ -11,7 +11,7 @@ import sys
 
 WIDTH, HEIGHT = 720, 440
 LEFT, RIGHT, TOP, BOTTOM = 70, 190, 40, 50
-# Okabe and Ito's colours: told apart with any eyesight.
+# Okabe and Ito's colours, distinguishable for colour-blind readers.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#999999")
 
 
@@ -24,7 +24,7 @@ class Axis:
         self.low, self.high = self.low - margin, self.high + margin
         self.start, self.end = start, end
         decade = abs(end - start) / (self.high - self.low)
-        self.steps = (1, 2, 5) if decade * 0.3 >= room else (1,)  # from 1 to 2 it is 0.3 of a decade
+        self.steps = (1, 2, 5) if decade * 0.3 >= room else (1,)  # from 1 to 2 is 0.3 of a decade
 
     def at(self, value):
         share = (math.log10(value) - self.low) / (self.high - self.low)

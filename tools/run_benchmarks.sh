@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Builds the benchmarks and runs them: first the table of the engine's targets, then the programs on Google Benchmark
-# (executables named *_bench). Results go to build/bench/results/NAME.json, with the machine, the compiler and the commit.
+# Builds the benchmarks and runs them: first the table of the engine's targets, then the programs that use Google
+# Benchmark (executables named *_bench). Results go to build/bench/results/NAME.json, with the machine, the compiler and
+# the commit.
 #
 #   tools/run_benchmarks.sh [JOBS] [options of terrace_tin_bench, such as --peer 'COMMAND' or --filter 'T1 ']
-#   tools/run_benchmarks.sh --docs [JOBS] [options]     and puts the tables into docs/performance.md
+#   tools/run_benchmarks.sh --docs [JOBS] [options]     also writes the tables into docs/performance.md
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 docs=false

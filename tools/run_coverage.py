@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Which lines of each room the tests run: builds with clang's counters, runs ctest, and prints a table.
+"""Shows which lines of each module the tests run: builds with clang's counters, runs ctest, and prints a table.
 
     tools/run_coverage.py [--jobs N] [--missed] [--keep] [--no-run] [CTEST_OPTION ...]
 
---missed names the lines that never run, of every file with five of them or more. --keep adds to the counts of earlier runs in
-build/coverage/profiles, --no-run takes them alone. Tests that kill the server leave no counts of it, nor do those that run out of
-their time. Exit status 1 if a room is below 90 %.
+--missed prints the lines that never ran, for every file with five or more of them. --keep adds to the counts of earlier runs in
+build/coverage/profiles; --no-run uses only those. A server that a test kills leaves no counts, and neither does a test that times
+out. Exit status 1 if a module is below 90 %.
 """
 import argparse
 import collections
@@ -36,13 +36,13 @@ def run_tests(jobs, keep, options):
     if not keep:
         shutil.rmtree(PROFILES, ignore_errors=True)
     PROFILES.mkdir(exist_ok=True)
-    # A file for each binary, which its processes add to.
+    # One file for each binary; its processes add their counts.
     environment = os.environ | {"LLVM_PROFILE_FILE": f"{PROFILES}/%4m.profraw"}
     run(["ctest", "--test-dir", BUILD, "-j", str(jobs), "--output-on-failure", *options], env=environment)
 
 
 def export(*options):
-    """What llvm-cov writes about all binaries of the build."""
+    """The output of llvm-cov export for all binaries of the build."""
     merged = BUILD / "all.profdata"
     run(["llvm-profdata-14", "merge", "-sparse", "-o", merged, *sorted(PROFILES.glob("*.profraw"))], check=True)
     binaries = [path for path in sorted(BUILD.rglob("*"))
@@ -53,7 +53,7 @@ def export(*options):
 
 
 def name_of(path):
-    """Below the root: ccache may have made it build/coverage/../../config/config.h."""
+    """The path below the root: with ccache it may be build/coverage/../../config/config.h."""
     return os.path.relpath(path, ROOT)
 
 
@@ -64,7 +64,7 @@ def summaries():
 
 
 def missed_lines():
-    """File -> the numbers of its lines that never run."""
+    """File -> the numbers of its lines that never ran."""
     missed, name = collections.defaultdict(list), None
     for line in export("-format=lcov").decode().splitlines():
         key, _, value = line.partition(":")
@@ -76,7 +76,7 @@ def missed_lines():
 
 
 def ranges(numbers):
-    """"3-5, 9" of 3, 4, 5, 9."""
+    """Turns 3, 4, 5, 9 into "3-5, 9"."""
     found = []
     for number in sorted(numbers):
         if found and found[-1][1] == number - 1:

@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Repeats the paper's experiments on its five elevation models, which the folder TERRACE_TEST_DATA must hold (by default
-# ../shared/data). Numbers, plots and pictures go to build/paper.
+# Repeats the paper's experiments on its five elevation models, which must be in the folder TERRACE_TEST_DATA (by
+# default ../shared/data). Numbers, plots and pictures go to build/paper.
 #
 #   tools/run_paper.sh [JOBS]
-#   tools/run_paper.sh --docs [JOBS]     and puts them into docs/engine.md and docs/images/engine
+#   tools/run_paper.sh --docs [JOBS]     also writes them into docs/engine.md and docs/images/engine
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 docs=false

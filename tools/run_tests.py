@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Builds and runs the tests: everything in release, the GoogleTest binaries once more under both sanitizers.
+"""Builds and runs the tests: all of them in release, and the GoogleTest binaries also under both sanitizers.
 
     tools/run_tests.py [--jobs N] [SUITE ...]     suites: release asan tsan; default: all three, in this order
 
-A sanitizer suite takes tests that are executables of the build, and builds only these: `asan` all but those labelled
-`slow`, `tsan` those labelled `threads`, which are about what several threads do at once. The last line says
-`N passed, N failed`, counted from ctest's own reports; a test that could not be built or found counts as failed. Exit status 0 only if everything was built and nothing failed.
+A sanitizer suite runs tests that are executables of the build, and builds only these: `asan` all except those labelled
+`slow`, `tsan` those labelled `threads`, which test several threads at once. The last line is
+`N passed, N failed`, counted from ctest's reports; a test that could not be built or found counts as failed. Exit status 0
+only if everything was built and nothing failed.
 """
 import argparse
 import dataclasses
@@ -25,7 +26,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 @dataclasses.dataclass(frozen=True)
 class Suite:
     name: str  # of the CMake preset
-    choice: tuple = ()  # of ctest, by label; a suite with one takes executables of the build alone
+    choice: tuple = ()  # ctest's options that select by label; a suite with a choice runs only executables of the build
     environment: dict = dataclasses.field(default_factory=dict)
 
 
@@ -66,7 +67,7 @@ def run(command, **kwargs):
 
 
 def programs_of(build, choice):
-    """Test -> executable of the build, of the chosen tests. terrace_test gives both one name; shards have a number."""
+    """Test -> executable of the build, for the chosen tests. terrace_test gives both the same name; shards have a number."""
     listing = subprocess.run(["ctest", "--test-dir", str(build), "--show-only=json-v1", *choice], cwd=ROOT, check=True,
                              stdout=subprocess.PIPE, stdin=subprocess.DEVNULL)
     targets = subprocess.run(["ninja", "-C", str(build), "-t", "targets", "all"], check=True, stdout=subprocess.PIPE, text=True)
@@ -90,7 +91,7 @@ def count(report):
 
 
 def address_space_prefix():
-    """clang-14's ThreadSanitizer cannot live with the address randomization of recent kernels: ask for none, if allowed."""
+    """clang-14's ThreadSanitizer fails with the address randomization of recent kernels, so this turns it off if allowed."""
     prefix = ["setarch", os.uname().machine, "--addr-no-randomize"]
     if shutil.which("setarch") and subprocess.run([*prefix, "true"], stderr=subprocess.DEVNULL).returncode == 0:
         return prefix
@@ -103,11 +104,12 @@ def run_suite(suite, jobs):
     if run(["cmake", "--preset", suite.name, "-DTERRACE_BUILD_TESTS=ON", "--log-level=WARNING"]) != 0:
         return Outcome(broken=[f"{suite.name}: configure"])
     outcome = Outcome()
-    # -k 0: what can be built is built and tested, what cannot is reported by ctest as failed.
+    # -k 0: builds and tests as much as possible; ctest reports the rest as failed.
     build_command = ["ninja", "-C", str(build), "-j", str(jobs), "-k", "0"]
     report = build / "ctest.xml"
     report.unlink(missing_ok=True)
-    # Many tests wait for a server or a clock most of the time. Those that need all processors run alone.
+    # Most tests wait for a server or a clock most of the time, hence twice as many jobs. Tests that need all processors
+    # run alone.
     ctest = ["ctest", "--test-dir", str(build), "--output-on-failure", "--no-tests=error", "-j", str(2 * jobs),
              "--output-junit", str(report)]
     if suite.choice:

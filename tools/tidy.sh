@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# clang-tidy over the product. Reads the unity sources of the sanitizer build: each header is parsed once for eight sources, which
-# takes a fifth of the time.
+# Runs clang-tidy over the product, on the unity sources of the sanitizer build: each header is parsed once for eight
+# sources, which takes a fifth of the time.
 #
 #   tools/tidy.sh [JOBS]
 set -euo pipefail

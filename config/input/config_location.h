@@ -16,7 +16,7 @@ namespace terrace::config {
 
 class ConfigLocation {
  public:
-  // `errors` must outlive this and every place made from it.
+  // `errors` must outlive this and every location made from it.
   ConfigLocation(std::filesystem::path directory, std::string path, std::vector<ConfigError>& errors)
       : directory_(std::move(directory)), path_(std::move(path)), errors_(&errors) {}
   // The command line. Empty directory: the working directory has no name.

@@ -19,16 +19,16 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .value = "NAME",
        .help = "Name of the dataset in URLs; by default the name of the file without its extension",
        .details = "1 to 64 letters, digits, `.`, `_` or `-`; not `.`, `..`, `datasets`, `viewer`, `livez`, `readyz` or "
-                  "`metrics`. A DEM of the command line is named after its file; other characters become `-`",
+                  "`metrics`. A DEM on the command line is named after its file; other characters become `-`",
        .codec = Text(&DatasetConfig::name, CheckDatasetName, NameSchema()),
        .other_words = "id title",
        .missing = "; every dataset needs one"},
       {.key = "sources",
        .help = "Files, globs and folders of rasters, in order of priority",
-       .details = "The first that has a height at a place gives it: [mosaics](#mosaics). Globs have `*`, `?` and "
-                  "`[...]`; a folder stands for all rasters in it, not in folders below. Relative to the folder of the "
-                  "file. Each is a text, or an object such as `{\"path\": \"srtm/\", \"vertical\": \"egm96\", "
-                  "\"nodata\": -9999}` for what differs from the dataset",
+       .details = "At each place, the first source that has a height is used: [mosaics](#mosaics). Globs have `*`, `?` "
+                  "and `[...]`. A folder stands for all rasters in it, without its subfolders. Relative to the folder "
+                  "of the file. Each entry is a text, or an object such as `{\"path\": \"srtm/\", \"vertical\": "
+                  "\"egm96\", \"nodata\": -9999}` with options that differ from the dataset's",
        .codec = SourcesCodec(),
        .other_words = "paths file files dem dems raster rasters input inputs",
        .missing = "; every dataset needs one, or \"baked\"",
@@ -47,39 +47,40 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .help =
            "Vertical datum of the heights: crs (as the source states), unknown, ellipsoid, egm96, egm2008, EPSG:N or "
            "the path of a grid",
-       .details = "`EPSG:5703` is a vertical reference system. A grid of undulations is a path (`.gtx`, `.tif`), "
-                  "relative to the folder of the file. [More](#heights)",
+       .details = "`EPSG:5703` is an example of a vertical reference system. A grid of undulations is a path (`.gtx`, "
+                  "`.tif`), relative to the folder of the file. [More](#heights)",
        .codec = VerticalCodec(),
        .other_words = "datum geoid"},
       {.key = "nodata",
        .value = "VALUE",
-       .help = "Which samples are voids: auto (declared and detected nodata values), declared, or a number (one more)",
-       .details =
-           "`auto` detects undeclared values beside the declared one. A number or a list of numbers (raw values) "
-           "are voids beside the declared one. [More](#voids)",
+       .help = "Which samples are voids: auto (declared and detected nodata values), declared, or a number (declared "
+               "values and this one)",
+       .details = "`auto` also detects undeclared values. A number or a list of numbers (raw values) adds them to the "
+                  "declared value. [More](#voids)",
        .codec = NodataCodec()},
       {.key = "attribution",
        .value = "TEXT",
        .help = "Attribution shown by clients",
-       .details = "On one line",
+       .details = "One line",
        .codec = OneLine(&DatasetConfig::attribution),
        .other_words = "copyright credit credits license licence"},
       {.key = "error_fraction",
        .value = "SHARE",
-       .help = "Default error of a level as a share of the error that clients assume there",
+       .help = "Default error of a level as a fraction of the error that clients assume there",
        .details = "They assume 77,067 m / 2^level",
        .codec = Number(&DatasetConfig::error_fraction, 0.05, 1),
        .other_words = "max_error"},
       {.key = "finest_error",
        .value = "METRES",
-       .help = "Largest default error of the deepest level; by default a tenth of the source's spacing",
+       .help = "Largest default error of the deepest level; by default a tenth of the source's sample spacing",
        .details = "The deepest level is the first whose default error is at most this. The spacing is that of the "
-                  "finest source's samples",
+                  "finest source",
        .codec = Number(&DatasetConfig::finest_error, 0.001, 100'000),
        .other_words = "max_error tolerance resolution"},
       {.key = "floor",
        .value = "METRES",
-       .help = "Height outside the sources and in voids that nothing fills; by default their lowest height",
+       .help =
+           "Height outside the sources and in voids that are not filled; by default the lowest height of the sources",
        .details = "Above the WGS 84 ellipsoid",
        .codec = Number(&DatasetConfig::floor, -kMaxHeight, kMaxHeight)},
       {.key = "max_void_gap",
@@ -88,36 +89,37 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .codec = Integer(&DatasetConfig::max_void_gap, 0, 4096)},
       {.key = "voids",
        .value = "NAME",
-       .help = "What larger voids with data all around them show: smooth (a surface between their edges) or floor",
-       .details = "Where no other source has a height. [More](#voids)",
+       .help =
+           "Surface in larger voids with data all around them: smooth (between the heights at their edges) or floor",
+       .details = "It applies where no other source has a height. [More](#voids)",
        .codec = Choice(&DatasetConfig::voids, {{"smooth", dem::HoleFill::kSmooth}, {"floor", dem::HoleFill::kFloor}}),
        .other_words = "holes"},
       {.key = "feather",
        .value = "METRES",
        .help = "Distance from edges and voids over which a source blends into the sources below; 0 is a hard edge",
-       .details = "At most 256 of its samples. [More](#mosaics)",
+       .details = "At most 256 samples of the source. [More](#mosaics)",
        .codec = Number(&DatasetConfig::feather, 0, 1'000'000),
        .other_words = "blend blending"},
       {.key = "criterion",
        .value = "NAME",
-       .help = "How triangles are joined: delaunay, or data-dependent: smaller tiles, more time to build",
-       .details = "`delaunay` avoids thin triangles; `data-dependent` fits them to the heights: an eighth to a fifth "
-                  "fewer vertices for the same error, which is kept either way, but thinner triangles and about twice "
-                  "the time to refine",
+       .help = "How triangles are connected: delaunay, or data-dependent (smaller tiles that take longer to build)",
+       .details =
+           "`delaunay` avoids thin triangles. `data-dependent` fits triangles to the heights: an eighth to a fifth "
+           "fewer vertices within the same error, but thinner triangles and about twice the time to refine",
        .codec = Choice(&DatasetConfig::criterion,
                        {{"delaunay", tin::Criterion::kDelaunay}, {"data-dependent", tin::Criterion::kDataDependent}})},
       {.key = "compact",
        .value = "true|false",
-       .help = "Drop the vertices that a tile's error does not need: smaller tiles, more time to build",
-       .details = "About a third fewer at the same error, and 34 to 52 % fewer bytes, for about a tenth more "
-                  "time to build a tile and a quarter more for another error of one that is kept; edges stay "
-                  "as they are. Heights stay within the error but use more of it. "
-                  "[Decision 18](decisions/0018-compact-stays-an-option.md) has when it is worth it",
+       .help = "Remove the vertices that a tile's error does not need: smaller tiles that take longer to build",
+       .details = "About a third fewer vertices within the same error, and 34 to 52 % fewer bytes. A tile takes about "
+                  "a tenth longer to build; another error of a tile whose refinement is in the cache takes a quarter "
+                  "longer. Edges do not change. Heights stay within the error but use more of it. [Decision "
+                  "18](decisions/0018-compact-stays-an-option.md) says when it is worth it",
        .codec = Switch(&DatasetConfig::compact)},
       {.key = "glb_compression",
        .value = "NAME",
-       .help = "Compression of GLB tiles whose requests name none: draco, none, quantized or meshopt",
-       .details = "[Which client takes which](formats/glb.md#compression)",
+       .help = "Compression of GLB tiles whose requests do not name one: draco, none, quantized or meshopt",
+       .details = "[Which client reads which](formats/glb.md#compression)",
        .codec = Choice(&DatasetConfig::glb_compression, {{"draco", proto::GlbCompression::kDraco},
                                                          {"none", proto::GlbCompression::kNone},
                                                          {"quantized", proto::GlbCompression::kQuantized},
@@ -125,38 +127,39 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {.key = "draco_speed",
        .value = "N",
        .help = "Speed of Draco for GLB tiles: 0 makes the smallest tiles, 10 is fastest",
-       .details = "3 makes large tiles 8 % smaller for half as much encoding time again or more; 10 codes each "
-                  "triangle by itself, and tiles are three times as large",
+       .details = "3 makes large tiles 8 % smaller, and encoding takes half as long again or more. 10 encodes each "
+                  "triangle separately, and tiles are three times as large",
        .codec = Integer(&DatasetConfig::draco_speed, 0, 10)},
       {.key = "draco_normal_bits",
        .value = "N",
        .help = "Bits of each of the two coordinates of a normal in Draco tiles",
-       .details = "With 8, as in quantized-mesh, a normal is less than a degree off",
+       .details = "With 8 bits, as in quantized-mesh, a normal is less than a degree off",
        .codec = Integer(&DatasetConfig::draco_normal_bits, 4, 16)},
       {.key = "water",
        .value = "METRES|FILE",
        .help = "Water masks: a sea level, or a raster that is not zero on water",
-       .details = "For clients that ask for them. In the file `{\"sea_level\": 0}`: metres, -20,000 to 20,000; the "
-                  "dataset's heights at or below it are water. Or `{\"mask\": \"water.tif\"}`: a raster, relative to "
-                  "the folder of the file. As a flag a number is a sea level and other text a raster. [More](#water)",
+       .details = "Tiles have a mask if the client requests it. In the file, `{\"sea_level\": 0}` is a height in "
+                  "metres, -20,000 to 20,000; heights of the dataset at or below it are water. `{\"mask\": "
+                  "\"water.tif\"}` is a raster, relative to the folder of the file. As a flag, a number is a sea level "
+                  "and other text a raster. [More](#water)",
        .codec = WaterCodec()},
       {.key = "imagery",
        .value = "FILE",
-       .help = "Image that the textures of GLB tiles are cut from",
+       .help = "Image from which the textures of GLB tiles are made",
        .details = "In the file `{\"image\": \"photo.tif\"}`, relative to its folder; as a flag the path alone. "
                   "[More](#imagery)",
        .codec = ImageryCodec(),
        .other_words = "photo ortho orthophoto"},
       {.key = "public",
        .value = "true|false",
-       .help = "Served without a token, where the server has tokens",
+       .help = "Serve the dataset without a token, if the server has tokens",
        .details = "[More](#tokens)",
        .codec = Switch(&DatasetConfig::is_public),
        .other_words = "open anonymous"},
       {.key = "metadata_availability",
        .value = "LEVELS",
        .help = "Interval of levels at which tiles list the tiles below them; 0 is none",
-       .details = "With 0 `layer.json` alone tells clients. [More](#where-tiles-are)",
+       .details = "With 0, only `layer.json` tells clients which tiles exist. [More](#where-tiles-are)",
        .codec = Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };
   return table;

@@ -24,9 +24,9 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
   static const std::vector<Option<DiskCacheConfig>> table = {
       {.key = "directory",
        .value = "DIR",
-       .help = "Directory of the cache; one server at a time uses it",
-       .details = "Made if it is missing; best one that holds nothing else. A second server that names it does not "
-                  "start",
+       .help = "Folder of the cache; only one server at a time can use it",
+       .details = "The server creates it if it is missing. It should contain nothing else. A second server with the "
+                  "same folder does not start",
        .codec = Path(&DiskCacheConfig::directory, "the path of a directory"),
        .missing = ": where the cache is kept"},
       {.key = "tile_bytes",
@@ -37,8 +37,8 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
       {.key = "refinement_bytes",
        .value = "BYTES",
        .help = "Disk for the refinements that tiles are made from; 0 keeps none",
-       .details = "At least 16 MiB, or 0: about 50 kB a tile at default errors. They make another error, format or "
-                  "coding of a tile cheap after a restart as well",
+       .details = "At least 16 MiB, or 0: about 50 kB a tile at default errors. With refinements on disk, another "
+                  "error, format or coding of a tile takes little time after a restart as well",
        .codec = FileBytes(&DiskCacheConfig::refinement_bytes)},
   };
   return table;

@@ -74,7 +74,7 @@ std::string MeaningOf(const Option<Target>& option, bool has_flag) {
   if (!option.unless.empty()) meaning = fmt::format("Required without `{}`. ", option.unless);
   meaning += option.help;
   if (!option.details.empty()) meaning += fmt::format(". {}", option.details);
-  if (option.is_live) meaning += ". A change takes no restart";
+  if (option.is_live) meaning += ". A change needs no restart";
   // A vertical bar ends a cell.
   for (std::size_t at = 0; (at = meaning.find('|', at)) != std::string::npos; at += 2) meaning.insert(at, "\\");
   return meaning;
@@ -126,7 +126,7 @@ std::string SchemaText() {
                  {"title", "terrace configuration"},
                  {"description",
                   "What `terrace serve --config` reads. Every key is optional; docs/configuration.md explains them. "
-                  "Relative paths count from the folder of the file."}};
+                  "Relative paths are relative to the folder of the file."}};
   Json object = ObjectSchema(ServerOptionTable());
   object["properties"][kSchemaKey] = {{"description", "Where editors find this schema; the server does not read it."},
                                       {"type", "string"}};

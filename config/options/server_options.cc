@@ -92,8 +92,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "HOST:PORT",
        .section = "listening",
        .help = "Address and port to listen on; port 0 picks a free one",
-       .details = "IPv6 in brackets: `[::1]:8080`; every interface: `0.0.0.0:8080` or `[::]:8080`. The line that the "
-                  "server prints names the port",
+       .details = "An IPv6 address is in brackets: `[::1]:8080`. `0.0.0.0:8080` or `[::]:8080` is every interface. The "
+                  "server prints one line with the port that it uses",
        .codec = Listen(),
        .other_words = "port host address bind interface ip"},
       {.key = "datasets",
@@ -107,26 +107,25 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "DIR|false",
        .section = "listening",
        .help = "Folder of the web page at /; true is the page that comes with terrace, false is none",
-       .details = "Without one, `/` is a plain list of datasets. The folder's `index.html` is the page; all of its "
-                  "files are below `/viewer/`, so links to them begin with `viewer/` in that page. They are read once, "
-                  "at the start; symbolic links to files are followed, those to folders are not",
+       .details = "Without a viewer, `/` is a plain list of datasets. The page is the folder's `index.html`. All files "
+                  "of the folder are served below `/viewer/`, so the page links to them as `viewer/...`. The server "
+                  "reads them once, at the start. It follows symbolic links to files, not to folders",
        .codec = Viewer(),
        .other_words = "ui web html static www"},
       {.key = "cache_control",
        .value = "TEXT",
        .section = "listening",
-       .help = "Cache-Control header of tiles that are asked for without their version",
-       .details =
-           "One line of ASCII. Tiles with their version, as in the URLs of all documents, are kept for a year, and "
-           "documents are asked for again each time",
+       .help = "Cache-Control header of tiles requested without their version",
+       .details = "One line of ASCII. Clients keep tiles requested with their version, as in the URLs of all "
+                  "documents, for a year. They revalidate documents on each use",
        .codec = Text(&Config::cache_control, CheckCacheControl, Json::parse(kCacheControlSchema)),
        .other_words = "max_age",
        .is_live = true},
       {.key = "io_threads",
        .value = "N",
        .section = "load",
-       .help = "Threads that talk to clients",
-       .details = "They only move bytes; one or two serve most machines",
+       .help = "Threads that send and receive",
+       .details = "They do not build tiles; one or two are enough for most machines",
        .codec = Integer(&Config::io_threads, 1, 64)},
       {.key = "worker_threads",
        .value = "N",
@@ -137,41 +136,42 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "cache_dir",
        .value = "DIR|none",
        .section = "load",
-       .help = "Folder for statistics and averages of sources, so that the next start needs no scan; none is no folder",
-       .details = "By default `$CACHE_DIRECTORY`, which systemd sets, else `$XDG_CACHE_HOME/terrace`, else "
-                  "`~/.cache/terrace`; a line of the log says where it is. An empty text is `none`, and a folder of "
-                  "one of these two names is `./default` or `./none`. It holds the ranges of "
-                  "sources, the errors of their averages and the averages that shallow tiles are made of, where "
-                  "overviews of the source do not have them: about 0.4 bytes for each sample, and 1.4 of sources with "
-                  "more than 4096 x 4096. It is made with progress and continued where it was "
-                  "interrupted. Sources are told "
-                  "apart by path, size and times: a replaced one is prepared anew. Several servers may share the "
-                  "folder. Without it, or where it fails, averages are [kept in memory](operations.md#cache_dir) as "
-                  "far as they fit. Relative to the folder of the file",
+       .help = "Folder that keeps statistics and averages of sources, so that the next start need not read them; none "
+               "keeps nothing",
+       .details =
+           "The default is `$CACHE_DIRECTORY`, which systemd sets, else `$XDG_CACHE_HOME/terrace`, else "
+           "`~/.cache/terrace`; the log names the folder. An empty text is `none`. For a folder with one of these two "
+           "names, write `./default` or `./none`. The folder holds the ranges of sources, the errors of their "
+           "averages, and the averages for shallow tiles if the source has no such overviews: about 0.4 bytes per "
+           "sample, or 1.4 for sources with more than 4096 x 4096 samples. The log reports progress; an interrupted "
+           "pass continues at the next start. Sources are identified by path, size and times, so a replaced source is "
+           "read again. Several servers may share the folder. Without the folder, or if it fails, averages are [kept "
+           "in memory](operations.md#cache_dir) as far as they fit. Relative to the folder of the file",
        .codec = CacheDir()},
       {.key = "cache_dir_bytes",
        .value = "BYTES",
        .section = "load",
-       .help = "Size of the files in cache_dir; 0 is no folder",
-       .details = "Before it is exceeded, files that were not used for longest are removed, but none that this server "
-                  "uses, and nothing that terrace did not write. What finds no room is kept in memory as far as it "
-                  "fits, and `/readyz` says `degraded`",
+       .help = "Largest total size of the files in cache_dir; 0 keeps nothing",
+       .details = "If the limit would be exceeded, the least recently used files are removed, except those that this "
+                  "server uses and those that terrace did not write. Data for which the folder has no space is kept in "
+                  "memory as far as it fits, and `/readyz` says `degraded`",
        .codec = Bytes(&Config::cache_dir_bytes, kMaxCacheBytes),
        .other_words = "cache_size"},
       {.key = "queue_length",
        .value = "N",
        .section = "load",
        .help = "Builds that may wait for a worker; more are refused with 503",
-       .details = "A bound of memory, and more than one connection ever has waiting. Beyond it the newest build of the "
-                  "client that has most waiting gets 503 with `Retry-After`. A client is a token or an address (the "
-                  "/64 of an IPv6 one). The client that has used least of the workers' time is served next; of its own "
-                  "builds shallow tiles go first, a level counting as a tenth of a second of waiting",
+       .details = "The limit bounds memory. If it is exceeded, the newest build of the client with the most waiting "
+                  "builds gets 503 with `Retry-After`. A client is a token or an address (for IPv6, the /64). The "
+                  "client that has used the least worker time is served next. Among the builds of one client shallow "
+                  "tiles go first; each level counts as a tenth of a second of waiting",
        .codec = Integer(&Config::queue_length, 1, 1'000'000)},
       {.key = "cache_bytes",
        .value = "BYTES",
        .section = "load",
        .help = "Memory for finished tiles, such as 512MB or 1GiB; 0 is no cache",
-       .details = "Bytes, or text with B, kB, MB, GB, TB, KiB, MiB, GiB or TiB, as in all options in bytes",
+       .details =
+           "A number of bytes, or text with B, kB, MB, GB, TB, KiB, MiB, GiB or TiB; so are all options in bytes",
        .codec = Bytes(&Config::cache_bytes, kMaxCacheBytes),
        .other_words = "cache cache_size memory",
        .is_live = true},
@@ -179,93 +179,97 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "BYTES",
        .section = "load",
        .help = "Memory for the refinements that tiles are made from; 0 is no cache",
-       .details = "About half a megabyte a tile. Another error, format or coding of a tile then costs a fraction of "
-                  "the first one",
+       .details = "About half a megabyte a tile. With its refinement in the cache, another error, format or coding of "
+                  "a tile costs a fraction of the first one",
        .codec = Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes),
        .is_live = true},
       {.key = "disk_cache",
        .value = "DIR",
        .section = "load",
-       .help = "Directory that keeps finished tiles and refinements across restarts",
-       .details = "In the file an object, `{\"directory\": \"/var/cache/terrace\"}`; as a flag the directory alone. "
+       .help = "Folder that keeps finished tiles and refinements across restarts",
+       .details = "In the file an object, `{\"directory\": \"/var/cache/terrace\"}`; as a flag the folder alone. "
                   "Relative to the folder of the file. [More](#disk-cache)",
        .codec = DiskCacheOption(),
        .other_words = "cache"},
       {.key = "gdal_cache_bytes",
        .value = "BYTES",
        .section = "load",
-       .help = "Memory for blocks of the sources, as GDAL reads them",
-       .details = "In all threads together. `/metrics` tells how much is in use",
+       .help = "Memory for blocks of the sources that GDAL has read",
+       .details = "For all threads together. `/metrics` shows how much is in use",
        .codec = Bytes(&Config::gdal_cache_bytes, kMaxCacheBytes)},
       {.key = "max_open_sources",
        .value = "N",
        .section = "load",
-       .help = "Files of sources, of all datasets, that are kept open between reads",
-       .details = "Rasters, images, grids of PROJ. Those used longest ago are closed; those in use come on top, one "
-                  "for each thread. Fewer where [descriptors](operations.md#descriptors) are scarce",
+       .help = "Files of sources, of all datasets, that stay open between reads",
+       .details = "Rasters, images, and grids of PROJ. The least recently used ones are closed. Files in use do not "
+                  "count; each thread uses at most one. The server lowers the number if "
+                  "[descriptors](operations.md#descriptors) are scarce",
        .codec = Integer(&Config::max_open_sources, 0, 100'000)},
       {.key = "max_connections",
        .value = "N",
        .section = "load",
-       .help = "Connections at a time; for one more, one of the client that has most is closed",
-       .details = "A new one takes its place, idle ones going first. A new one of that client itself gets 503 with "
-                  "`Retry-After` where it has none to give up; with `tls` it is closed during the handshake. Fewer "
-                  "where [descriptors](operations.md#descriptors) are scarce",
+       .help = "Connections at a time; one more closes a connection of the client that has the most",
+       .details =
+           "Idle connections are closed first. If the new connection is from that client itself, and none of its "
+           "connections can be closed, the new one gets 503 with `Retry-After`; with `tls` it is closed during the "
+           "handshake. The server lowers the number if [descriptors](operations.md#descriptors) are scarce",
        .codec = Integer(&Config::max_connections, 1, 1'000'000)},
       {.key = "max_connections_per_client",
        .value = "N",
        .section = "load",
        .help = "Connections of one client at a time; 0 is no limit",
-       .details = "A client is an IPv4 address, or the /64 of an IPv6 address. More get 429; with `tls` they are "
-                  "closed during the handshake. [Trusted proxies](#behind-a-proxy) do not count",
+       .details =
+           "A client is an IPv4 address, or the /64 of an IPv6 address. Further connections get 429; with `tls` they "
+           "are closed during the handshake. The limit does not apply to [trusted proxies](#behind-a-proxy)",
        .codec = Integer(&Config::max_connections_per_client, 0, 1'000'000)},
       {.key = "transfer_bytes",
        .value = "BYTES",
        .section = "load",
-       .help = "Memory for replies that clients have not taken yet, and for request bodies",
-       .details = "[Bodies on their way](operations.md#bodies-on-their-way): half for replies of up to a sixteenth of "
-                  "it, a quarter for larger ones, a quarter for request bodies. Bodies up to 16 KiB do not count",
+       .help = "Memory for replies that clients have not received yet, and for request bodies",
+       .details =
+           "[Bodies on their way](operations.md#bodies-on-their-way): half of it is for replies of up to a sixteenth "
+           "of it, a quarter for larger replies, and a quarter for request bodies. Bodies up to 16 KiB do not count",
        .codec = Bytes(&Config::transfer_bytes, kMaxCacheBytes)},
       {.key = "requests_per_second",
        .value = "N",
        .section = "load",
-       .help = "Requests of one client or token a second, on average; more wait, or get 429; 0 is no limit",
-       .details = "A request waits for its turn, and gets 429 with `Retry-After` where that comes after "
-                  "`request_deadline_s`. `/livez` and `/readyz` do not count; all others do, also those that are "
+       .help = "Average rate of requests of one client or token; more wait, or get 429; 0 is no limit",
+       .details = "A request above the rate waits. It gets 429 with `Retry-After` if it would wait longer than "
+                  "`request_deadline_s`. `/livez` and `/readyz` do not count; all other requests do, also those "
                   "answered with 404 or 405",
        .codec = Number(&Config::requests_per_second, 0, 1'000'000),
        .other_words = "rate rate_limit"},
       {.key = "request_burst",
        .value = "N",
        .section = "load",
-       .help = "Requests of one client or token at once; 0 is twice requests_per_second",
-       .details = "A viewer asks for some hundreds of tiles when it starts",
+       .help = "Requests that one client or token may send at once; 0 is twice requests_per_second",
+       .details = "A viewer requests some hundreds of tiles when it starts",
        .codec = Number(&Config::request_burst, 0, 1'000'000)},
       {.key = "tokens",
        .section = "access",
-       .help = "Tokens, and the datasets that each may see; without any, everybody sees everything",
+       .help = "Tokens, and the datasets that each one opens; without tokens, all datasets are open to everybody",
        .details = "[More](#tokens)",
        .codec = TokensCodec(),
        .other_words = "auth api_keys keys users passwords"},
       {.key = "cors_origins",
        .value = "ORIGIN[,ORIGIN]",
        .section = "access",
-       .help = "Web pages that may read replies; * is any, an empty list none",
-       .details = "As browsers send them in `Origin`: `[\"https://maps.example\"]`. As a flag with commas between them",
+       .help = "Origins of web pages that may read replies; * is any, an empty list none",
+       .details = "As browsers send them in `Origin`: `[\"https://maps.example\"]`. As a flag, separated by commas",
        .codec = OriginsCodec(),
        .other_words = "allowed_origins"},
       {.key = "trusted_proxies",
        .value = "ADDRESS[,ADDRESS]",
        .section = "access",
-       .help = "Addresses and ranges of proxies that may state the client's address in a header",
-       .details = "`[\"127.0.0.1\", \"10.0.0.0/8\"]`; as a flag with commas between them. [More](#behind-a-proxy)",
+       .help = "Addresses and ranges of proxies whose headers may state the client's address",
+       .details = "`[\"127.0.0.1\", \"10.0.0.0/8\"]`; as a flag, separated by commas. [More](#behind-a-proxy)",
        .codec = ProxiesCodec(),
        .other_words = "proxy"},
       {.key = "forwarded_header",
        .value = "NAME",
        .section = "access",
-       .help = "Header that trusted proxies write: x-forwarded (-For, -Proto, -Host) or forwarded (RFC 7239)",
-       .details = "The other one is ignored: a proxy passes it on as the client sent it",
+       .help = "Header that trusted proxies set: x-forwarded (-For, -Proto, -Host) or forwarded (RFC 7239)",
+       .details = "The other header is ignored, because a proxy passes it on as the client sent it",
        .codec = Choice(&Config::forwarded_header,
                        {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}})},
       {.key = "tls",
@@ -273,27 +277,27 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "access",
        .help = "PEM files of a certificate and its key, for HTTPS; without them the server speaks plain HTTP",
        .details = "In the file `{\"certificate\": \"server.pem\", \"key\": \"server.key\"}`, relative to its folder; "
-                  "as a flag the two paths with a comma between them. [More](#tls)",
+                  "as a flag, both paths separated by a comma. [More](#tls)",
        .codec = TlsCodec(),
        .other_words = "ssl https cert"},
       {.key = "max_locations",
        .value = "N",
        .section = "load",
-       .help = "Points that one request for heights, or one profile, may have",
-       .details = "More get 400. Bodies of such requests may have 4096 bytes and 64 for each of these points; larger "
-                  "ones get 413",
+       .help = "Largest number of points of one request for heights, or of one profile",
+       .details = "Requests with more get 400. The body of such a request may have 4096 bytes plus 64 for each point "
+                  "of this limit; larger bodies get 413",
        .codec = Integer(&Config::max_locations, 1, 1'000'000)},
       {.key = "max_mesh_samples",
        .value = "N",
        .section = "load",
-       .help = "Height samples that one mesh of an area may be made from",
-       .details = "Larger areas get 400. A worker takes up to 300 bytes a sample while it meshes",
+       .help = "Largest number of height samples of one mesh of an area",
+       .details = "Larger areas get 400. Meshing takes up to 300 bytes of memory a sample",
        .codec = Integer(&Config::max_mesh_samples, 4, 100'000'000),
        .is_live = true},
       {.key = "request_deadline_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "A request that takes longer gets 503",
+       .help = "Longest time for a request; after it the reply is 503",
        .codec = Seconds(&Config::request_deadline, 0.1, 3600),
        .other_words = "request_timeout",
        .is_live = true},
@@ -301,59 +305,61 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "SECONDS",
        .section = "limits",
        .help = "Time for a client to send the head of a request",
-       .details = "Of a body: time without a single byte, and before `min_read_rate` counts",
+       .details = "For a body it is the longest time without a byte, and the time before `min_read_rate` applies",
        .codec = Seconds(&Config::header_timeout, 0.1, 3600)},
       {.key = "idle_timeout_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "Time that a connection without requests is kept open",
+       .help = "Time that a connection without requests stays open",
        .codec = Seconds(&Config::idle_timeout, 0.1, 3600)},
       {.key = "write_timeout_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "Time that a client may go without taking a byte of a response",
+       .help = "Longest time in which a client receives no byte of a response",
        .codec = Seconds(&Config::write_timeout, 0.1, 3600)},
       {.key = "min_read_rate",
        .value = "BYTES",
        .section = "limits",
-       .help = "Bytes a second that a client must take of a response, or send of a body; 0 is no limit",
-       .details = "Of a response counted from `write_timeout_s` on, of a body from `header_timeout_s` on",
+       .help = "Lowest rate in bytes a second at which a client must receive a response or send a body; 0 is no limit",
+       .details = "It applies to a response after `write_timeout_s`, to a body after `header_timeout_s`",
        .codec = Integer(&Config::min_read_rate, 0, 1'000'000'000)},
       {.key = "drain_timeout_s",
        .value = "SECONDS",
        .section = "limits",
        .help = "Time for open requests to finish when the server stops",
-       .details = "After SIGTERM or SIGINT",
+       .details = "The server stops after SIGTERM or SIGINT",
        .codec = Seconds(&Config::drain_timeout, 0, 3600)},
       {.key = "data_roots",
        .value = "DIR[,DIR]",
        .section = "sources",
-       .help = "Folders that must hold every source; by default sources may lie anywhere",
-       .details = "They hold every water mask, image and grid of undulations as well. A source must be a regular file; "
-                  "symbolic links count where they lead. Relative to the folder of the file; as a flag with commas "
-                  "between them",
+       .help = "Folders that must contain every source; by default sources may be anywhere",
+       .details =
+           "They must also contain every water mask, image and grid of undulations. A source must be a regular file; "
+           "for a symbolic link its target counts. Relative to the folder of the file; as a flag, separated by commas",
        .codec = TextList(&Config::data_roots, "a list of folders", true),
        .other_words = "root data_dir"},
       {.key = "allowed_prefixes",
        .value = "PREFIX[,PREFIX]",
        .section = "sources",
-       .help = "Beginnings of remote sources, such as /vsis3/bucket/; by default there are none",
-       .details = "`/vsicurl/https://example.org/dems/` is another. By default GDAL's ways to the network are closed. "
-                  "Remote files are not watched: a changed one is seen at the next start, and should get another name",
+       .help = "Prefixes of remote sources that may be opened, such as /vsis3/bucket/; by default none",
+       .details =
+           "Another example is `/vsicurl/https://example.org/dems/`. By default GDAL cannot reach the network. Remote "
+           "files are not watched: the server sees a changed file at the next start. Give a changed file another name",
        .codec = TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
       {.key = "allowed_drivers",
        .value = "NAME[,NAME]",
        .section = "sources",
-       .help = "Formats that sources may have, by GDAL's short names; by default the usual ones",
-       .details = "`gdalinfo --formats` lists the names. Those given replace the usual ones",
+       .help = "Formats that sources may have, as GDAL's short names; by default the usual ones",
+       .details = "`gdalinfo --formats` lists the names. The list replaces the default",
        .codec = TextList(&Config::allowed_drivers, "a list of formats such as [\"GTiff\", \"VRT\"]", false),
        .other_words = "formats"},
       {.key = "watch",
        .value = "true|false",
        .section = "changes",
        .help = "Follow changes of sources and of the configuration file while serving",
-       .details = "They are looked at every second, and so are the files that globs stand for "
-                  "([operations](operations.md#changing-data-and-configuration)). Without it SIGHUP does",
+       .details =
+           "The server checks the files every second, and also which files the globs match "
+           "([operations](operations.md#changing-data-and-configuration)). With `false`, SIGHUP makes it check them",
        .codec = Switch(&Config::watch),
        .other_words = "reload"},
       {.key = "log_level",
@@ -371,13 +377,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "log_format",
        .value = "FORMAT",
        .section = "log",
-       .help = "text for people, json for machines (one object a line); both go to stderr",
+       .help = "Format of the log on stderr: text for people, or json (one object a line) for programs",
        .codec = Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
       {.key = "access_log",
        .value = "FORM",
        .section = "log",
-       .help = "Form of the access log: log (lines among those of the log), combined, json or off",
-       .details = "`combined` is the form of Apache and nginx; `json` is one object a line "
+       .help = "Format of the access log: log (lines of the log), combined, json or off",
+       .details = "`combined` is the format of Apache and nginx; `json` is one object a line "
                   "([operations](operations.md#logs))",
        .codec = Choice(&Config::access_log, {{"log", AccessLogForm::kLog},
                                              {"combined", AccessLogForm::kCombined},
@@ -386,8 +392,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "access_log_file",
        .value = "FILE",
        .section = "log",
-       .help = "File that a combined or json access log is appended to; by default stderr",
-       .details = "Relative to the folder of the configuration file. SIGHUP opens it anew",
+       .help = "File to which a combined or json access log is appended; by default stderr",
+       .details = "Relative to the folder of the configuration file. SIGHUP reopens it",
        .codec = Path(&Config::access_log_file, "the path of a file")},
   };
   return table;

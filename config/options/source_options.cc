@@ -133,11 +133,11 @@ const std::vector<Option<SourceConfig>>& SourceOptionTable() {
        .missing = ": a path, a glob or a folder"},
       {.key = "vertical",
        .value = "DATUM",
-       .help = "What the heights of these files count from; by default as in the dataset",
+       .help = "Vertical datum of these files; by default the dataset's",
        .codec = SourceVertical()},
       {.key = "nodata",
        .value = "VALUE",
-       .help = "Which of their samples are voids; by default as in the dataset",
+       .help = "Which samples of these files are voids; by default as for the dataset",
        .codec = SourceNodata()},
   };
   return table;

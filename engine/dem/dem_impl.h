@@ -48,8 +48,8 @@ class DemSource::Impl {
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
   float floor = 0;  // above the ellipsoid
-  std::shared_ptr<const Undulations>
-      floor_undulations;  // for the whole Earth, of the last raster grid that refers to a geoid; or null
+  // For the whole Earth, of the last raster grid that refers to a geoid; or null.
+  std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;

@@ -1,7 +1,7 @@
 // A digital elevation model: heights at lattice nodes, anywhere on the globe, at any level.
 //
-// A model has one or more rasters. A node takes its height from the first source, ordered by rank and resolution, that
-// has one there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
+// A model has one or more rasters. Sources are ordered by rank and resolution; a node takes its height from the first
+// one that has one there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
 //
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once
@@ -37,7 +37,8 @@ class DemSource {
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
-  // enough for the level, and all ancestors of available tiles. Level 0 has both roots (availability.h).
+  // enough for the level, and the ancestors of available tiles with their siblings. Level 0 has both roots
+  // (mosaic/availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
   const std::vector<std::vector<geo::TileRange>>& Availability() const;

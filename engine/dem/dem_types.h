@@ -53,12 +53,12 @@ struct RasterCache {
 struct DemOptions {
   SourceOptions source = {};    // for files without options of their own
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
-  std::optional<double> finest_error =
-      {};                            // metres: the deepest level is the first whose default error is at most this
+  // Metres: the deepest level is the first whose default error is at most this.
+  std::optional<double> finest_error = {};
   std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources and in collars; default:
                                      // a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;
-  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are bridged
+  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
   // edges.

@@ -5,14 +5,15 @@
 //      /   \         p-w, and the edges that take its place are suspect in turn. Spokes (edges at p) are not.
 //     u-----v
 //      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
-//        p               p-w is taken where S(u-v) < q^2 S(p-w),
-//                        u-v is kept where S(p-w) < q^(5/4) S(u-v), and already where S(p-w) < q^(1/4) S(u-v) if a cut
-//                        by its fit, or one that came after it, has brought the edge into the outline,
-//                        else that with less E^2 / S; equal ones by the shape; equal in both: p-w.
+//        p               p-w is taken if S(u-v) < q^2 S(p-w),
+//                        u-v is kept if S(p-w) < q^(5/4) S(u-v); the factor is q^(1/4) if the edge came into the
+//                        outline by a cut that was decided by fit, or by a cut after such a cut,
+//                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
-// that makes the shape worse rarely pays in the end, more rarely still further out, and adds two triangles to scan.
-// Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices (docs/decisions/0007).
+// that makes the shape worse rarely saves vertices in the end, and even more rarely farther from p. It also adds two
+// triangles to scan. Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices
+// (docs/decisions/0007).
 //
 // A test depends on its quadrilateral, on which of the corners beyond the edge is the youngest, and on how its edge
 // came into the outline. The cavity therefore does not depend on the order of the tests, on the triangle that the
@@ -114,12 +115,13 @@ class DataDependentCriterion {
   static constexpr double kUnknown = -1;
   static constexpr std::size_t kLikelyEdges = 64;  // of an outline
   static constexpr std::size_t kSpareSlots = std::size_t{1} << 10;
-  static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan of nothing else
+  static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan without other triangles
+  // Star::left_out of such a scan: the triangle between two pairs, which are the triangles of p-w of two suspects.
   static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
-  // Of a triangle with p.
+  // Of a triangle that has p as a corner.
   struct Fit {
-    PlaneMisfit misfit;  // with maxima only
+    PlaneMisfit misfit;  // only if FitErrors::are_maxima()
     double error = kUnknown;
   };
 
@@ -127,7 +129,7 @@ class DataDependentCriterion {
   struct Suspect {
     std::uint32_t edge = 0;  // by its place in the outline
     HalfEdgeId outside = 0;
-    bool is_certain = false;  // for its shape
+    bool is_certain = false;  // its shape alone decides for p-w
     ShapeQuality quality;
     Triangulation::Beyond beyond;
   };
@@ -165,6 +167,7 @@ class DataDependentCriterion {
   void ReplaceEdge(Star& star, const Flip& flip);
   void SuspectEdge(Star& star, std::uint32_t index);
   Ends EndsOf(const Star& star, std::uint32_t edge) const;
+  // The misfits of the triangle of p and an edge of the outline, and of a triangle beyond the outline.
   double& NearError(std::uint32_t edge) { return edge_count_ == 0 ? errors_[edge] : edges_[edge].fit.error; }
   double ErrorBeyond(TriangleId t);
   void PrefetchError(TriangleId t) const;

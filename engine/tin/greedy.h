@@ -68,7 +68,7 @@ struct SeedGrid {
   int step = 1;
 };
 
-// The misfit by which data-dependent triangulation compares the two ways to divide a quadrilateral into triangles
+// The misfit that data-dependent triangulation compares between the two ways to divide a quadrilateral into triangles
 // (section 3.4.1).
 enum class FitMeasure : std::uint8_t {
   kSumMax,      // the sum of their largest errors

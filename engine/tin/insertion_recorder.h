@@ -41,8 +41,8 @@ class InsertionRecorder {
   std::vector<std::uint32_t> made_in_slot_;
 
   // For each insertion: the number of triangles made, with InsertionRecord::kOpen; the ring of vertices; the slots of
-  // the triangles removed. These are two fewer than the triangles made, one fewer in an open star. The first triangles
-  // made take these slots, the others new ones.
+  // the triangles removed. An insertion removes two triangles fewer than it makes, or one fewer in an open star. The
+  // first triangles made take the slots of the removed ones, the others new slots.
   LargeArray<Word> log_;
   std::size_t made_ = 0, most_made_ = 0;  // triangles, in all and by one insertion
   std::size_t corners_ = 0;               // of all rings

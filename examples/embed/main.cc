@@ -2,8 +2,8 @@
 //
 //   embed DEM LEVEL X Y ERROR_M OUT.terrain
 //
-// Tiles are those of EPSG:4326 in the TMS scheme: two at level 0, y from the south. What the engine has to say about
-// the model goes to spdlog's default logger.
+// Tiles are those of EPSG:4326 in the TMS scheme: two at level 0, y from the south. The engine's messages about the
+// model go to spdlog's default logger.
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>

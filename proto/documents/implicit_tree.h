@@ -37,9 +37,9 @@ int LevelsUnder(Availability available, const geo::TileKey& root);
 // file arrives.
 inline constexpr int kTallestSubtree = 7;
 
-// The number of levels of each .subtree in a tree of `levels` levels: as few subtrees above each other as possible, of
-// equal height. The last one must not be low: loaders.gl fetches all subtrees of a tree one by one before it draws, and
-// there are as many subtrees as tiles on the level where they begin.
+// The number of levels of each .subtree in a tree of `levels` levels: as few subtrees above each other as possible,
+// with equally many levels. Deepest subtrees with few levels would begin at a deep level, and there would be one for
+// each of its many tiles. loaders.gl fetches all subtrees of a tree one by one before it draws.
 int SubtreeLevels(int levels);
 
 struct TreeRoot {

@@ -32,8 +32,8 @@ struct Subtree {
   std::function<HeightSpan(const geo::TileKey&)> heights;
 };
 
-// The whole file. Every available tile has content and a row of metadata. Where all bits of a bitstream are equal, the
-// JSON says so and the bitstream is left out. Preconditions: tiles has levels + 1 entries, the root is available, and
+// The whole file. Every available tile has content and a row of metadata. If all bits of a bitstream are equal, the
+// JSON has a constant instead of the bitstream. Preconditions: tiles has levels + 1 entries, the root is available, and
 // so is the parent of every available tile.
 std::string EncodeSubtree(const Subtree& subtree);
 

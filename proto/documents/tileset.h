@@ -27,8 +27,8 @@ struct TilesetDescription {
 double GeometricError(int level);
 
 // UTF-8 JSON. Templates are relative to the tileset: 3dtiles/{RootName}/{level}/{x}/{y}.glb and
-// .{SubtreeLevels}.subtree, so that a tileset.json kept from a day when the tree had other levels stays good. Several
-// roots become children of a tile without content. The schema is that of the subtrees' metadata
+// .{SubtreeLevels}.subtree, so that an older tileset.json still works if the tree has another number of levels now.
+// Several roots become children of a tile without content. The schema is that of the subtrees' metadata
 // (proto/documents/subtree.h).
 std::string EncodeTileset(const TilesetDescription& tileset);
 

@@ -28,7 +28,7 @@ class NodeVerticals {
     explicit Plane(const std::array<geo::Vec3, 3>& corners);
     geo::Vec3 normal;   // of any length
     double offset = 0;  // dot(normal, point) of its points
-    double least = 0;   // least dot(normal, plumb line): steeper planes have no defined height
+    double least = 0;   // the smallest dot(normal, plumb line) with a defined height; steeper planes have none
     // The corners are so close to one line that rounding determines the plane. The triangle is ignored, because its
     // neighbours' edges cover it.
     bool is_line = false;
@@ -63,15 +63,16 @@ class NodeVerticals {
   struct Shift {
     double x = 0, y = 0;
   };
-  //
-  // The point's longitude is the mean of the corners' weighted with their distances from the axis, but for the cube of
-  // their difference. Its latitude is off by less than sin cos d^2 / 8, d the difference in longitude, since the point
-  // is nearer to the axis, by the covariance of latitude and height, and by that of latitude with the radius of
-  // curvature. All are taken a few times too large: what is inside the shift is only asked, not counted.
+  // Bounds for one triangle (BoundsOf). The longitude of a point is the mean of the corners' longitudes, weighted with
+  // their distances from the axis, up to the cube of their difference. The offset of its latitude has three parts. The
+  // point is nearer to the axis than the corners: less than sin cos d^2 / 8 for a difference d in longitude. The other
+  // two are the covariances of latitude with height and with the radius of curvature. All bounds are a few times too
+  // large. That costs time, but the result is the same: triangles within the shift are measured exactly.
   struct Bounds {
     Shift shift;
     // Metres by which the triangle lies below its corners' linear interpolation, at most: half the square of the radius
-    // of a circle around it, over the radius of curvature. The smallest is at most 1/sqrt(3) of the longest edge wide.
+    // of a circle around it, over the radius of curvature. The radius of the smallest such circle is at most 1/sqrt(3)
+    // of the longest edge.
     double sagitta_m = 0;
   };
   Bounds BoundsOf(const std::array<NodePoint, 3>& corners, std::int64_t unit, double beside_m) const {
@@ -111,7 +112,7 @@ class NodeVerticals {
   };
   friend class VerticalsInTriangle;
 
-  // The smallest radius of curvature there is, a meridian's at the equator, 100 km below the ellipsoid.
+  // The smallest radius of curvature: that of a meridian at the equator, 100 km below the ellipsoid.
   static constexpr double kMinRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis - 1e5;
   static constexpr Shift kUnknownShift = {std::numeric_limits<double>::infinity(),
                                           std::numeric_limits<double>::infinity()};

@@ -52,7 +52,7 @@ struct GltfMaterial {
   std::array<double, 4> color{1, 1, 1, 1};  // linear
 };
 
-// The material's colour, times this picture: clamped at its edges.
+// A picture, clamped at its edges. The material's colour is multiplied by it.
 struct GltfTexture {
   std::size_t view = 0;  // of the image file
   std::string_view media_type;

@@ -27,9 +27,9 @@ enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 // than 2^23.
 //
 // Floats allow finer steps. With floats the step is also at most 2^-7 m, so that no vertex of a tile's edge is a
-// centimetre from the meridian or parallel where the tile ends: a client may tell by position which edge a vertex is
-// on. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits: 2^-6 m at level
-// 8, 1 m at level 2.
+// centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by their
+// positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits: 2^-6 m
+// at level 8, 1 m at level 2.
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width);
 
 // Whole steps along the axes of ECEF.
@@ -40,10 +40,10 @@ using GridPoint = std::array<std::int64_t, 3>;
 // micrometre, so two processors can differ here only if a coordinate is within a micrometre of a tie.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
-// Whether decoders that compute in 32-bit floats decode every point exactly, and the lower rim of skirts of this depth:
-// the tile spans less than 2^23 steps. A float has one bit more, but Draco adds one half. False for very high cliffs in
-// deep tiles with small errors: hundreds of metres within a few. The caller then doubles the step until the tile fits,
-// and its edges are off by up to half of that step.
+// Whether decoders that compute in 32-bit floats decode all points, and the lower rim of skirts of this depth, exactly.
+// This is so if the tile spans less than 2^23 steps. A float has one bit more, but Draco adds one half. False for very
+// high cliffs in deep tiles with small errors: hundreds of metres of height within a few metres. The caller then
+// doubles the step until the tile fits, and its edges are off by up to half of that step.
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m);
 
 // Metres.
@@ -56,7 +56,7 @@ struct GridMesh {
   std::vector<geo::Vec3> normals;                       // unit, ECEF, one per position
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
   // Where each position is in a picture of the tile: lattice columns from the west, rows from the NORTH, 0 .. cells.
-  // The feet of skirts have those of the rim above them.
+  // Vertices of the lower rim of skirts have those of the vertices above them.
   int cells = 1;
   std::vector<std::array<std::uint16_t, 2>> uv;
 };

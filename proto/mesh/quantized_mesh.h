@@ -12,8 +12,8 @@
 namespace terrace::proto {
 
 inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
-inline constexpr std::size_t kMaxTileVertices =
-    65534;  // CesiumJS misreads exactly 65536; below that indices are 16 bits
+// CesiumJS misreads tiles of exactly 65536 vertices; smaller ones have 16-bit indices.
+inline constexpr std::size_t kMaxTileVertices = 65534;
 
 // A quantized tile: integers, and the two heights of the header that scale them.
 struct QuantizedTile {

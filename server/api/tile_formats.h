@@ -1,5 +1,5 @@
-// The tile formats, one row each: how a URL names one, what a request asks of it, and how a reply describes it. And
-// what all formats share: parameters, codings, errors. tiler/encoders.h has the rows of how they are made.
+// The tile formats, one row each: suffix of its URLs, parameters, and headers of replies. Also the parts that all
+// formats share: parameters, codings, errors. tiler/encoders.h has the encoders.
 #pragma once
 
 #include <cstdint>
@@ -49,7 +49,7 @@ Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 struct TileFormat {
   tiler::TileFormat format;
   std::string_view suffix;  // of the URL: ".terrain"
-  bool is_mercator;         // counted in Web Mercator's XYZ scheme; else in TMS geodetic
+  bool is_mercator;         // keys are in Web Mercator's XYZ scheme; else in TMS geodetic
   std::string_view (*media_type)(const tiler::TileRequest& tile);
   std::string_view (*vary)(const tiler::TileRequest& tile);  // the headers that a reply depends on, as in Response
   // Reads the parameters of a URL and sets the rest of the request; its dataset, key and format are set. kNotFound: the
@@ -62,8 +62,8 @@ struct TileFormat {
 // matches.
 const TileFormat* CutSuffix(std::string_view& name);
 
-// From a route and a request's headers to a canonical request. kNotFound: no such dataset, or the tile lies outside
-// what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
+// Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies
+// outside what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
 Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
 // kNotFound, for a dataset without sources: its archive has no tiles of this format.
@@ -85,7 +85,7 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
-// Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is what answers
+// Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is the tile of
 // `request`.
 tiler::HeaderLines MakeTileHeaders(const tiler::TileRequest& request, const tiler::EncodedTile& tile);
 

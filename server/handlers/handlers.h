@@ -47,7 +47,7 @@ class ProcessState {
 
 // One for each catalog. Thread-safe. A request keeps it alive until it is answered.
 struct Handlers {
-  // `tiles`: its workers do work that takes long. `tiles` and `process` must outlive this object.
+  // `tiles`: its workers run long work. `tiles` and `process` must outlive this object.
   Handlers(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
            const config::Config& config, const ProcessState& process);
 

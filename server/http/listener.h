@@ -1,8 +1,8 @@
 // The listening socket: accepts connections up to a limit.
 //
 // At the limit, a new connection takes the place of another one (ConnectionSet::EvictOne), or is answered 503 and
-// closed. Left in the kernel's queue, its client could not know that it should try elsewhere. A shortage of file
-// descriptors is handled in the same way, with a spare descriptor that is kept for this purpose.
+// closed. A client in the kernel's queue could not know that it should try elsewhere. A shortage of file descriptors is
+// handled in the same way, with a spare descriptor that is kept for this purpose.
 #pragma once
 
 #include <boost/asio/ip/tcp.hpp>

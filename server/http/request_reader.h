@@ -56,8 +56,8 @@ class RequestReader {
   Stream& stream_;
   const ReadTimeouts timeouts_;
   std::string buffer_;  // grows, and is not cleared: that would take as long as parsing
-  std::size_t begin_ = 0,
-              end_ = 0;  // bytes read and not consumed: pipelined requests
+  // The bytes of buffer_ that were read and not consumed: pipelined requests.
+  std::size_t begin_ = 0, end_ = 0;
   HeadMemo memo_;
   bool is_first_ = true;
   bool waiting_ = false;

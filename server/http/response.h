@@ -73,7 +73,7 @@ Response PreflightResponse(bool takes_post);
 // The value of the Allow header.
 std::string MethodsOf(bool takes_post);
 
-// Turns a 200 into a 304 where the request's If-None-Match names its ETag.
+// Turns a 200 into a 304 if the request's If-None-Match names its ETag.
 Response Conditional(Response response, const Request& request);
 
 // RFC 9110, section 13.1.2: a list of ETags, weakly compared, or "*".

@@ -24,8 +24,8 @@ using JobClock = std::chrono::steady_clock;
 
 struct JobOrder {
   std::uint64_t client = 0;
-  int level = 0;  // of the client's jobs the lower level runs first, even if it comes shortly after: shallow tiles
-                  // cover what deep tiles refine. Deep tiles are not delayed indefinitely
+  int level = 0;         // a client's job of a lower level runs first, even if it arrives shortly after: shallow tiles
+                         // cover the area of deep tiles. Deep tiles are not delayed indefinitely
   bool is_long = false;  // takes seconds; a bounded number of long jobs runs at a time
   JobClock::time_point deadline = JobClock::time_point::max();  // of the wait
   std::uint64_t kind = 0;                                       // jobs of one kind take about the same time

@@ -80,7 +80,7 @@ class SingleFlight {
   std::atomic<std::uint64_t> joined_total_{0};
 };
 
-// Everything but `stop` and what is const is guarded by SingleFlight::mutex_.
+// SingleFlight::mutex_ guards everything except `stop` and const members.
 template <typename Key, typename Value, typename Hash>
 struct SingleFlight<Key, Value, Hash>::Flight {
   Flight(const Key& k, std::string n, std::stop_token cancelled)
@@ -145,7 +145,7 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
   if (!has_job) Launch(flight, std::move(build), order);
 
-  boost::system::error_code ignored;  // landed, expired or cancelled: the outcome tells
+  boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
   lock.lock();

@@ -137,7 +137,8 @@ struct WorkerPool::RunState {
   std::optional<Result<T>> outcome;  // nothing: not yet
 };
 
-// The caller's part of an errand. Lives in the frame of Run, so that the job is given up however the coroutine ends.
+// The caller's part of a call of Run. Lives in the frame of Run, so that the job is given up however the coroutine
+// ends.
 template <typename T>
 class WorkerPool::WaitGuard {
  public:
@@ -175,7 +176,7 @@ asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
   const WaitGuard<T> guard(*this, state, job);
   if (Result<void> submitted = Submit(job); !submitted) co_return tl::unexpected(std::move(submitted.error()));
 
-  boost::system::error_code ignored;  // finished, expired or cancelled: the outcome tells
+  boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
 
   const std::lock_guard lock(state->mutex);

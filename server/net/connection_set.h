@@ -78,7 +78,7 @@ class ConnectionSet {
     std::weak_ptr<Connection> connection;
     std::string client;
     std::uint64_t number = 0;  // in the order in which they came
-    bool is_evicted = false;   // told to go, and not counted any more
+    bool is_evicted = false;   // told to close, and no longer counted
   };
 
   const std::size_t capacity_, most_of_one_;

@@ -17,10 +17,10 @@ constexpr std::chrono::milliseconds kLook{250};
 
 // Parts of the memory.
 constexpr std::size_t kRepliesPart = 2, kLargePart = 4, kUploadsPart = 4;
-// The largest small reply, as a part of its room.
+// The largest small reply, as a part of its pool.
 constexpr std::size_t kSmallPart = 8;
 
-// Use is compared in steps of an eighth of the room for a second: smaller differences do not change the order.
+// Use is compared in steps of an eighth of the pool for a second: smaller differences do not change the order.
 constexpr double kClaimSteps = 8;
 constexpr std::chrono::duration<double> kHalfLife{10};
 
@@ -95,9 +95,9 @@ asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoo
   }
 }
 
-std::size_t TransferBudget::HeldBy(std::uint64_t client, const Pool& room) {
-  const auto own = room.shares.find(client);
-  return own == room.shares.end() ? 0 : own->second.bytes;
+std::size_t TransferBudget::HeldBy(std::uint64_t client, const Pool& pool) {
+  const auto own = pool.shares.find(client);
+  return own == pool.shares.end() ? 0 : own->second.bytes;
 }
 
 // Use grows by `bytes` per second and decays by half every kHalfLife. For constant `bytes` it converges.
@@ -110,24 +110,24 @@ void TransferBudget::Age(Share& share, Clock::time_point now) {
 }
 
 // The client's recent use plus what it may use before it is late, in steps.
-std::uint64_t TransferBudget::Claim(std::uint64_t client, const Pool& room, Clock::time_point now) {
-  const auto own = room.shares.find(client);
-  if (own == room.shares.end()) return 0;
+std::uint64_t TransferBudget::Claim(std::uint64_t client, const Pool& pool, Clock::time_point now) {
+  const auto own = pool.shares.find(client);
+  if (own == pool.shares.end()) return 0;
   Share share = own->second;
   Age(share, now);
   const double coming = static_cast<double>(share.bytes) * std::chrono::duration<double>(kGrace).count();
-  const double step = std::max(static_cast<double>(room.capacity) / kClaimSteps, 1.0);
+  const double step = std::max(static_cast<double>(pool.capacity) / kClaimSteps, 1.0);
   return static_cast<std::uint64_t>((share.used + coming) / step);
 }
 
 // Returns the aged share. From time to time, drops shares that have decayed to nothing.
-TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& room, Clock::time_point now) {
-  if (room.shares.size() >= room.sweep_at) {
-    std::erase_if(room.shares,
-                  [&](const auto& other) { return other.second.holds == 0 && Claim(other.first, room, now) == 0; });
-    room.sweep_at = 2 * room.shares.size() + 64;
+TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now) {
+  if (pool.shares.size() >= pool.sweep_at) {
+    std::erase_if(pool.shares,
+                  [&](const auto& other) { return other.second.holds == 0 && Claim(other.first, pool, now) == 0; });
+    pool.sweep_at = 2 * pool.shares.size() + 64;
   }
-  Share& share = room.shares[client];
+  Share& share = pool.shares[client];
   Age(share, now);
   return share;
 }
@@ -135,32 +135,32 @@ TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& room,
 // `waiter`: the waiter that asks; null: a new request, which is last in the order.
 bool TransferBudget::MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const {
   const std::size_t number = PoolOf(ask);
-  const Pool& room = pools_[number];
+  const Pool& pool = pools_[number];
   if (ask.body && charges_.contains(ask.body.get())) return true;
   if (!HasRoom(ask)) return false;
   if (waiters_.empty()) return true;
   const Waiter* next = NextWaiter(number, now);
   if (next == nullptr || next == waiter) return true;
-  return Claim(ask.client, room, now) < Claim(next->ask.client, room, now);
+  return Claim(ask.client, pool, now) < Claim(next->ask.client, pool, now);
 }
 
 // Any waiter.
 bool TransferBudget::HasRoom(const HoldRequest& ask) const {
   const std::size_t number = PoolOf(ask);
-  const Pool& room = pools_[number];
-  if (room.takes_one) return room.held == 0;
-  if (room.held + ask.bytes > room.capacity) return false;
-  const std::size_t own = HeldBy(ask.client, room);
-  return number == kUploads || own == 0 || own + ask.bytes <= kShare * (room.capacity - room.held - ask.bytes);
+  const Pool& pool = pools_[number];
+  if (pool.takes_one) return pool.held == 0;
+  if (pool.held + ask.bytes > pool.capacity) return false;
+  const std::size_t own = HeldBy(ask.client, pool);
+  return number == kUploads || own == 0 || own + ask.bytes <= kShare * (pool.capacity - pool.held - ask.bytes);
 }
 
 // The oldest waiter of the client with the smallest claim.
-TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t room, Clock::time_point now) const {
+TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t pool, Clock::time_point now) const {
   Waiter* next = nullptr;
   std::uint64_t least = 0;
   for (Waiter* waiter : waiters_) {
-    if (PoolOf(waiter->ask) != room) continue;
-    const std::uint64_t claim = Claim(waiter->ask.client, pools_[room], now);
+    if (PoolOf(waiter->ask) != pool) continue;
+    const std::uint64_t claim = Claim(waiter->ask.client, pools_[pool], now);
     if (next == nullptr || claim < least) {
       next = waiter;
       least = claim;
@@ -175,21 +175,21 @@ std::optional<TransferBudget::Hold> TransferBudget::Take(const HoldRequest& ask,
   const bool is_beyond = !fits && ask.kind == Kind::kVitalReply && reserve_held_ + ask.bytes <= kReserve;
   if (!fits && !is_beyond) return std::nullopt;
   const std::size_t number = PoolOf(ask);
-  Pool& room = pools_[number];
+  Pool& pool = pools_[number];
   auto late_at = Clock::time_point::max();
   if (ask.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
   // Allocations come first, because they may fail.
   Entries made;
   made.push_back({ask.body.get(), number, late_at, ask.holder, ask.client});
   if (!ask.body) made.front().charge = &made.front();
-  Share& own = ShareOf(ask.client, room, now);
+  Share& own = ShareOf(ask.client, pool, now);
   Charge& charge = charges_[made.front().charge];
   const auto entry = made.begin();
   entries_.splice(entries_.end(), made);
   ++own.holds;
   if (++charge.holders == 1) {
     charge = {ask.bytes, 1, is_beyond, ask.client};
-    (is_beyond ? reserve_held_ : room.held) += ask.bytes;
+    (is_beyond ? reserve_held_ : pool.held) += ask.bytes;
     own.bytes += ask.bytes;
   }
   if (waiter != nullptr) WakeNext(number, now);  // there may be memory for the next one too
@@ -210,16 +210,16 @@ bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>
 // Vital replies may also take memory from their own client.
 void TransferBudget::ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
   const std::size_t number = PoolOf(ask);
-  const Pool& room = pools_[number];
+  const Pool& pool = pools_[number];
   const bool is_vital = ask.kind == Kind::kVitalReply;
-  std::size_t most = is_vital ? 0 : HeldBy(ask.client, room);
+  std::size_t most = is_vital ? 0 : HeldBy(ask.client, pool);
   std::optional<std::uint64_t> client;
   const auto is_late = [&](const Entry& entry) {
-    return entry.room == number && now >= entry.late_at && (is_vital || entry.client != ask.client);
+    return entry.pool == number && now >= entry.late_at && (is_vital || entry.client != ask.client);
   };
   for (const Entry& entry : entries_) {
     if (!is_late(entry)) continue;
-    const std::size_t held = HeldBy(entry.client, room);
+    const std::size_t held = HeldBy(entry.client, pool);
     if (held <= most) continue;
     most = held;
     client = entry.client;
@@ -231,26 +231,26 @@ void TransferBudget::ChooseLate(const HoldRequest& ask, Clock::time_point now, V
 
 void TransferBudget::ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
   const std::size_t number = PoolOf(ask);
-  const Pool& room = pools_[number];
+  const Pool& pool = pools_[number];
   std::uint64_t largest = ask.client;
-  for (const auto& [client, share] : room.shares) {
-    const std::size_t most = HeldBy(largest, room);
+  for (const auto& [client, share] : pool.shares) {
+    const std::size_t most = HeldBy(largest, pool);
     // Ties are broken by the client's number, so that the order of the table does not matter.
     if (share.bytes > most || (share.bytes == most && client < largest)) largest = client;
   }
-  if (HeldBy(largest, room) > HeldBy(ask.client, room) + ask.bytes) {
+  if (HeldBy(largest, pool) > HeldBy(ask.client, pool) + ask.bytes) {
     for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
-      if (entry->room == number && entry->client == largest && Tell(*entry, victims.displaced)) return;
+      if (entry->pool == number && entry->client == largest && Tell(*entry, victims.displaced)) return;
     }
   }
   for (Entry& entry : entries_) {
-    if (entry.room == number && entry.client != ask.client && now >= entry.late_at) Tell(entry, victims.displaced);
+    if (entry.pool == number && entry.client != ask.client && now >= entry.late_at) Tell(entry, victims.displaced);
   }
 }
 
 // The waiter belongs to its coroutine's thread, which may run at once: keep no reference here.
-void TransferBudget::WakeNext(std::size_t room, Clock::time_point now) {
-  Waiter* next = NextWaiter(room, now);
+void TransferBudget::WakeNext(std::size_t pool, Clock::time_point now) {
+  Waiter* next = NextWaiter(pool, now);
   if (next == nullptr) return;
   const std::weak_ptr<asio::steady_timer> timer = next->timer;
   try {
@@ -264,17 +264,17 @@ void TransferBudget::WakeNext(std::size_t room, Clock::time_point now) {
 void TransferBudget::Release(Entries::iterator entry) {
   const auto now = now_();
   const std::lock_guard lock(mutex_);
-  const std::size_t number = entry->room;
+  const std::size_t number = entry->pool;
   const std::uint64_t client = entry->client;
-  Pool& room = pools_[number];
+  Pool& pool = pools_[number];
   const auto found = charges_.find(entry->charge);
   Charge& charge = found->second;
-  Share& own = room.shares.at(client);
+  Share& own = pool.shares.at(client);
   Age(own, now);
   --own.holds;
   entries_.erase(entry);
   if (--charge.holders == 0) {
-    (charge.is_beyond ? reserve_held_ : room.held) -= charge.bytes;
+    (charge.is_beyond ? reserve_held_ : pool.held) -= charge.bytes;
     own.bytes -= charge.bytes;
     charges_.erase(found);
   } else if (charge.client == client) {
@@ -282,7 +282,7 @@ void TransferBudget::Release(Entries::iterator entry) {
     const auto heir = std::ranges::find_if(entries_, [&](const Entry& other) { return other.charge == found->first; });
     own.bytes -= charge.bytes;
     charge.client = heir->client;
-    Share& next = room.shares.at(charge.client);
+    Share& next = pool.shares.at(charge.client);
     Age(next, now);
     next.bytes += charge.bytes;
   }
@@ -308,7 +308,7 @@ void TransferBudget::Settle(Entries::iterator entry) {
 TransferBudget::Stats TransferBudget::stats() const {
   const std::lock_guard lock(mutex_);
   std::size_t held = 0;
-  for (const Pool& room : pools_) held += room.held;
+  for (const Pool& pool : pools_) held += pool.held;
   return {held, waiters_.size(), refused_, cut_};
 }
 

@@ -1,12 +1,12 @@
 // The memory limit for bodies in transfer: replies that clients have not taken yet, and bodies of requests that are not
 // answered yet.
 //
-// The memory is divided into separate rooms: half for small replies, which are up to an eighth of their room, a quarter
-// for larger replies, a quarter for uploads. A body that is larger than its room is transferred outside of it, one at a
-// time, as if in a room of its own. The same rules hold in each room:
+// The memory is divided into separate pools: half for small replies, which are up to an eighth of their pool, a quarter
+// for larger replies, a quarter for uploads. A body that is larger than its pool is transferred outside of it, one at a
+// time, as if in a pool of its own. The same rules hold in each pool:
 // - A body that many replies share counts once.
 // - Bodies that do not fit wait (HoldWhenRoom). The next body is one of the client with the least recent use of the
-//   room, in bytes times seconds, with what it holds now included; among equals, the oldest.
+//   pool, in bytes times seconds, with what it holds now included; among equals, the oldest.
 // - One client may hold two thirds of the memory for replies that others do not use, or one reply. This leaves memory
 //   for the next client.
 // - Waiting bodies take memory from others. A client has kGrace to take a reply that is being sent, and gains one
@@ -16,7 +16,7 @@
 //   waiting one would; so are uploads of other clients that have not arrived within kGrace plus one second per kRate
 //   bytes. Bodies of one client wait for one another.
 //
-// Replies about the server's state, for operators, may exceed all rooms by kReserve: they matter most when memory is
+// Replies about the server's state, for operators, may exceed all pools by kReserve: they matter most when memory is
 // short.
 //
 // Thread-safe.
@@ -102,9 +102,9 @@ class TransferBudget {
 
   struct Entry {
     const void* charge;  // key of its charge: the body, or the entry itself if it is not shared
-    std::size_t room = 0;
+    std::size_t pool = 0;
     Clock::time_point late_at;         // max: its time has not begun
-    std::weak_ptr<Connection> holder;  // empty once it was told to make room
+    std::weak_ptr<Connection> holder;  // empty once it was told to release memory
     std::uint64_t client = 0;
   };
   using Entries = std::list<Entry>;
@@ -121,18 +121,18 @@ class TransferBudget {
 
   std::size_t PoolOf(const HoldRequest& ask) const;
   // mutex_ is held, as for the following.
-  static std::size_t HeldBy(std::uint64_t client, const Pool& room);
+  static std::size_t HeldBy(std::uint64_t client, const Pool& pool);
   static void Age(Share& share, Clock::time_point now);
-  static std::uint64_t Claim(std::uint64_t client, const Pool& room, Clock::time_point now);
-  static Share& ShareOf(std::uint64_t client, Pool& room, Clock::time_point now);
+  static std::uint64_t Claim(std::uint64_t client, const Pool& pool, Clock::time_point now);
+  static Share& ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now);
   bool HasRoom(const HoldRequest& ask) const;
   bool MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const;
-  Waiter* NextWaiter(std::size_t room, Clock::time_point now) const;
+  Waiter* NextWaiter(std::size_t pool, Clock::time_point now) const;
   void ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims);
   void ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims);
   bool Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom);
   std::optional<Hold> Take(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter);
-  void WakeNext(std::size_t room, Clock::time_point now);
+  void WakeNext(std::size_t pool, Clock::time_point now);
 
   void Release(Entries::iterator entry);
   void AddTaken(Entries::iterator entry, std::size_t bytes);

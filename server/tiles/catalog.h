@@ -1,4 +1,4 @@
-// What is served at one moment: the datasets, and the pipeline that makes their answers.
+// Everything that is served at one moment: the datasets, and the pipeline that makes their tiles, heights and meshes.
 //
 // Immutable, so any thread reads it without a lock. A request uses the catalog it began with until its end, and so does
 // a build that it starts: answers never mix two catalogs.
@@ -42,9 +42,9 @@ struct DatasetView {
   bool has_water = false;                       // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
-  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid that height tiles are cut from
-  std::optional<tiler::Coding> baked_coding;    // that the tiles of its archive have; nothing: it has no archive
-  // Set if the dataset has no sources. What a request leaves open is then as in the archive.
+  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
+  std::optional<tiler::Coding> baked_coding;    // of the tiles of its archive; nothing: it has no archive
+  // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
   std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
 
   // The version in URLs; changes with the generation.

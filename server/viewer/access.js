@@ -1,11 +1,11 @@
-// What the server shows to this page: the datasets, and the token with which it is asked for them. The token is kept
-// until the tab is closed, and goes into headers alone: no address that somebody copies has it.
+// The datasets that the server shows to this page, and the token of its requests. The token is stored until the tab is
+// closed. It is sent only in headers, so that no copied address contains it.
 const kKey = "terrace.token";
 
-// The server knows no such token.
+// The server does not know the token.
 export class UnknownToken extends Error {}
 
-// A browser may forbid pages to keep anything.
+// A browser may forbid pages to store data.
 function stored(act) {
   try {
     return act(sessionStorage);
@@ -17,18 +17,18 @@ function stored(act) {
 export class Access {
   #token = stored((storage) => storage.getItem(kKey)) ?? "";
 
-  // For every request.
+  // Headers of every request.
   get headers() {
     return headersOf(this.#token);
   }
 
-  // From now on. Empty: none.
+  // The token of later requests; empty: none.
   set token(token) {
     this.#token = token;
     stored((storage) => (token ? storage.setItem(kKey, token) : storage.removeItem(kKey)));
   }
 
-  // {datasets, moreWithToken}: what is shown to who has this token.
+  // {datasets, moreWithToken}: the datasets that are visible with this token.
   async list(token = this.#token) {
     if (!/^[\w.~+/=-]*$/.test(token)) throw new UnknownToken();
     const response = await fetch("/datasets", { headers: headersOf(token) });
@@ -38,12 +38,12 @@ export class Access {
     return { datasets: datasets.map(withDefaults), moreWithToken };
   }
 
-  // Whether the server refuses what this URL names to the token in use.
+  // Whether the server refuses this URL with the current token.
   async isRefused(url) {
     return [401, 403].includes((await fetch(url, { headers: this.headers })).status);
   }
 
-  // Metres above the ellipsoid; undefined where the server does not tell.
+  // Metres above the ellipsoid; undefined if the server has no height there.
   async heightAt(dataset, longitude, latitude) {
     try {
       const reply = await fetch(`${dataset.urls.heights}?locations=${latitude},${longitude}`, { headers: this.headers });

@@ -9,7 +9,7 @@ import { decodeView, encodeView } from "/viewer/view_url.js";
 
 const kFlightSeconds = 2.5;
 
-// `wanted`: a view of a dataset that was not there; it may be once there is a token.
+// `wanted`: a view of a dataset that is not in the list; it may be there with a token.
 const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
@@ -71,7 +71,7 @@ async function show() {
   remember();
 }
 
-// Of a part of a dataset nothing tells the heights.
+// The heights of a part of a dataset are unknown.
 async function lookAt(region, seconds) {
   const { dataset } = state;
   const { longitude, latitude } = boxOf(region.bounds);
@@ -101,7 +101,7 @@ function setSwitches({ contours, wireframe, tiles3d }) {
   remember();
 }
 
-// Keeps the address bar on what is shown, without filling the history.
+// Updates the address bar to the current view without adding to the history.
 function remember() {
   if (!state.ready || state.wanted) return;
   const view = { ...state, dataset: state.dataset.name, camera: globe.camera, exaggeration: globe.exaggeration,
@@ -155,7 +155,7 @@ async function useToken(token) {
   await apply(state.wanted ?? decodeView(location.hash));
 }
 
-// With the token of this tab, if it has one that still counts.
+// Uses the token of this tab, if it has a valid one.
 async function listAtStart() {
   try {
     await list();

@@ -1,11 +1,11 @@
-// How a dataset is best seen: from how far, and with how fine a mesh.
+// The best view of a dataset: distance of the camera and fineness of the mesh.
 import { Math as CesiumMath } from "/viewer/cesium/index.js";
 
 const kMetresPerDegree = 111320;
 const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
 export const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
 
-// Middle and size of [west, south, east, north], degrees; east < west means across the antimeridian.
+// Centre and size of [west, south, east, north] in degrees; east < west means across the antimeridian.
 export function boxOf([west, south, east, north]) {
   const width = east >= west ? east - west : east - west + 360;
   return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
@@ -21,8 +21,8 @@ function shareOfEarth(bounds) {
   return (boxOf(bounds).width / 360) * ((sine(bounds[3]) - sine(bounds[1])) / 2);
 }
 
-// What a first view of a dataset frames: all of it, or, of one of the whole Earth, the region with the finest data if
-// that is a small part of it. `isPart` tells which.
+// The region of a first view of a dataset: all of it, or for one of the whole Earth the region with the finest data, if
+// that is a small part of it. `isPart`: it is such a part.
 export function firstRegion(dataset) {
   const finest = { ...dataset, bounds: dataset.finest_bounds ?? dataset.bounds };
   const isPart = isGlobal(dataset) && shareOfEarth(finest.bounds) < shareOfEarth(dataset.bounds) / 4;
@@ -35,19 +35,19 @@ export function extent(dataset) {
   return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
 }
 
-// Metres between the camera and the middle of a dataset seen whole.
+// Metres between the camera and the centre of a dataset that is completely in view.
 export function viewDistance(dataset) {
   return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
 }
 
-// Pixels of error at which CesiumJS goes a level deeper, from a distance in metres. A planet seen whole gets more
-// tiles, for the sake of its colours.
+// Pixels of error at which CesiumJS goes a level deeper, for a distance in metres. A whole planet gets more tiles,
+// because colours need them.
 export function pixelTolerance(distance) {
   return 1.5 - CesiumMath.clamp((Math.log10(distance) - 5.5) / 1.5, 0, 1);
 }
 
-// The share of the level error that makes a first view of the dataset good: half of it, and less where the relief is so
-// small beside the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
+// The fraction of the level error for a good first view of the dataset: one half, or less if the relief is so small for
+// the extent that the level error (pixelTolerance pixels of 1.6 mm at one metre) exceeds 1/40 of it.
 export function suggestedFraction(dataset) {
   const visible = (dataset.heights.max - dataset.heights.min) / 40;
   return Math.min(0.5, visible / (0.0016 * pixelTolerance(viewDistance(dataset)) * viewDistance(dataset)));

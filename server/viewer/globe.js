@@ -1,4 +1,4 @@
-// The CesiumJS side of the page: the widget, the terrain in it, the camera, picking, and what is being drawn.
+// The CesiumJS part of the page: the widget, its terrain, the camera, picking, and statistics of the drawn tiles.
 import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
   HeadingPitchRange, Math as CesiumMath, PointPrimitiveCollection, Resource, ScreenSpaceEventHandler,
@@ -9,14 +9,14 @@ import { steerByKeyboard } from "/viewer/keyboard.js";
 import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
 import { Tiles3d } from "/viewer/tiles3d.js";
 
-// Drawn without a GPU: smooth edges cost too much there.
+// Renderers without a GPU, for which antialiasing is too slow.
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
-const kWorldMiddle = [82, 18];  // longitude and latitude in front when all of the Earth is shown: the highest ground
+const kWorldMiddle = [82, 18];  // longitude and latitude at the centre of a view of the whole Earth: the highest ground
 
 export class Globe {
-  #latest = 0;  // counts show(): of two that overlap only the later one may set the terrain
+  #latest = 0;  // number of the latest show(): of overlapping calls only the latest may set the terrain
 
-  // `onError` gets a sentence for the reader of the page.
+  // `onError` gets a sentence for the user.
   constructor(container, onError) {
     const credits = document.createElement("div");  // the page states the attribution itself
     this.widget = new CesiumWidget(container, {
@@ -66,7 +66,7 @@ export class Globe {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
     const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
-    // CesiumJS takes a missing layer.json for an ancient server of height maps.
+    // If layer.json is missing, CesiumJS assumes an old server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
     if (turn !== this.#latest) return;
     provider.errorEvent.addEventListener((failure) => this.onError(failure.message));
@@ -92,8 +92,8 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // The air is white where no ground is in front of it: through wires, and where terrain has made room for 3D Tiles that
-  // are still on their way.
+  // Makes the background white where no ground covers it: in wireframe, and on the side of 3D Tiles that are still
+  // loading.
   #hideAir() {
     const { wire, split } = this.material.uniforms;
     this.scene.skyAtmosphere.show = wire === 0 && split === 0;
@@ -103,13 +103,13 @@ export class Globe {
     return this.scene.splitPosition;
   }
 
-  // Where the splitter stands, as a share of the picture's width.
+  // The position of the splitter as a fraction of the width.
   set split(share) {
     this.scene.splitPosition = share;
     this.scene.requestRender();
   }
 
-  // The last picture stays in front until the new terrain is there or the camera moves.
+  // Shows the last frame as a still image until the new terrain is drawn or the camera moves.
   #drawCurtain() {
     const { canvas, globe, camera } = this.scene;
     if (globe.terrainProvider.availability === undefined) return;
@@ -128,15 +128,15 @@ export class Globe {
     stop.push(camera.moveStart.addEventListener(lift));
   }
 
-  // A region from the south-west, low enough to see its relief; a global dataset as a whole planet. `region`: a dataset,
-  // or a part of it with `ground`, the height of its middle.
+  // Shows a region from the south-west, low enough to see its relief, and a global dataset as a whole planet. `region`:
+  // a dataset, or a part of it with `ground`, the height at its centre.
   lookAt(region, seconds) {
     const { camera } = this.scene;
     const { longitude, latitude, width, height } = boxOf(region.bounds);
     const narrow = Math.max(1, 0.8 * this.scene.canvas.clientHeight / this.scene.canvas.clientWidth);
     if (isGlobal(region)) {
       const eastward = width > 350 ? kWorldMiddle[0] : longitude;
-      const northward = width > 350 && height > 100 ? kWorldMiddle[1] : latitude;  // not of what lies around a pole
+      const northward = width > 350 && height > 100 ? kWorldMiddle[1] : latitude;  // except for regions around a pole
       const destination = Cartesian3.fromDegrees(eastward, northward, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }
@@ -169,7 +169,7 @@ export class Globe {
     return this.material.uniforms.wire === 1;
   }
 
-  // CesiumJS offers lines only through its inspector's switch.
+  // CesiumJS has wireframes only in its inspector.
   set wireframe(on) {
     this.scene.globe._surface.tileProvider._debug.wireframe = on;
     this.scene.globe.showSkirts = !on;
@@ -187,7 +187,7 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // What follows the distance: depth of tiles, contour interval, strength of the shading, roundness of the globe.
+  // Adapts to the distance: depth of tiles, contour interval, strength of shading, roundness of the globe.
   adaptToCamera() {
     const { camera, canvas } = this.scene;
     const middle = camera.pickEllipsoid({ x: canvas.clientWidth / 2, y: canvas.clientHeight * 0.6 });
@@ -204,7 +204,7 @@ export class Globe {
   }
 
   // Calls back with {longitude, latitude, height} of the clicked ground (degrees, metres above the ellipsoid), or
-  // undefined beside the globe.
+  // undefined outside the globe.
   onPick(callback) {
     const { canvas, camera } = this.scene;
     const handler = new ScreenSpaceEventHandler(canvas);
@@ -232,8 +232,7 @@ export class Globe {
     return !this.scene.globe.tilesLoaded || this.tiles3d.loading;
   }
 
-  // What is in the current picture, skirts not counted but where it says so. `keys` are the tiles' "z/x/y", y from the
-  // south.
+  // Statistics of the current frame, without skirts unless stated. `keys` are the tiles' "z/x/y", y from the south.
   drawn() {
     const sum = { tiles: 0, triangles: 0, withSkirts: 0, vertices: 0, deepest: 0, keys: [] };
     for (const tile of this.scene.globe._surface._tilesToRender) {

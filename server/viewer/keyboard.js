@@ -1,11 +1,11 @@
-// The camera by keyboard, while the globe has the focus: arrows travel, Shift and arrows turn, plus and minus zoom,
-// Enter reads the height in the middle.
+// Controls the camera by keyboard while the globe has the focus: arrows move, Shift and arrows turn, plus and minus
+// zoom, Enter shows the height at the centre.
 import { Cartesian3, Math as CesiumMath } from "/viewer/cesium/index.js";
 
 const kTurn = CesiumMath.toRadians(4);
 const kStep = 0.12;  // of the height above the ellipsoid
 
-// Along the ground by `right` and `ahead`, in steps as seen from the camera.
+// Moves along the ground by `right` and `ahead`, in steps relative to the camera.
 function travel(camera, right, ahead) {
   const up = Cartesian3.normalize(camera.positionWC, new Cartesian3());
   const northward = Cartesian3.cross(up, camera.rightWC, new Cartesian3());

@@ -1,8 +1,9 @@
-// The look of the terrain: one globe material that colours by height, shades by the tiles' vertex normals and draws
-// contour lines. The light stands in the local north-west of every point, as on a printed map: no hemisphere is dark.
+// The material of the globe: colours by height, shading by the tiles' vertex normals, and contour lines. The light is
+// in the local north-west of every point, as on a printed map, so no hemisphere is dark.
 import { Material } from "/viewer/cesium/index.js";
 
-// Depth and height as fractions of what the dataset has, and sRGB. Low ground, where most land lies, gets most colours.
+// Depth and height as fractions of the dataset's range, and sRGB. Low ground has most of the colours, because most land
+// is low.
 const kSea = [
   [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196],
   [1.0, 136, 196, 212],
@@ -11,10 +12,10 @@ const kLand = [
   [0.0, 74, 122, 84], [0.07, 98, 144, 88], [0.16, 146, 166, 98], [0.28, 200, 184, 118], [0.42, 198, 154, 94],
   [0.56, 166, 116, 74], [0.7, 134, 96, 76], [0.82, 158, 142, 136], [0.92, 222, 219, 217], [1.0, 255, 255, 255],
 ];
-// A lowest height above this is taken for land below the ellipsoid, not for a sea floor.
+// If the lowest height is above this, it counts as land below the ellipsoid, not as a sea floor.
 const kShallowestSeaFloor = -200;
-// Datasets of land alone store the sea as a plain: level ground below this share of the heights is drawn as water, if
-// the dataset comes down to the sea at all.
+// Datasets of land store the sea as a plain: level ground below this fraction of the heights is drawn as water, if the
+// dataset reaches sea level.
 const kWaterShare = 0.025;
 const kHighestSea = 50;
 const kMinRelief = 300;
@@ -51,8 +52,8 @@ export function drawRamp(canvas, heights) {
 
 export const kRampWidth = 2048;
 
-// What a point of the ground looks like, from uniforms of the names below. `tiles` are the points of 3D Tiles, which
-// have the right of the picture beyond the splitter to themselves.
+// Computes the look of a point of the ground from the uniforms below. `tiles`: a point of 3D Tiles, which are drawn to
+// the right of the splitter.
 export const kLook = /* glsl */ `
 const vec3 kRadii = vec3(6378137.0, 6378137.0, 6356752.314245);
 const vec3 kShadow = vec3(0.30, 0.33, 0.46);

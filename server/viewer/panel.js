@@ -1,9 +1,9 @@
-// The controls and the numbers beside the globe. Knows the page's elements, not CesiumJS.
+// The controls and the numbers beside the globe. Uses the page's elements, but not CesiumJS.
 import { drawRamp } from "/viewer/material.js";
 import { Splitter } from "/viewer/splitter.js";
 import { kPhases } from "/viewer/traffic.js";
 
-// The slider counts half powers of two, to the right the finer: 4, 2.83, ... 1/32.
+// The slider has steps of half powers of two, finer to the right: 4, 2.83, ... 1/32.
 const kCoarsest = -4;
 const kFinest = 10;
 export const fractionOfStep = (step) => 2 ** (-step / 2);
@@ -48,7 +48,7 @@ export class Panel {
     byId("fraction").addEventListener("input", (event) => {
       const fraction = fractionOfStep(event.target.valueAsNumber);
       this.setFraction(fraction);
-      clearTimeout(settle);  // a drag passes over steps that nobody wants fetched
+      clearTimeout(settle);  // steps passed during a drag should not be fetched
       settle = setTimeout(() => actions.fraction(fraction), 250);
     });
     byId("exaggeration").addEventListener("input", (event) => {
@@ -62,13 +62,13 @@ export class Panel {
     if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
   }
 
-  // `moreWithToken`: there may be others for who has a token.
+  // `moreWithToken`: a token may show others.
   setDatasets(datasets, moreWithToken) {
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
     byId("use-token").hidden = !moreWithToken;
   }
 
-  // `hasPart`: the first view is of a part of it.
+  // `hasPart`: the first view shows a part of the dataset.
   setDataset({ name, heights, attribution }, hasPart) {
     byId("dataset").value = name;
     byId("whole").hidden = !hasPart;
@@ -116,7 +116,7 @@ export class Panel {
     byId("message").textContent = text ?? "";
   }
 
-  // `tiles3d`: what of 3D Tiles is drawn, where they are.
+  // `tiles3d`: statistics of the drawn 3D Tiles, if any.
   setStats(drawn, traffic, tiles3d) {
     const error = (keys) => {
       const worst = traffic.worstError(keys);

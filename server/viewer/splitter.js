@@ -1,9 +1,9 @@
-// The line between the two halves of the picture, moved by pointer or arrow keys.
+// The line between the two parts of the view, moved by pointer or arrow keys.
 const kKeyStep = 0.02;
 const kKeys = { ArrowLeft: -kKeyStep, ArrowRight: kKeyStep };
 
 export class Splitter {
-  // `onMove` gets the line's place as a share of the width, from the left.
+  // `onMove` gets the position of the line as a fraction of the width, from the left.
   constructor(element, onMove) {
     Object.assign(this, { element, onMove });
     element.addEventListener("pointerdown", (event) => element.setPointerCapture(event.pointerId));

@@ -1,6 +1,6 @@
-// The dataset's 3D Tiles to the right of a line on the screen, in the scene of the terrain and with its look, so that
-// the two can be compared. Both deepen at the same distance: the tileset's geometric errors are eight times the level
-// errors that CesiumJS assumes of terrain, and so is the tolerance set here.
+// Shows the dataset's 3D Tiles to the right of a line on the screen, in the scene of the terrain and with its material,
+// so that both can be compared. Both refine at the same distance: the tileset's geometric errors are eight times the
+// level errors that CesiumJS assumes for terrain, and so is the tolerance set here.
 import {
   Cartesian2, Cartesian4, Cesium3DTileset, CustomShader, LightingModel, SplitDirection, TextureUniform,
   UniformType,
@@ -10,8 +10,8 @@ import { kLook, kRampWidth } from "/viewer/material.js";
 const kErrorRatio = 8;
 const kTexels = 4 * kRampWidth;
 
-// Heights come from the ellipsoid's equation f = 1, written as a difference from the camera: an Earth-centred position
-// in 32-bit floats is only good to half a metre.
+// Heights are computed from the ellipsoid's equation f = 1, relative to the camera, because an Earth-centred position
+// in 32-bit floats is exact only to half a metre.
 const kFragment = /* glsl */ `
 ${kLook}
 void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
@@ -51,15 +51,16 @@ function makeShader() {
 }
 
 export class Tiles3d {
-  #latest = 0;  // counts show() and hide(): of loads that overlap only the last may enter the scene
+  #latest = 0;  // number of the latest show() or hide(): of overlapping loads only the latest may enter the scene
 
-  // `look`: the uniforms of the terrain's material, which the tiles follow from frame to frame.
+  // `look`: the uniforms of the terrain's material, which the tiles use in every frame.
   constructor(scene, look) {
     Object.assign(this, { scene, look, tileset: undefined, pending: false, wireframe: false });
     scene.preUpdate.addEventListener(() => this.tileset && this.#follow());
   }
 
-  // `resource`: of tileset.json. Throws what CesiumJS throws if it cannot be read. `onError` gets a sentence for each tile that fails.
+  // `resource`: tileset.json. If it cannot be read, throws the exception of CesiumJS. `onError` gets a sentence for
+  // each tile that fails.
   async show(resource, onError) {
     const turn = ++this.#latest;
     this.pending = true;
@@ -96,7 +97,7 @@ export class Tiles3d {
     return this.pending || (this.tileset !== undefined && !this.tileset.tilesLoaded);
   }
 
-  // What is in the current picture, skirts counted: GLB tiles carry theirs. `keys` are "root/level/x/y".
+  // Statistics of the current frame, including skirts, which GLB tiles contain. `keys` are "root/level/x/y".
   drawn() {
     const sum = { tiles: 0, triangles: 0, keys: [] };
     for (const { content } of this.tileset?._selectedTiles ?? []) {

@@ -11,7 +11,7 @@ export class TokenCard {
     byId("token-cancel").addEventListener("click", () => this.close());
   }
 
-  // `reason`: a sentence. `isOptional`: there is something to see without a token.
+  // `reason`: a sentence. `isOptional`: there are datasets that need no token.
   ask(reason, isOptional) {
     byId("token-reason").textContent = reason;
     byId("token-cancel").hidden = !isOptional;

@@ -1,4 +1,5 @@
-// What the tiles cost, by format, read from the browser's own resource timing: bytes, cache hits, and the server's time by phase.
+// Statistics of loaded tiles by format, from the browser's resource timing: bytes, cache hits, and the server's time by
+// stage.
 import { Resource } from "/viewer/cesium/index.js";
 
 export const kPhases = ["read", "refine", "encode", "compress"];
@@ -13,7 +14,7 @@ export class Traffic {
 
   reset() {
     Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
-    this.tiles3d = { tiles: 0, bytes: 0 };  // the same of 3D Tiles; the bytes of subtrees and tileset.json with them
+    this.tiles3d = { tiles: 0, bytes: 0 };  // the same for 3D Tiles, including the bytes of subtrees and tileset.json
     this.errors = new Map();  // metres, by "z/x/y", of 3D Tiles by "root/level/x/y"
     this.milliseconds = Object.fromEntries(kPhases.map((phase) => [phase, 0]));
   }
@@ -28,7 +29,7 @@ export class Traffic {
       return;
     }
     this.tiles += 1;
-    this.bytes += entry.transferSize || 0;  // 0 for what came from the browser's cache
+    this.bytes += entry.transferSize || 0;  // 0 for entries from the browser's cache
     const timing = new Map((entry.serverTiming ?? []).map((metric) => [metric.name, metric]));
     const cache = timing.get("cache")?.description;
     if (!cache || entry.transferSize === 0) return;
@@ -39,13 +40,13 @@ export class Traffic {
     for (const phase of kPhases) this.milliseconds[phase] += timing.get(phase)?.duration ?? 0;
   }
 
-  // The largest Terrain-Max-Error among these tiles, metres; undefined if none stated one.
+  // The largest Terrain-Max-Error of these tiles in metres; undefined if none has one.
   worstError(keys) {
     const errors = keys.filter((key) => this.errors.has(key)).map((key) => this.errors.get(key));
     return errors.length > 0 ? Math.max(...errors) : undefined;
   }
 
-  // Response headers are not part of resource timing; the request that CesiumJS makes is the only place to see them.
+  // Resource timing has no response headers, so this reads them from the requests of CesiumJS.
   #watchErrorHeader() {
     const load = Resource._Implementations.loadWithXhr;
     Resource._Implementations.loadWithXhr = (url, ...rest) => {

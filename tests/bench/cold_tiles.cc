@@ -1,5 +1,5 @@
-// terrace_cold_tiles: how many tiles a second the pipeline makes on so many threads, without HTTP, caches or queues,
-// and how long a tile's stages take. tests/load/cold_storm.py holds a server's figure against it.
+// terrace_cold_tiles measures how many tiles a second the pipeline builds on a number of threads, without HTTP, caches
+// or queues, and how long the stages of a tile take. tests/load/cold_storm.py compares a server with it.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -28,7 +28,7 @@ struct Arguments {
   unsigned threads = std::max(std::thread::hardware_concurrency(), 1u);
 };
 
-// One a line: "/maui/12/252/2520.terrain".
+// One key a line: "/maui/12/252/2520.terrain".
 Result<std::vector<geo::TileKey>> ReadKeys(const std::string& file) {
   std::ifstream lines(file);
   std::vector<geo::TileKey> keys;

@@ -1,4 +1,4 @@
-// CPU time of the calling thread: what a benchmark charges to the mesher, whatever else runs on the machine.
+// CPU time of the calling thread, which other programs on the machine affect little.
 #pragma once
 
 #include <ctime>
@@ -12,7 +12,7 @@ inline double ThreadSeconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-// What `work` costs.
+// CPU seconds of `work`.
 template <typename Work>
 double SecondsOf(Work&& work) {
   const double start = ThreadSeconds();

@@ -29,7 +29,7 @@ double CheckMesh(const std::string& name, const tin::HeightField& field, const t
   if (error.samples != samples) Die(fmt::format("{}: the mesh covers {} of {} samples", name, error.samples, samples));
   if (goal.max_points != std::numeric_limits<std::size_t>::max()) {
     if (mesh.vertices.size() > goal.max_points) Die(fmt::format("{}: {} vertices", name, mesh.vertices.size()));
-  } else if (error.max > goal.max_error + 1e-9) {  // the measurement itself rounds
+  } else if (error.max > goal.max_error + 1e-9) {  // the measurement rounds
     Die(fmt::format("{}: the mesh is {} m off where {} m were asked", name, error.max, goal.max_error));
   }
   return error.rms;

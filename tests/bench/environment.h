@@ -1,4 +1,4 @@
-// What all parts of the benchmark share: the options of the command line, and who runs against whom.
+// Shared by all parts of the benchmark: the options of the command line, and races against a peer.
 #pragma once
 
 #include <optional>
@@ -17,7 +17,7 @@ namespace terrace::bench {
 
 struct Options {
   int runs = 5;                     // turns of every race
-  std::string peer;                 // command, peer.h; empty: nobody runs against us
+  std::string peer;                 // command, see peer.h; empty: no comparison
   std::string data_dependent_peer;  // the same for data-dependent triangulations
   std::string filter;               // regular expression on the names of cases; empty: all
 };
@@ -34,17 +34,17 @@ class Environment {
   std::regex filter_;
 };
 
-// Gives up: throws a std::runtime_error that only main() catches, so that temporary files go on the way.
+// Throws a std::runtime_error that only main() catches, so that destructors remove temporary files.
 [[noreturn]] void Die(const std::string& message);
 
-// The command (peer.h) as a contender. Fields that it is raced on must outlive it. Dies when the command fails.
+// The command (peer.h) as a contender. The fields of its races must outlive it. Dies if the command fails.
 Contender PeerContender(const std::string& command);
 
 // Dies unless the mesh meets the goal, measured by tin::MeasureError. Returns the root mean square error.
 double CheckMesh(const std::string& name, const tin::HeightField& field, const tin::GreedyGoal& goal,
                  const tin::TinMesh& mesh);
 
-// A race of ours against a peer, if there is one, as a row of SpeedColumns().
+// A race of ours against the peer, if there is one, as a row of SpeedColumns().
 std::vector<std::string> SpeedColumns();
 struct Contest {
   Score ours;

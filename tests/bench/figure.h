@@ -11,7 +11,7 @@ namespace terrace::bench {
 struct Series {
   std::string name;
   std::vector<std::pair<double, double>> points;
-  bool is_reference = false;  // numbers of others: drawn as marks, not as a line
+  bool is_reference = false;  // numbers of another program, drawn as marks and not as a line
 };
 
 // Both axes are logarithmic.

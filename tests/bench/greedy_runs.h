@@ -15,7 +15,7 @@ namespace terrace::bench {
 
 using Mesher = std::function<tin::TinMesh(const tin::HeightField&, const tin::GreedyGoal&)>;
 
-// From two triangles to the mesh.
+// A complete run, from two triangles to the mesh.
 inline tin::TinMesh MeshOf(const tin::HeightField& field, const tin::GreedyGoal& goal,
                            const tin::GreedyOptions& options = {}) {
   tin::GreedyTriangulation tin(field, options);
@@ -27,7 +27,7 @@ inline Mesher GreedyMesher(const tin::GreedyOptions& options = {}) {
   return [options](const tin::HeightField& field, const tin::GreedyGoal& goal) { return MeshOf(field, goal, options); };
 }
 
-// The same, cut into blocks where the engine thinks that this pays; all of them on this thread. An error is the goal.
+// The same in blocks, if the engine's partition has several; all of them on this thread. The goal must be an error.
 inline tin::TinMesh MeshInBlocks(const tin::HeightField& field, const tin::GreedyGoal& goal) {
   const tin::FieldPartition cut = tin::FieldPartition::For(field, goal.max_error);
   tin::BlockJoiner joiner(cut);
@@ -37,7 +37,7 @@ inline tin::TinMesh MeshInBlocks(const tin::HeightField& field, const tin::Greed
   return std::move(joiner).Take();
 }
 
-// Twice a turn, as peers do: the first time finds the caches as another process has left them.
+// Meshes twice a turn, as peers do, because the first run starts with the caches of another process.
 inline Contender Timed(Mesher mesher) {
   return [mesher = std::move(mesher)](const tin::HeightField& field, const tin::GreedyGoal& goal, Runs& runs) {
     for (int time = 0; time < 2; ++time) {

@@ -1,4 +1,4 @@
-// What a measurement depends on besides the code: goes into every file of results.
+// What a measurement depends on besides the code. Every file of results contains it.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -6,8 +6,8 @@
 
 namespace terrace::bench {
 
-// {"cpu", "cores", "load", "compiler", "flags", "commit", "date"}; "unknown" for what cannot be found out. "load": how
-// many threads wanted a core in the minute before.
+// {"cpu", "cores", "load", "compiler", "flags", "commit", "date"}; unknown values are "unknown". "load" is the load
+// average of the last minute.
 nlohmann::ordered_json MachineContext();
 
 // The first line that a shell command prints; empty if it fails.

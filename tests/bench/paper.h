@@ -16,11 +16,11 @@ struct Results {
 
 void TimeOverVertices(Results& results);      // figure 3: time(m, n), on windows of West US
 void ParallelInsertions(Results& results);    // figure 12: many insertions per pass, on Crater
-void CraterQuality(Results& results);         // RMS and maximum error over m, beside Scape's
+void CraterQuality(Results& results);         // RMS and maximum error over m, compared with Scape's
 void DataDependentQuality(Results& results);  // figures 13 and 14, and the measures of section 3.4.1, on Crater
 void QualityOverVertices(Results& results);   // figure 15: greedy insertion and uniform grids, all five models
 
-// Figures 4 to 11: Crater and its approximations; and one area from 1 % to 50 % of its samples.
+// Figures 4 to 11: Crater and its approximations. Also one area with 1 % to 50 % of its samples.
 void DrawPictures(const std::string& folder);
 
 }  // namespace terrace::bench

@@ -27,7 +27,7 @@ Series UniformCurve(const tin::HeightField& field) {
   return series;
 }
 
-// Scape's meshes, where they are known.
+// Adds Scape's known meshes.
 void AddScapeMarks(const std::string& id, Figure& figure) {
   Series delaunay{"Scape, Delaunay", {}, true}, data_dependent{"Scape, data-dependent", {}, true};
   if (id == "crater") {
@@ -51,7 +51,7 @@ std::string StrategyName(const reference::ParallelRow& row) {
   return row.epsilon < 0 ? fmt::format("alpha = {:g}", row.alpha) : fmt::format("epsilon = {:g} m", row.epsilon);
 }
 
-// After every pass: vertices and RMS.
+// Vertices and RMS after every pass.
 Series ParallelCurve(const tin::HeightField& field, const reference::ParallelRow& row) {
   constexpr std::size_t kEnough = 10000, kNoLimit = static_cast<std::size_t>(-1);
   Series series{StrategyName(row), {}};
@@ -65,7 +65,7 @@ Series ParallelCurve(const tin::HeightField& field, const reference::ParallelRow
   return series;
 }
 
-// The curve's first point with that many vertices: where the pass ended that reached them.
+// The curve's first point with that many vertices, which is the end of the pass that reached them.
 std::optional<std::pair<double, double>> FirstWith(const Series& series, std::size_t points) {
   for (const auto& point : series.points) {
     if (point.first >= static_cast<double>(points)) return point;

@@ -32,7 +32,7 @@ std::array<Variant, 6> Variants() {
            {"sum-max, q = 0", DataDependent(tin::FitMeasure::kSumMax, 0), &CraterRow::pure_sum_max_rms}}};
 }
 
-// Every measure of section 3.4.1.
+// All measures of section 3.4.1.
 Table Measures(const tin::HeightField& crater) {
   std::vector<std::string> columns{"m"};
   std::vector<std::vector<Cell>> rows;
@@ -51,7 +51,7 @@ Table Measures(const tin::HeightField& crater) {
   return table;
 }
 
-// The bound that the run itself reports, against what an independent pass finds.
+// Compares the bound that the run reports with the error that an independent pass measures.
 Table Maxima(const tin::HeightField& crater) {
   Table table("crater-maxima", "Crater: maximum error in m at m vertices, data-dependent (sum-max)",
               {"m", "reported", "measured", "Scape's, measured"});
@@ -64,7 +64,7 @@ Table Maxima(const tin::HeightField& crater) {
   return table;
 }
 
-// Seconds to each number of vertices, the least of some runs, and the RMS error there.
+// Seconds to each number of vertices, the minimum of some runs, and the RMS error there.
 Series ErrorOverTime(const tin::HeightField& field, const std::string& name, const tin::GreedyOptions& options) {
   constexpr int kRepeats = 3;
   Series series{name, {}};

@@ -14,7 +14,7 @@ namespace {
 
 void Repeat(const std::string& folder) {
   std::filesystem::create_directories(folder);
-  const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
+  const nlohmann::ordered_json context = MachineContext();  // before the work, which would increase the load
   Results results;
   for (const auto& experiment :
        {CraterQuality, DataDependentQuality, ParallelInsertions, QualityOverVertices, TimeOverVertices}) {

@@ -1,5 +1,5 @@
-// What the authors' own program, Scape 1.2, makes of the paper's elevation models, compiled today: the numbers that
-// ours stand beside. RMS errors in the elevation models' units (metres).
+// Results of Scape 1.2, the program of the paper's authors, on the paper's elevation models, built on the same machine
+// as ours. RMS errors are in the units of the elevation models (metres).
 #pragma once
 
 #include <array>
@@ -7,7 +7,8 @@
 
 namespace terrace::bench::reference {
 
-// Crater, by number of vertices. Data-dependent triangulations with the shape threshold 1/2 but where it says pure.
+// Crater, by number of vertices. Data-dependent triangulations have the shape threshold 1/2, those named pure have
+// none.
 struct CraterRow {
   std::size_t points;
   double delaunay_rms, delaunay_max;
@@ -24,8 +25,7 @@ inline constexpr std::array<CraterRow, 7> kCrater = {{
     {50000, 0.36749, 1.0, 0.29590, 5, 0.28940, 0.29874, 0.37578, 0.47556, 2.0292, 62.5},
 }};
 
-// Crater, insertion of many samples per pass: RMS after the pass that reached 1542, 5000 and
-// 7711 vertices; 0: not known.
+// Crater, insertion of many samples per pass: RMS after the pass that reached 1542, 5000 and 7711 vertices; 0: unknown.
 struct ParallelRow {
   double alpha, epsilon;  // one of them is -1
   std::array<double, 3> rms;

@@ -18,7 +18,7 @@ struct Timing {
   double n, m, seconds;
 };
 
-// The least seconds of `repeats` runs up to each number of vertices.
+// The minimum of `repeats` runs of the seconds to each number of vertices.
 std::vector<Timing> TimeRun(const tin::HeightField& field, const std::vector<std::size_t>& counts) {
   constexpr int kRepeats = 3;
   const double n = static_cast<double>(field.width()) * static_cast<double>(field.height());
@@ -36,7 +36,7 @@ std::vector<Timing> TimeRun(const tin::HeightField& field, const std::vector<std
   return timings;
 }
 
-// The naive algorithm, one run.
+// One run of the naive algorithm.
 Series TimeNaive(const tin::HeightField& field, const std::vector<std::size_t>& counts) {
   Series series{fmt::format("naive, n = {} x {}", field.width(), field.height()), {}};
   ParallelInsertion insertion(field);

@@ -45,7 +45,7 @@ std::size_t ParallelInsertion::Pass(double threshold, std::size_t max_points) {
   return inserted;
 }
 
-// False if the sample is a vertex already: the triangles on both sides of an edge may have chosen the same.
+// Returns false if the sample is already a vertex: the triangles on both sides of an edge may have the same candidate.
 bool ParallelInsertion::Insert(const Candidate& candidate) {
   const tin::SamplePosition point = tin::PositionOf(candidate.sample);
   const TriangleId start = changed_.empty() ? 0 : changed_.back();

@@ -1,9 +1,7 @@
-// Greedy insertion of many samples in each pass: section 4.4 of the paper, the variant it advises against.
-//
-// Every triangle has its worst sample as a candidate. A pass inserts the candidates of all triangles at once that reach
-// a threshold, and only then looks at the triangles that changed. The threshold is `alpha` times the largest error at
-// the start of the pass (fractional), or a constant `epsilon`. alpha = 1 is sequential insertion but for ties, alpha =
-// 0 inserts a sample in every triangle.
+// Greedy insertion of many samples in each pass: section 4.4 of the paper, which advises against it.  The candidate of
+// a triangle is its worst sample. A pass inserts all candidates that reach a threshold, and scans the changed triangles
+// only afterwards. The threshold is `alpha` times the largest error at the start of the pass (fractional), or a
+// constant `epsilon`. alpha = 1 is sequential insertion except for ties. alpha = 0 inserts a sample in every triangle.
 #pragma once
 
 #include <cstddef>
@@ -21,12 +19,12 @@ class ParallelInsertion {
   // `field` must outlive this object.
   explicit ParallelInsertion(const tin::HeightField& field);
 
-  // One pass; returns how many samples it inserted, 0 when there is none left that reaches the threshold. Stops in the
-  // middle of the pass at `max_points` vertices.
+  // Runs one pass. Returns the number of inserted samples, 0 if none reaches the threshold. Stops during the pass at
+  // `max_points` vertices.
   std::size_t FractionalPass(double alpha, std::size_t max_points);
   std::size_t ConstantPass(double epsilon, std::size_t max_points);
 
-  // A pass of section 3.2, algorithm I: looks at every sample of the field again and inserts the worst. O(n) each.
+  // A pass of section 3.2, algorithm I: scans every sample of the field again and inserts the worst. O(n).
   std::size_t NaivePass(std::size_t max_points);
 
   std::size_t vertex_count() const { return triangulation_.vertex_count(); }
@@ -42,7 +40,7 @@ class ParallelInsertion {
   const tin::HeightField& field_;
   tin::Triangulation triangulation_;
   std::vector<tin::Candidate> candidates_;  // by triangle
-  std::vector<tin::TriangleId> changed_;    // since they were scanned, some of them more than once
+  std::vector<tin::TriangleId> changed_;    // since their last scan, with duplicates
 };
 
 }  // namespace terrace::bench

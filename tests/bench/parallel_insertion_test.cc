@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kNoLimit = static_cast<std::size_t>(-1);
 
 TEST(ParallelInsertion, WithAlphaOneIsSequential) {
-  const tin::HeightField field = tin::NoiseField(21, 18, 3);  // no two errors are equal
+  const tin::HeightField field = tin::NoiseField(21, 18, 3);  // all errors differ
   ParallelInsertion parallel(field);
   while (parallel.FractionalPass(1, 90) > 0) {
   }
@@ -40,7 +40,7 @@ TEST(ParallelInsertion, WithAlphaZeroInsertsInEveryTriangle) {
   const std::size_t inserted = parallel.FractionalPass(0, kNoLimit);
   EXPECT_EQ(parallel.vertex_count(), before + inserted);
   EXPECT_LE(inserted, triangles);
-  EXPECT_GT(inserted, triangles / 2);  // two triangles may share a sample on their edge, no more
+  EXPECT_GT(inserted, triangles / 2);  // at most two triangles share a sample on their edge
 }
 
 TEST(ParallelInsertion, KeepsTheConstantThreshold) {

@@ -1,12 +1,11 @@
-// Another mesher, run as a command: what it costs to mesh the same heights to the same goal.
+// Runs another mesher as a command, and reports its time for the same heights and the same goal.
 //
 // The command gets four more arguments: a file of raw float32 heights (metres, row by row, this machine's byte order),
-// its width, its height, and the goal, `error=5` (metres) or `points=1542` (vertices). For each time it meshed it
+// its width, its height, and the goal, `error=5` (metres) or `points=1542` (vertices). For each run of its mesher it
 // prints a line
 //
 //   seconds 0.0104 points 1542
-//
-// the CPU seconds of meshing alone, without reading, and the vertices it got. Lines that begin otherwise are skipped.
+// with the CPU seconds of meshing, without reading, and the number of vertices. Other lines are ignored.
 #pragma once
 
 #include <cstddef>
@@ -29,10 +28,10 @@ struct PeerRuns {
   std::size_t points = 0;
 };
 
-// What the command printed, as stated above. kInvalidArgument: not a single line of it.
+// Parses the output described above. kInvalidArgument: it has no such line.
 Result<PeerRuns> ParsePeerOutput(std::string_view output);
 
-// Fields written for peers to read; the folder goes with the object.
+// Writes fields for peers into a temporary folder; the destructor removes it.
 class FieldFiles {
  public:
   FieldFiles();
@@ -40,7 +39,7 @@ class FieldFiles {
   FieldFiles(const FieldFiles&) = delete;
   FieldFiles& operator=(const FieldFiles&) = delete;
 
-  // The field's file, written when it is asked for the first time. `field` must outlive this object.
+  // The field's file; the first call writes it. `field` must outlive this object.
   Result<std::filesystem::path> PathOf(const tin::HeightField& field);
 
  private:
@@ -48,7 +47,7 @@ class FieldFiles {
   std::vector<const tin::HeightField*> written_;
 };
 
-// Runs the command once. kUnavailable: it failed; kInvalidArgument: it printed something else.
+// Runs the command once. kUnavailable: it failed; kInvalidArgument: its output is invalid.
 Result<PeerRuns> RunPeer(const std::string& command, const std::filesystem::path& file, const tin::HeightField& field,
                          const tin::GreedyGoal& goal);
 

@@ -23,7 +23,7 @@ TEST(Peer, LinesOfSecondsAndPointsCountAndNoOthers) {
   EXPECT_EQ(runs->seconds, (std::vector<double>{0.5, 0.25}));
   EXPECT_EQ(runs->points, 7u);
   EXPECT_FALSE(ParsePeerOutput("").has_value());
-  EXPECT_FALSE(ParsePeerOutput("seconds 0 points 7\n").has_value());  // a clock that stands still measures nothing
+  EXPECT_FALSE(ParsePeerOutput("seconds 0 points 7\n").has_value());  // a clock without progress measures nothing
 }
 
 TEST(Peer, GetsTheHeightsAndTheGoal) {
@@ -33,7 +33,7 @@ TEST(Peer, GetsTheHeightsAndTheGoal) {
   ASSERT_TRUE(path.has_value());
   EXPECT_EQ(std::filesystem::file_size(*path), 7u * 5u * sizeof(float));
   EXPECT_EQ(files.PathOf(field).value(), *path);
-  // The script's answer holds what it was given: width + height as seconds, the goal's digits as points.
+  // The script prints its arguments: width + height as seconds, the goal's digits as points.
   const auto runs =
       RunPeer("sh -c 'test -f \"$0\" && echo seconds $(($1 + $2)) points ${3#points=}'", *path, field, {0, 1542});
   ASSERT_TRUE(runs.has_value());

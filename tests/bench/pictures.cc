@@ -64,7 +64,7 @@ Picture Hillshade(const tin::HeightField& field, double spacing_m) {
       const int y0 = std::max(y - 1, 0), y1 = std::min(y + 1, height - 1);
       const double to_east = static_cast<double>(field.At(x1, y) - field.At(x0, y)) / ((x1 - x0) * spacing_m);
       const double to_south = static_cast<double>(field.At(x, y1) - field.At(x, y0)) / ((y1 - y0) * spacing_m);
-      // The light comes from (-1/2, 1/2 north, 1/sqrt 2); the surface's normal is (-to_east, to_south north, 1).
+      // The direction to the light is (-1/2, 1/2 north, 1/sqrt 2), the surface's normal (-to_east, to_south north, 1).
       const double light =
           (to_east / 2 + to_south / 2 + std::sqrt(0.5)) / std::sqrt(to_east * to_east + to_south * to_south + 1);
       const double step = std::clamp(std::round(light * 64), 0.0, 63.0);

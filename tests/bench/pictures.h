@@ -21,8 +21,8 @@ struct Picture {
 // The mesh's height at every sample of the field.
 tin::HeightField SampledMesh(const tin::HeightField& field, const tin::TinMesh& mesh);
 
-// Lit from the north-west at 45 degrees, row 0 in the north; samples are `spacing_m` apart. In steps of 1/64, which the
-// eye does not miss and files of half the size need.
+// Light from the north-west at 45 degrees; row 0 is in the north, samples are `spacing_m` apart. Grey values are in
+// steps of 1/64: the difference is not visible, and files are half as large.
 Picture Hillshade(const tin::HeightField& field, double spacing_m);
 
 // The mesh's edges, black on white, `scale` pixels to a sample.

@@ -1,4 +1,4 @@
-// Two programs on the same fields, run in turns, so that whatever slows the machine down meets both.
+// Runs two programs on the same fields in turns, so that other load on the machine affects both.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,7 @@ struct Runs {
   std::size_t points = 0;  // vertices of its mesh
 };
 
-// Meshes the field once or several times and adds the seconds of each time to the runs.
+// Meshes the field one or more times and adds the seconds of each time to the runs.
 using Contender = std::function<void(const tin::HeightField&, const tin::GreedyGoal&, Runs&)>;
 
 // Sums over fields: of minima, of medians, of vertices.

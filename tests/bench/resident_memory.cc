@@ -26,7 +26,7 @@ std::size_t Since(std::size_t before, std::size_t now) { return now > before ? n
 
 ResidentMemory::ResidentMemory() {
   ::malloc_trim(0);
-  std::ofstream("/proc/self/clear_refs") << "5";  // the mark starts again
+  std::ofstream("/proc/self/clear_refs") << "5";  // resets the peak
   resident_before_ = BytesIn("/proc/self/status", "VmRSS:");
   anonymous_before_ = Anonymous();
 }

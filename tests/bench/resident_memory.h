@@ -1,17 +1,17 @@
-// How much memory the process holds: pages that it has written to, whoever gave them.
+// Measures the memory of the process: all pages that it has written, from any allocator.
 #pragma once
 
 #include <cstddef>
 
 namespace terrace::bench {
 
-// Counts from the present on. What the heap holds in reserve goes back to the system first.
+// Measures from its construction on. The constructor first returns the heap's free memory to the system.
 class ResidentMemory {
  public:
   ResidentMemory();
 
-  // The most since then, bytes beyond what there was: by the system's own mark, which is some dozen pages off, or by a
-  // count of pages now, whichever is more. 0 where the system tells neither.
+  // The peak since then, in bytes above the memory at construction: the system's own peak, which is some dozen pages
+  // off, or the current count of pages, whichever is larger. 0 if the system provides neither.
   std::size_t PeakBytes() const;
 
  private:

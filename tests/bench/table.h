@@ -9,9 +9,9 @@
 
 namespace terrace::bench {
 
-// One cell: what is printed, and the value that the JSON file holds.
+// One cell: the printed text, and the value in the JSON file.
 struct Cell {
-  Cell() = default;  // nothing to say here
+  Cell() = default;  // empty
   Cell(std::string shown) : text(std::move(shown)), value(text) {}
   Cell(const char* shown) : Cell(std::string(shown)) {}
   Cell(std::string shown, nlohmann::ordered_json held) : text(std::move(shown)), value(std::move(held)) {}
@@ -29,7 +29,7 @@ Cell Number(double value, const char* unit, int digits);
 
 class Table {
  public:
-  // `id` names the table in files, `columns` head the cells of every row; their names are the keys in JSON.
+  // `id` names the table in files. `columns` are the headings, and the keys in JSON.
   Table(std::string id, std::string title, std::vector<std::string> columns)
       : id_(std::move(id)), title_(std::move(title)), columns_(std::move(columns)) {}
 
@@ -37,7 +37,7 @@ class Table {
   void Add(std::vector<Cell> row);
   bool empty() const { return rows_.empty(); }
 
-  std::string Markdown() const;  // the rows alone
+  std::string Markdown() const;  // only the rows
   void Print(std::ostream& out) const;
   nlohmann::ordered_json Json() const;
 

@@ -9,7 +9,7 @@
 namespace terrace::bench {
 namespace {
 
-// Rasters of this size are what the target is about; the smaller ones stand beside them for comparison.
+// The target applies to rasters from this size on; smaller ones are for comparison.
 constexpr int kTargetSide = 2401;
 
 }  // namespace

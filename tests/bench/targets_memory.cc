@@ -12,11 +12,11 @@ namespace {
 
 struct Peak {
   std::size_t meshing_bytes = 0;   // of the triangulation while it runs
-  std::size_t finished_bytes = 0;  // of the triangulation and of the mesh taken from it, whichever moment is worse
+  std::size_t finished_bytes = 0;  // of the triangulation and of the mesh made from it; the larger peak
   std::size_t points = 0;
 };
 
-// In blocks, if there are any: the meshes of those that are done are part of it.
+// The peak in blocks, if there are several; it includes the meshes of finished blocks.
 Peak BlocksPeak(const tin::HeightField& field, const tin::GreedyGoal& goal) {
   tin::ReleaseSpareBlocks();
   const ResidentMemory memory;

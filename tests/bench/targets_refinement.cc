@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFinestError = 1;
 constexpr std::array<double, 4> kReplayed = {2, 4, 8, 24};
-// Ten neighbouring errors of a tile, a quarter of an octave apart: steps of geo::LadderError, from the finest on.
+// Ten consecutive errors of a tile, a quarter of an octave apart: steps of geo::LadderError from the finest one.
 constexpr int kLadderSteps = 10;
 double LadderError(int step) { return kFinestError * std::exp2(step / 4.0); }
 
@@ -25,7 +25,7 @@ tin::Refinement RefinementTo(const tin::HeightField& field, double error, tin::G
   return tin.MakeRefinement();
 }
 
-// What a cache holds: a refinement for each field. `fields` must outlive it.
+// One refinement for each field, as in a cache. `fields` must outlive it.
 class RecordedFields {
  public:
   explicit RecordedFields(const std::vector<tin::HeightField>& fields) {
@@ -39,7 +39,7 @@ class RecordedFields {
     Die("a field without a refinement");
   }
 
-  // Bytes per vertex of all of them as they are stored.
+  // Stored bytes per vertex, over all refinements.
   double SerializedBytesPerVertex() const {
     double bytes = 0, vertices = 0;
     for (const auto& [field, refinement] : recorded_) {

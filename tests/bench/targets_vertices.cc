@@ -9,8 +9,8 @@
 namespace terrace::bench {
 namespace {
 
-// Vertices of greedy insertion by the book: the worst sample of all on every pass, found with a plain scan. Equally bad
-// samples go in together.
+// Number of vertices of exact greedy insertion: each pass inserts the worst of all samples, found with a plain scan.
+// Samples with equal errors are inserted together.
 std::size_t ExactGreedyPoints(const tin::HeightField& field, double error) {
   ParallelInsertion insertion(field);
   while (insertion.CurrentError() > error) insertion.FractionalPass(1, static_cast<std::size_t>(-1));

@@ -1,6 +1,6 @@
-// terrace_tile_accuracy: how far decoded tiles are from every sample of their source, beside what the tiles state,
-// their bytes and what building them costs, as greedy insertion leaves them and after the drop pass. Decisions 17 and
-// 18 have the results.
+// terrace_tile_accuracy measures the distance of decoded tiles from every sample of their source, the errors that the
+// tiles state, their bytes and their build time, after greedy insertion and after the drop pass. Decisions 17 and 18
+// have the results.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -43,7 +43,7 @@ struct Arguments {
   bool rim = false;
 };
 
-// The best of all runs, seconds.
+// Seconds, the minimum of all runs.
 struct Cost {
   double cpu = kNever, warm = kNever, read = kNever, refine = kNever, encode = kNever, compress = kNever;
 };
@@ -80,7 +80,7 @@ bool HasSamples(const tiler::SampleIndex& samples, const geo::TileKey& key) {
   return has;
 }
 
-// Beside the source there is only the floor: tiles there say nothing of the lattice.
+// Tiles that are partly outside the source show the floor there, so their errors say nothing about the lattice.
 bool IsInside(const tiler::SampleIndex& samples, const geo::TileKey& key) {
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
@@ -90,8 +90,8 @@ bool IsInside(const tiler::SampleIndex& samples, const geo::TileKey& key) {
   return true;
 }
 
-// Random tiles of the level with samples of the source, each as likely as another: those inside it, or those at its
-// rim. Where there are no such tiles, the others.
+// Random tiles of the level with samples of the source, with equal probability: those inside the source, or those at
+// its rim. If there are none of the requested kind, the others.
 std::vector<geo::TileKey> Draw(const dem::DemSource& source, const tiler::SampleIndex& samples, int level,
                                const Arguments& arguments) {
   std::vector<geo::TileKey> keys;
@@ -215,7 +215,7 @@ std::vector<Cell> RowOf(const Sampling& sampling) {
           Count(static_cast<std::size_t>(of_level))};
 }
 
-// Both meshes take turns, tile by tile, so that a busy moment of the machine falls on both.
+// Both meshes take turns, tile by tile, so that other load on the machine affects both.
 Result<void> Try(std::vector<Sampling>& meshes, const tiler::SampleIndex& samples, int runs) {
   for (Sampling& sampling : meshes) {
     for (Tile& tile : sampling.tiles) {

@@ -1,5 +1,5 @@
-// terrace_tile_formats: what a tile costs in every format and coding, in CPU time of one core and in bytes. The whole
-// pipeline runs, over a block of tiles in the middle of a level: docs/formats/glb.md has the results.
+// terrace_tile_formats measures the CPU time on one core and the bytes of tiles in every format and coding. It runs the
+// whole pipeline on a block of tiles in the middle of a level. docs/formats/glb.md has the results.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
@@ -57,7 +57,7 @@ std::vector<Variant> Variants() {
   return variants;
 }
 
-// The first tiles of the level's first block that do not lie on its rim.
+// The first tiles of the level's first block that are not on its rim.
 std::vector<geo::TileKey> TilesOf(const dem::DemSource& source, const Arguments& arguments) {
   const geo::TileRange& range = source.Available(arguments.level).front();
   std::vector<geo::TileKey> keys;
@@ -74,7 +74,7 @@ struct Cost {
   std::size_t tiles = 0, bytes = 0, vertices = 0;                            // of all tiles
 };
 
-// A build of all tiles without what they are made from, and one with it.
+// Builds all tiles without a cached refinement, then with it.
 Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& cost) {
   auto source = dem::DemSource::Open(arguments.dem);
   if (!source) return tl::unexpected(source.error());
@@ -106,7 +106,7 @@ Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& c
   return {};
 }
 
-// All forms in turns, so that a busy moment of the machine falls on all of them.
+// All formats take turns, so that other load on the machine affects all of them.
 Result<void> Run(const Arguments& arguments) {
   std::vector<Variant> variants = Variants();
   std::erase_if(variants,
@@ -147,7 +147,7 @@ int main(int argc, char** argv) {
   app.add_option("--form", arguments.form, "Only forms with this in their name");
   app.add_option("--runs", arguments.runs, "Runs; the fastest counts")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
-  spdlog::set_level(spdlog::level::err);  // a raster's warnings come once for each run
+  spdlog::set_level(spdlog::level::err);  // a raster would repeat its warnings in each run
   const terrace::Result<void> done = terrace::bench::Run(arguments);
   if (done) return 0;
   std::fprintf(stderr, "terrace_tile_formats: %s\n", done.error().message.c_str());

@@ -1,4 +1,4 @@
-// terrace_tin_bench: the engine's targets as tables, ours against the meshers that the command line names.
+// terrace_tin_bench prints the engine's targets as tables, compared with the meshers that the command line names.
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <fstream>
@@ -13,12 +13,12 @@ namespace {
 int Measure(const Options& options, const std::string& json_path) {
   std::ofstream out;
   if (!json_path.empty()) {
-    out.open(json_path);  // before all the work
+    out.open(json_path);  // fails before the work if the file cannot be written
     if (!out) Die(json_path + ": cannot be written");
   }
   Environment environment(options);
   nlohmann::ordered_json tables = nlohmann::ordered_json::array();
-  const nlohmann::ordered_json context = MachineContext();  // first: later the load would be our own
+  const nlohmann::ordered_json context = MachineContext();  // before the work, which would increase the load
   for (const auto& measure :
        {MeasureTiles, MeasureTilesEverywhere, MeasureVertexGoals, MeasureLargeRasters, MeasureReplay, MeasureSweep,
         MeasureDataDependent, MeasureDataDependentQuality, MeasureDropPass, MeasureMemory, MeasureVertices}) {

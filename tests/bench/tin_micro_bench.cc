@@ -1,5 +1,5 @@
-// Steps of the mesher on Google Benchmark, on tiles of a raster that is part of the repository: to see what a change
-// did to which step. The numbers that count are terrace_tin_bench's.
+// Measures steps of the mesher with Google Benchmark, on tiles of a raster of the repository, to show which step a
+// change affects. The targets are measured by terrace_tin_bench.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -15,7 +15,7 @@
 namespace terrace::bench {
 namespace {
 
-// Four different tiles: a single one would train the processor's branch predictor.
+// Four different tiles, because a single one would train the processor's branch predictor.
 const std::vector<tin::HeightField>& Tiles() {
   static const std::vector<tin::HeightField> tiles = [] {
     std::vector<tin::HeightField> read;

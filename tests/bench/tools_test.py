@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of tools/fill_tables.py and tools/plot_paper.py: what they make of results, and what they refuse."""
+"""Tests of tools/fill_tables.py and tools/plot_paper.py: their output, and the input that they reject."""
 import json
 import pathlib
 import subprocess
@@ -75,7 +75,7 @@ class ToolsTest(unittest.TestCase):
         self.assertEqual(len(root.findall(f"{name}polyline")), 1)
         self.assertEqual(len(root.findall(f"{name}circle")), 5)  # three points, one mark, and its legend
         places = [tuple(map(float, place.split(","))) for place in root.find(f"{name}polyline").get("points").split()]
-        self.assertEqual(places, sorted(places))  # to the right with more vertices, and down with less error
+        self.assertEqual(places, sorted(places))  # x grows with the number of vertices, y with a decreasing error
         self.assertIn("A < B", [element.text for element in root.iter(f"{name}text")])
 
 

@@ -1,5 +1,5 @@
-// The samples of one triangle and the heights that its plane has there: plain and slow, shares nothing with the
-// engine's scan but the orientation predicate.
+// The samples of one triangle and the heights of its plane there. Plain and slow; shares only the orientation predicate
+// with the engine's scan.
 #pragma once
 
 #include <algorithm>

@@ -11,7 +11,7 @@
 namespace terrace::bench {
 namespace {
 
-// The node's sample: evenly spaced, halves rounded up, in integers.
+// The sample of a node: evenly spaced, halves rounded up, in integers.
 std::uint16_t SampleOf(int node, int nodes, int samples) {
   return static_cast<std::uint16_t>((2 * node * (samples - 1) + nodes - 1) / (2 * (nodes - 1)));
 }

@@ -1,5 +1,5 @@
-// A regular grid of samples as an approximation: the baseline of section 4.5 of the paper. It looks at no height at
-// all.
+// A regular grid of samples as an approximation, the baseline of section 4.5 of the paper. It does not depend on
+// heights.
 #pragma once
 
 #include <cstddef>
@@ -9,8 +9,8 @@
 
 namespace terrace::bench {
 
-// Nodes at evenly spaced columns and rows, rounded to samples, the borders among them; every cell is cut along the
-// diagonal from its larger column and smaller row. 2 <= columns <= width, 2 <= rows <= height.
+// Nodes are at evenly spaced columns and rows, rounded to samples, including the borders. Every cell is divided along
+// the diagonal from its larger column and smaller row. 2 <= columns <= width, 2 <= rows <= height.
 tin::TinMesh UniformGrid(const tin::HeightField& field, int columns, int rows);
 
 // The grid of nearly square cells whose number of nodes is nearest to `points`.

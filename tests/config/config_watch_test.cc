@@ -26,7 +26,7 @@ class ConfigWatchTest : public testing::Test {
     return R"({"datasets": [{"name": "a", "sources": [")" + source + R"("]}]})";
   }
 
-  // Until the file is old enough for its stamp to tell all changes apart.
+  // Loads until the file is old enough that its stamp distinguishes all changes.
   void LoadSettled() {
     later_ns_ = std::int64_t{60} * 1'000'000'000;
     ASSERT_TRUE(watch_.Load());

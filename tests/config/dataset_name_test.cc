@@ -44,7 +44,7 @@ TEST(FindDuplicateNames, ReportsEveryLaterDataset) {
   std::vector<DatasetConfig> datasets(5);
   for (const std::size_t i : {0, 2, 4}) datasets[i].name = std::string(1, 'a');
   const std::vector<ConfigError> errors = FindDuplicateNames(datasets);
-  ASSERT_EQ(errors.size(), 2u);  // names that are missing are reported elsewhere
+  ASSERT_EQ(errors.size(), 2u);  // missing names are reported elsewhere
   EXPECT_EQ(errors[0].path, "/datasets/2/name");
   EXPECT_EQ(errors[1].path, "/datasets/4/name");
 }

@@ -1,4 +1,4 @@
-// What a test of the configuration expects of its errors.
+// Errors of configurations, for tests.
 #pragma once
 
 #include <gmock/gmock.h>
@@ -11,7 +11,7 @@
 
 namespace terrace::config {
 
-// The errors of a text that must have some; relative paths start in a folder that does not exist.
+// The errors of a text that must have errors. Relative paths are relative to a folder that does not exist.
 inline std::vector<ConfigError> ErrorsOf(std::string_view text) {
   const ConfigResult result = ParseConfig(text, "/nowhere");
   return result ? std::vector<ConfigError>{} : result.error();

@@ -28,7 +28,7 @@ TEST(ParseJsonText, ReportsNothingButTheSyntaxErrorAndEarlierDuplicates) {
   EXPECT_THAT(ErrorsOf(R"({"io_threads": 0, "listen": )"), ElementsAre(IsError("", "syntax error")));
 }
 
-// Where each object is looked for in its list, this takes minutes.
+// This takes minutes if the parser searches for each object in its list.
 TEST(ParseJsonText, TakesALongListOfObjects) {
   constexpr std::size_t kCount = 400'000;
   std::string text = "{\"datasets\": [{}";
@@ -40,7 +40,7 @@ TEST(ParseJsonText, TakesALongListOfObjects) {
   EXPECT_THAT(errors, ElementsAre(IsError("", "the key that ends here stands twice")));
 }
 
-// Each key is looked for among all before it.
+// The parser compares each key with all keys before it.
 TEST(ParseJsonText, RefusesAnObjectOfManyKeys) {
   std::string text = "{\"0\": 0";
   for (int i = 1; i < 1000; ++i) text += ",\n\"" + std::to_string(i) + "\": 0";

@@ -123,7 +123,7 @@ TEST(SetServerOption, KnowsTheWordsOfCacheDir) {
   EXPECT_EQ(config.cache_dir_bytes, std::size_t{1} << 30);
 }
 
-// Variables of the environment for as long as this lives.
+// Sets variables of the environment for the lifetime of the object.
 class Environment {
  public:
   Environment() {

@@ -201,7 +201,7 @@ TEST(LoadConfig, RefusesAFileThatIsTooLarge) {
       std::filesystem::path(testing::TempDir()) / ("large_config_" + std::to_string(::getpid()) + ".json");
   std::ofstream(file) << "{}" << std::string(kMaxConfigBytes - 2, '\n');
   EXPECT_TRUE(LoadConfig(file));
-  std::filesystem::resize_file(file, kMaxConfigBytes + 1);  // with a hole
+  std::filesystem::resize_file(file, kMaxConfigBytes + 1);  // a sparse file
   const ConfigResult larger = LoadConfig(file);
   ASSERT_FALSE(larger);
   EXPECT_THAT(larger.error(), ElementsAre(IsError("", file.string() + " is larger than the 16 MiB")));
@@ -211,7 +211,7 @@ TEST(LoadConfig, RefusesAFileThatIsTooLarge) {
   EXPECT_THAT(endless.error(), ElementsAre(IsError("", "/dev/zero is larger than the 16 MiB")));
 }
 
-// Of another kind, and millions of things may be wrong in it.
+// A file of another kind may have millions of errors.
 TEST(ParseConfig, TellsABoundedNumberOfErrors) {
   std::string datasets = "{\"datasets\": [{}", keys = "{\"a\": 0", names = "{\"datasets\": [";
   for (int i = 0; i < 10'000; ++i) {

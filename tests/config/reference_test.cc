@@ -1,4 +1,5 @@
-// The schema and the manual are made of the option tables; the examples and cases.json are what the parser takes.
+// Checks that the schema and the manual are those of the option tables, and that the parser accepts the examples and
+// cases.json.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -52,7 +53,7 @@ TEST(Manual, NeedsOneMarkerForEveryTable) {
   EXPECT_TRUE(fails(manual.substr(0, end_at - end.size()), "log: no such table, two of it, or no end")) << "no end";
 }
 
-// A word that is an option itself would never be asked for.
+// "Did you mean" never suggests another option for the name of an option.
 TEST(Options, HaveOtherWordsThatAreNoOptions) {
   for (const auto& options : {ServerOptions(), DatasetOptions()}) {
     for (const OptionInfo& option : options) {
@@ -65,7 +66,7 @@ TEST(Options, HaveOtherWordsThatAreNoOptions) {
   }
 }
 
-// Help, schema and manual continue or quote these texts.
+// Help, schema and manual quote these texts or append to them.
 void ExpectOneSentence(const std::vector<OptionInfo>& options) {
   for (const OptionInfo& option : options) {
     EXPECT_FALSE(option.help.empty() || option.help.ends_with('.')) << option.key;

@@ -1,4 +1,4 @@
-"""Holds config.schema.json to the example files and to cases.json: schema_test.py SOURCE_DIR."""
+"""Checks config.schema.json with the example files and with cases.json: schema_test.py SOURCE_DIR."""
 import json
 import pathlib
 import sys
@@ -30,7 +30,7 @@ for name, config in named:
         failures.append(f"refused, though right: {name}: {error.json_path}: {error.message}")
 
 for case in cases["refused"]:
-    # A missing or an unknown key is an error of the object that should or should not have it.
+    # A missing or an unknown key is an error at the object that contains it.
     places = {"".join(f"/{part}" for part in error.absolute_path) for error in validator.iter_errors(case["config"])}
     if not places:
         failures.append(f"accepted, though wrong: {json.dumps(case['config'])}")

@@ -1,4 +1,4 @@
-// One secret in every place of a configuration and of the flags: no error tells it, and nothing prints a token.
+// Puts a secret into every place of a configuration and of the flags: no error contains it, and nothing prints a token.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ void ExpectNotTold(const std::vector<ConfigError>& errors, const std::string& te
   }
 }
 
-// The secret as it may stand in a place that is meant for something else.
+// Forms of the secret in a place for another value.
 std::vector<Json> Forms() {
   const Json text = kSecret;
   return {text,
@@ -48,7 +48,7 @@ std::vector<Json> Forms() {
           Json::array({Json::object({{"path", text}, {"token", text}, {"vertical", text}, {"nodata", text}})})};
 }
 
-// Every place that the schema knows, as JSON Pointers; "0" is in lists.
+// Every place of the schema as a JSON Pointer; "0" stands for entries of lists.
 void AddPlaces(const Json& schema, const std::string& place, std::vector<std::string>& places) {
   places.push_back(place);
   for (const char* choice : {"anyOf", "oneOf"}) {
@@ -89,7 +89,7 @@ TEST(ConfigSecrets, NoErrorTellsWhatStandsInAnyPlace) {
       Json config = Valid();
       try {
         config[Json::json_pointer(place)] = form;
-      } catch (const Json::exception&) {  // inside of what is no object in the valid one
+      } catch (const Json::exception&) {  // inside a value that is not an object in the valid configuration
         continue;
       }
       const std::vector<ConfigError> errors = ErrorsOf(config.dump());
@@ -115,7 +115,7 @@ TEST(ConfigSecrets, NoErrorTellsAKeyThatIsNone) {
   }
 }
 
-// Cut at any place, and with any character of JSON's own in any place.
+// The text is truncated at every place, and has every character of JSON's syntax inserted at every place.
 TEST(ConfigSecrets, NoErrorTellsTheTextBesideAMistake) {
   const std::string text =
       R"({"tokens": [{"name": "team", "token": ")" + kSecret + R"(", "datasets": ["a"]}], "b": 1})";
@@ -179,7 +179,7 @@ TEST(ConfigSecrets, ANameThatIsATokenIsRefused) {
               testing::ElementsAre(IsError("/tokens/0/name", "is a token itself")));
 }
 
-// Where a path is meant, of which the log would tell that there is no such file.
+// Otherwise the log would print the key as the path of a missing file.
 TEST(ConfigSecrets, AKeyInsteadOfItsPathIsRefused) {
   for (const std::string& key : {R"(-----BEGIN PRIVATE KEY-----\n)" + kSecret, "-----BEGIN KEY----- " + kSecret}) {
     const std::vector<ConfigError> errors = ErrorsOf(R"({"tls": {"certificate": "a.pem", "key": ")" + key + R"("}})");

@@ -16,7 +16,7 @@ using testing::ElementsAre;
 
 class SourcePaths : public testing::Test {
  protected:
-  // The folder's own name looks like a glob: only what the user wrote is one.
+  // The folder's name looks like a glob, but only the text that the user wrote is one.
   SourcePaths() : folder_(fs::path(testing::TempDir()) / ("sources [a*] " + std::to_string(::getpid()))) {
     fs::remove_all(folder_);
     for (const char* name : {"b.tif", "a.tif", "Z.tif", "n.txt", "tile[1].tif", "deep/c.tif"}) {
@@ -54,7 +54,7 @@ TEST_F(SourcePaths, TakesTheFilesOfAFolder) {
   const auto files = ExpandSource(".", folder_);
   ASSERT_TRUE(files) << files.error().message;
   EXPECT_TRUE(files->is_folder);
-  EXPECT_EQ(files->files.size(), 5u);  // not those of folders in it
+  EXPECT_EQ(files->files.size(), 5u);  // without those of its subfolders
   EXPECT_THAT(ExpandSource("deep", folder_)->files, ElementsAre(In("deep/c.tif")));
   EXPECT_FALSE(ExpandSource("deep/c.tif", folder_)->is_folder);
   fs::create_directory(folder_ / "empty");

@@ -1,4 +1,4 @@
-"""Where the real binary keeps what it learns of sources, and what it does without: cache_dir_test.py BINARY SOURCE_DIR."""
+"""Where the real binary stores the statistics of sources, and its behaviour without such a folder: cache_dir_test.py BINARY SOURCE_DIR."""
 import http.client
 import json
 import os
@@ -53,7 +53,7 @@ class Server:
             connection.close()
 
     def tiles(self):
-        """Of all levels, some of each."""
+        """Some tiles of each level."""
         levels = json.loads(self.get("/N46E007/layer.json")[1])["available"]
         bodies = []
         for level, ranges in enumerate(levels):

@@ -1,5 +1,5 @@
-// Vertical datums and what may be opened, on the real binary: served heights are those of the source plus the geoid that
-// PROJ's own cs2cs tells.
+// Vertical datums and the rules for opening files, with the real binary. Served heights must be those of the source
+// plus the undulation of PROJ's cs2cs.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -55,7 +55,7 @@ describe('vertical datums', () => {
         { name: 'single', sources: [{ path: dem, vertical: 'egm96' }], vertical: 'ellipsoid' },
       ],
     }));
-    // Settings of the environment have no effect: this one would leave no driver.
+    // Variables of the environment must have no effect; this one would disable the driver.
     process.env.GDAL_SKIP = 'GTiff';
     server = await serve('--config', config);
     delete process.env.GDAL_SKIP;
@@ -81,7 +81,7 @@ describe('vertical datums', () => {
     const info = JSON.parse(tool('gdalinfo', ['-json', dem]));
     const [west, width, , north, , height] = info.geoTransform;
     for (const [name, [latitude, longitude]] of Object.entries(places)) {
-      // The sample whose pixel has the place; the last row at the pole.
+      // The sample whose pixel contains the position; at the pole, the last row.
       const column = Math.floor((longitude - west) / width) % info.size[0];
       const row = Math.min(Math.floor((latitude - north) / height), info.size[1] - 1);
       const sample = Number(tool('gdallocationinfo', ['-valonly', dem, `${column}`, `${row}`]));

@@ -1,7 +1,7 @@
-"""The disk cache under the built binary: disk_cache_test.py BINARY SOURCE_DIR.
+"""The disk cache of the built binary: disk_cache_test.py BINARY SOURCE_DIR.
 
-Warm restarts, kill -9 under load, power cuts, a full disk, another program, another server. Every body is compared with one that a server
-without a disk cache made. With TERRACE_LONG_TESTS=1 there are a hundred kills and power cuts, and the disk is full for a minute.
+Warm restarts, kill -9 under load, power cuts, a full disk, another program, another server. Every body is compared with that of a server
+without a disk cache. With TERRACE_LONG_TESTS=1 there are a hundred kills and power cuts, and the disk is full for a minute.
 """
 import collections
 import hashlib
@@ -98,7 +98,7 @@ def digest(body):
 
 
 def crawl(port, paths):
-    """{path: digest}, how often each tier answered, and every status that was not 200."""
+    """Returns {path: digest}, the number of replies of each tier, and all statuses other than 200."""
     client, digests, tiers, wrong = Client(port), {}, collections.Counter(), []
     for path in paths:
         status, body, timing = client.get(path)
@@ -179,7 +179,7 @@ class DiskCache(unittest.TestCase):
     def test_kill_9_under_load_leaves_nothing_wrong(self):
         rounds, wrong, tiers, ready = 100 if LONG else 6, [], collections.Counter(), []
         for number in range(rounds):
-            # No memory: every answer is read from disk or built.
+            # No memory cache: every tile is read from disk or built.
             with Server(*self.flags(), "--cache-bytes", 0, "--refinement-cache-bytes", 0) as server:
                 ready.append(server.ready_s)
                 stop = threading.Event()
@@ -200,7 +200,7 @@ class DiskCache(unittest.TestCase):
         self.assertGreater(tiers["cache;desc=miss"], 0, tiers)
 
     def test_a_power_cut_leaves_nothing_wrong(self):
-        """What the file system has written of its own accord is all that is left: the image below it, copied at a moment."""
+        """A copy of the image below the file system has only what the file system has written by itself, as after a power cut."""
         folder = pathlib.Path(self.scratch.name)
         image, cut, disk, after = folder / "image", folder / "cut", folder / "disk", folder / "after"
         with open(image, "wb") as file:
@@ -236,7 +236,7 @@ class DiskCache(unittest.TestCase):
 
     def mount(self, image, folder):
         folder.mkdir(exist_ok=True)
-        # ext4 writes what is old every second, so that cuts meet states in between.
+        # ext4 writes old data every second, so cuts find intermediate states.
         mounted = subprocess.run(["mount", "-o", "loop,commit=1", image, folder], capture_output=True, text=True)
         if mounted.returncode != 0:
             self.skipTest(f"no image can be mounted: {mounted.stderr.strip()}")
@@ -276,7 +276,7 @@ class DiskCache(unittest.TestCase):
                 digests, _, wrong = crawl(server.port, self.paths)
                 self.assertEqual((digests, wrong), (self.oracle, []))
                 crawled += 1
-            # What was allocated ahead may have room for all the tiles; refinements are larger.
+            # Preallocated space may be enough for all tiles, but not for refinements.
             self.assertEqual(server.metric("terrace_cache_on", "disk", "refinements"), 0)
             self.assertGreater(server.metric("terrace_cache_errors_total", "disk", "refinements"), 0)
             self.assertGreater(crawl(server.port, self.paths[:100])[1]["disk"], 90, "what is on a full disk can be read")
@@ -294,7 +294,7 @@ class DiskCache(unittest.TestCase):
             print(f"full for {full_s} s: {crawled * len(self.paths)} answers, 0 failed, storing again after {recovered_s:.1f} s",
                   file=sys.stderr)
             self.assertGreater(written, before)
-            self.assertLess(recovered_s, 15)  # 5 s are the aim; machines of tests are slow
+            self.assertLess(recovered_s, 15)  # the aim is 5 s, but test machines are slow
 
     def test_another_program_finds_none_of_its_tiles(self):
         build_id = re.search(r"Build ID: (\w+)", subprocess.run(["readelf", "-n", BINARY], capture_output=True, text=True).stdout)
@@ -333,7 +333,7 @@ class DiskCache(unittest.TestCase):
         with Server(*self.flags()):
             self.assertEqual(self.refused(self.directory), f"terrace: disk_cache: {self.directory} is used by another process; "
                              "give each server a directory of its own\n")
-        with Server(*self.flags()) as server:  # the lock went with the process
+        with Server(*self.flags()) as server:  # the lock ended with the process
             self.assertEqual(server.get("/livez")[0], 200)
 
     def test_what_is_no_directory_is_refused(self):
@@ -362,7 +362,7 @@ class DiskCache(unittest.TestCase):
         with Server(*self.flags()) as server:
             crawl(server.port, some)
             server.stop()
-        foreign = self.directory / "tiles" / "0"  # somebody's own pyramid
+        foreign = self.directory / "tiles" / "0"  # a tile pyramid of another program
         foreign.mkdir()
         (foreign / "0.png").write_text("dear")
         for unfinished, found in ((1, len(some)), (2, 0)):

@@ -1,5 +1,5 @@
-// GLB tiles of the real binary, read as JavaScript clients read them: Khronos' validator, and the decoders that CesiumJS
-// and three.js carry.
+// Reads GLB tiles of the real binary as JavaScript clients do: with Khronos' validator, and with the decoders of
+// CesiumJS and three.js.
 import assert from 'node:assert/strict';
 import { createRequire } from 'node:module';
 import path from 'node:path';
@@ -61,7 +61,7 @@ function decodeArray(glb, number) {
   return numbers;
 }
 
-// Triangles as text of their corners in ECEF, sorted: the same for every form of a tile.
+// Triangles as sorted text of their corners in ECEF, equal for all compressions of a tile.
 function decode(bytes) {
   const glb = parse(bytes), primitive = glb.gltf.meshes[0].primitives[0];
   const { position, index } = primitive.extensions?.KHR_draco_mesh_compression
@@ -99,7 +99,7 @@ describe('GLB tiles', () => {
         const { startX, startY, endX, endY } = layer.available[level][0];
         const tiles = new Set([`${startX}/${startY}`, `${(startX + endX) >> 1}/${(startY + endY) >> 1}`, `${endX}/${endY}`]);
         for (const tile of tiles) {
-          const expected = {};  // of floats and of 16 bits
+          const expected = {};  // for floats and for 16 bits
           for (const form of forms) {
             const url = `${server.url}/${dataset}/${level}/${tile}.glb?compression=${form}`;
             const reply = await request(url, { headers: { 'Accept-Encoding': 'gzip' } });

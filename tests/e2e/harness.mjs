@@ -6,7 +6,7 @@ import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import zlib from 'node:zlib';
 
-// Run by hand, too, a test writes nothing into the home of whoever runs it.
+// A test must not write into the user's home, also if it is run by hand.
 process.env.XDG_CACHE_HOME ??= path.join(os.tmpdir(), 'terrace-tests');
 
 const root = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../..');
@@ -19,7 +19,7 @@ export function run(...args) {
   return { code: done.status, out: done.stdout, err: done.stderr };
 }
 
-// A running `terrace serve` on port 0. `log()` is what it wrote to stderr so far.
+// Starts `terrace serve` on port 0. `log()` returns what it has written to stderr.
 export async function serve(...args) {
   const child = spawn(binary, ['serve', '--listen', '127.0.0.1:0', ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
   let out = '', err = '';
@@ -46,7 +46,7 @@ export async function serve(...args) {
 
 const agent = new http.Agent({ keepAlive: true, maxSockets: 256 });
 
-// One request with exactly these headers: no Accept or Accept-Encoding of node's own.
+// One request with exactly these headers, without node's Accept or Accept-Encoding.
 export function request(url, { method = 'GET', headers = {} } = {}) {
   return new Promise((resolve, reject) => {
     const message = http.request(url, { method, headers, agent }, (response) => {
@@ -63,7 +63,7 @@ export const json = async (url) => JSON.parse((await request(url)).body);
 export const plain = (response) =>
   response.headers['content-encoding'] === 'gzip' ? zlib.gunzipSync(response.body) : response.body;
 
-// The ids of the extensions behind the mesh; throws unless the bytes end exactly where the last one ends.
+// The ids of the extensions after the mesh; throws unless the bytes end exactly at the end of the last one.
 export function extensionIds(tile) {
   const vertices = tile.readUInt32LE(88);
   let at = 92 + 6 * vertices;

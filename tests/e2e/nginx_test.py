@@ -1,4 +1,4 @@
-"""docker/nginx.conf.template as it ships, in a real nginx before the real binary: nginx_test.py BINARY SOURCE_DIR.
+"""docker/nginx.conf.template in a real nginx in front of the real binary: nginx_test.py BINARY SOURCE_DIR.
 
 Skipped (exit code 77) without nginx, curl or openssl.
 """
@@ -48,7 +48,7 @@ class Proxied(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp())
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
-        cls.folder.chmod(0o755)  # nginx's workers are another user
+        cls.folder.chmod(0o755)  # nginx's workers run as another user
         cls.start_terrace()
         cls.start_nginx()
 
@@ -82,7 +82,7 @@ class Proxied(unittest.TestCase):
         values = {"TERRACE_UPSTREAM": f"127.0.0.1:{cls.terrace_port}", "TERRACE_HTTP_PORT": str(cls.http_port),
                   "TERRACE_HTTPS_PORT": str(cls.port), "TERRACE_CERTIFICATES": str(certificates), "TERRACE_CACHE": str(cls.folder / "cache")}
         filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: values[match[1]], TEMPLATE.read_text())
-        # Around it what the image's own nginx.conf has, for a folder of one's own.
+        # The rest of the configuration is like nginx.conf of the image, but in a temporary folder.
         paths = "\n".join(f"  {name}_temp_path {cls.folder}/{name};" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
         cls.nginx_conf = cls.folder / "nginx.conf"
         cls.nginx_conf.write_text(f"daemon off; worker_processes 1; pid {cls.folder}/nginx.pid; error_log {cls.folder}/error.log;\n"
@@ -171,16 +171,16 @@ class Proxied(unittest.TestCase):
             tag = self.get(target, headers=["Accept-Encoding: gzip"]).fields["etag"]
             before = self.count_unchanged()
             again = self.get(target, headers=["Accept-Encoding: gzip", f"If-None-Match: {tag}"])
-            kept = "private, no-cache" if target == "/datasets" else "no-cache"  # which are listed is for who asks
+            kept = "private, no-cache" if target == "/datasets" else "no-cache"  # the list depends on the client
             self.assertEqual((again.status, again.body, again.fields["cache-control"]), (304, b"", kept), target)
-            end = time.monotonic() + 10  # a line is written after its reply
+            end = time.monotonic() + 10  # nginx writes a line after its reply
             while self.count_unchanged() == before and time.monotonic() < end:
                 time.sleep(0.02)
             self.assertEqual(self.count_unchanged(), before + 1, target)
             self.assertNotIn("x-cache", again.fields)
 
     def count_unchanged(self):
-        """Replies of terrace itself that sent no body, as the client has it."""
+        """Replies of terrace without a body, because the client has the bytes."""
         return sum(line["status"] == 304 for line in self.log_lines())
 
     def test_codings_are_kept_apart(self):
@@ -219,12 +219,12 @@ class Proxied(unittest.TestCase):
     def test_ranges(self):
         whole = self.get(TILE)
         part = self.get(TILE, headers=["Range: bytes=10-19"])
-        # Not understood, which HTTP allows, so the whole tile comes: never a part that is called the whole.
+        # HTTP allows servers to ignore ranges: the reply is the whole tile, never a part marked as the whole.
         self.assertEqual((part.status, part.body), (200, whole.body))
         self.assertEqual(part.fields["etag"], whole.fields["etag"])
 
     def test_terrace_sees_the_client(self):
-        # Another address of the loopback than the one that nginx speaks from; who forges a client is not believed.
+        # An address of the loopback other than nginx's; a forged client address must be ignored.
         reply = self.get("/earth/heights?locations=1,2", "--interface", "127.0.0.2", headers=["X-Forwarded-For: 192.0.2.9", "Forwarded: for=192.0.2.9"])
         self.assertEqual(reply.status, 200)
         line = [line for line in self.log_lines() if line["route"] == "heights"][-1]
@@ -242,21 +242,21 @@ class Proxied(unittest.TestCase):
                 reply = self.get(target + query, headers=headers)
                 self.assertEqual((reply.status, reply.fields["x-cache"]), (200, "BYPASS"))
                 self.assertTrue(reply.fields["cache-control"].startswith("private"), reply.fields["cache-control"])
-        # Not as it should be spelled, also about what everybody may see.
+        # Unusual spellings, also for public datasets.
         for base in (target, TILE, "/earth/layer.json", "/"):
             for rest in ("?Token=", "?TOKEN=", "?%54oken=", "?tok%65n=", "?token%3D", "?%2574oken=", "?;token=", "?v=1;token=", "?error=5;token=",
                          "?extensions=metadata;token=", "?access_token=", "?token[]=", "?amp;token=", "?", "?v=1&key=", ";token=",
                          "%3Ftoken=", "%3Ftoken%3D", "/token="):
                 for _ in range(2):
                     reply = self.get(base + rest + TOKEN, "-g")
-                    self.assertIn(reply.fields.get("x-cache"), ("BYPASS", None), base + rest)  # None: there is no cache for it
+                    self.assertIn(reply.fields.get("x-cache"), ("BYPASS", None), base + rest)  # None: the location has no cache
                     self.assertTrue(reply.fields["cache-control"].startswith("private"), base + rest)
         reply = self.get(f"{TILE}?token={TOKEN}", port=self.http_port, scheme="http")
         self.assertEqual((reply.status, reply.fields["cache-control"]), (308, "private, no-store"))
         self.assertEqual(self.get(target).status, self.direct(target).status)
         self.assertIn(self.get(target).status, (401, 404))
-        for file in self.folder.rglob("*"):  # logs of nginx, and its cache: the key of an entry holds the query
-            if file.is_file() and file.suffix != ".json":  # the server's own configuration is one
+        for file in self.folder.rglob("*"):  # logs of nginx, and its cache, whose entries contain the query in their key
+            if file.is_file() and file.suffix != ".json":  # the server's configuration is such a file
                 self.assertNotIn(TOKEN.encode(), file.read_bytes(), file)
 
     def test_heights_by_post(self):

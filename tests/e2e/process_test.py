@@ -1,4 +1,4 @@
-"""The real binary as a process among others: restarts on a held socket, and few file descriptors: process_test.py BINARY SOURCE_DIR."""
+"""Restarts of the real binary on a held socket, and few file descriptors: process_test.py BINARY SOURCE_DIR."""
 import pathlib
 import resource
 import shutil
@@ -66,7 +66,7 @@ class Opening(unittest.TestCase):
             slow = pathlib.Path(folder, "slow.tif")
             shutil.copy(DEM, slow)
             with restarts.leased(slow):
-                # A folder, for the files of one are looked into when the dataset is opened, and not before.
+                # A folder, because its files are opened only with the dataset, not by the checks before.
                 process = subprocess.Popen([BINARY, "serve", folder, "--listen", address, "--drain-timeout-s", "0.5"], text=True,
                                            stdout=subprocess.PIPE, stderr=subprocess.PIPE)
                 while not listens(address):
@@ -78,7 +78,7 @@ class Opening(unittest.TestCase):
                 self.assertEqual(urllib.request.urlopen(state.replace("readyz", "livez"), timeout=30).status, 200)
                 process.send_signal(signal.SIGTERM)
                 log = process.communicate(timeout=60)[1]
-            self.assertEqual(process.returncode, 1, log)  # the open that cannot be given up
+            self.assertEqual(process.returncode, 1, log)  # the blocked open cannot be cancelled
             self.assertIn("look whether a source can be read", log)
             self.assertIn("stopped before any dataset was served", log)
 
@@ -89,7 +89,7 @@ class Descriptors(unittest.TestCase):
             told = descriptors.serve_with_few(BINARY, SOURCE_DIR, pathlib.Path(folder), 80)
         print(told, file=sys.stderr)
         self.assertEqual(told.wrong, [])
-        # How many there are depends on when RocksDB merged some. 27 descriptors are for them.
+        # Their number depends on when RocksDB merged some. 27 descriptors are for them.
         self.assertGreater(told.files, 50, "there are more files of records than descriptors for them")
         self.assertLess(told.most, 80)
 

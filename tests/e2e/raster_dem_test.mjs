@@ -1,4 +1,5 @@
-// Height tiles and heights of the real binary: read by MapLibre in a real browser, and against GDAL's command line.
+// Height tiles and heights of the real binary, read by MapLibre in a real browser and compared with GDAL's command line
+// tools.
 import assert from 'node:assert/strict';
 import { spawnSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -16,7 +17,7 @@ const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swif
                 '--disable-background-networking', '--no-first-run'];
 const kDem = path.join(samples, 'jacksboro.tif');
 
-// Raw samples of a raster at pixel coordinates, by a program that shares no code with the server.
+// Raw samples of a raster at pixel coordinates, read by an independent program.
 function samplesAt(dem, pixels) {
   const done = spawnSync('gdallocationinfo', ['-valonly', dem],
                          { input: pixels.map(([x, y]) => `${x} ${y}`).join('\n') + '\n', encoding: 'utf8' });
@@ -46,8 +47,8 @@ function bilinear(dem, points) {
   });
 }
 
-// What a map shows that reads Web Mercator pixels of this depth: bilinear between pixels that hold the DEM's heights at
-// their centres. MapLibre takes a pixel's height for that of its north-western corner.
+// What a map shows from Web Mercator pixels of this depth: bilinear between pixels with the DEM's heights at their
+// centres. MapLibre uses the height of a pixel as that of its north-western corner.
 function asMapLibreReads(points, depth) {
   const size = 256 * 2 ** depth;
   const cells = points.map(([lon, lat]) => {
@@ -95,7 +96,7 @@ describe('heights', () => {
       for (const [i, { elevation, location, dataset }] of results.entries()) {
         assert.deepEqual(location, { lat: points[i][1], lng: points[i][0] });
         assert.equal(dataset, name);
-        // 2^-10 m of rounding, and what gdaltransform's printed digits leave of a slope.
+        // Allows 2^-10 m of rounding, and the rounded coordinates of gdaltransform on a slope.
         assert.ok(Math.abs(elevation - expected[i]) < 0.01, `${points[i]}: ${elevation}, GDAL ${expected[i]}`);
       }
     });
@@ -201,7 +202,7 @@ describe('a map with terrain', { skip: kHaveBrowser ? false : 'needs TERRACE_CHR
         await new Promise((resolve) => shown.once('idle', resolve));
         const points = [];
         for (let i = -3; i <= 3; i++) for (let j = -3; j <= 3; j++) points.push([centre[0] + i * 0.002, centre[1] + j * 0.0015]);
-        // Heights relative to the map's own centre, which stands on the terrain.
+        // Heights relative to the centre of the map, which is on the terrain.
         const heights = points.map((point) => shown.queryTerrainElevation(point) + shown.transform.elevation);
         const source = shown.getSource('dem');
         return { points, heights, errors, maxzoom: source.maxzoom, tileSize: source.tileSize, encoding: source.encoding };

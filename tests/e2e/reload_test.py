@@ -1,7 +1,7 @@
 """Sources and configurations change under the real binary: reload_test.py BINARY SOURCE_DIR.
 
-Two elevation models of one place take turns under one name while clients ask for tiles. The bytes of every tile of both
-are known beforehand, so each answer is told to be of one, of the other, or of neither.
+Two elevation models of one area take turns under one name while clients request tiles. The bytes of every tile of both
+are known beforehand, so each reply is recognized as that of one, of the other, or of neither.
 
 TERRACE_LONG_TESTS=1: 200 swaps instead of 30.
 """
@@ -28,12 +28,12 @@ BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
 SWAPS = 200 if os.environ.get("TERRACE_LONG_TESTS") else 30
 NAME = "N46E007.hgt"
-# What the manual promises is 2 s; the machine that runs this may be busy.
+# The manual promises 2 s, but the machine may be busy.
 SEEN_WITHIN = 8.0
 
 
 def replace(path, by):
-    """Renames a new directory entry of `by` over `path`."""
+    """Links `by` under a new name and renames that over `path`."""
     beside = path.with_suffix(".new")
     os.link(by, beside)
     os.rename(beside, path)
@@ -58,7 +58,7 @@ class Server:
         return self.log_file.read()
 
     def get(self, target):
-        """(status, headers, body) over a connection that this thread keeps."""
+        """(status, headers, body) on the persistent connection of this thread."""
         connection = getattr(self.local, "connection", None)
         if connection is None:
             connection = self.local.connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
@@ -96,7 +96,7 @@ def digest(reply):
 
 
 class Load:
-    """Clients that ask for the targets without a pause; every reply is judged."""
+    """Clients that request the targets without a pause; every reply is checked."""
 
     def __init__(self, server, targets, judge, threads=6):
         self.server, self.targets, self.judge = server, targets, judge
@@ -115,7 +115,7 @@ class Load:
             try:
                 reply = self.server.get(target)
                 fault = self.judge(target, reply)
-            except Exception as error:  # a connection that was cut is a fault
+            except Exception as error:  # a cut connection is an error
                 reply, fault = (0, {}, b""), repr(error)
             now = time.monotonic()
             with self.lock:
@@ -154,7 +154,7 @@ class ReloadTest(unittest.TestCase):
         return server
 
     def write_config(self, text, name="terrace.json"):
-        """As editors do that care: complete or not at all."""
+        """Replaces the file atomically, as good editors do."""
         path = self.folder / name
         beside = path.with_suffix(".tmp")
         beside.write_text(text if isinstance(text, str) else json.dumps(text), encoding="utf-8")
@@ -183,7 +183,7 @@ class Source(ReloadTest):
             cls.targets = cls.tiles_of(layer)
             cls.known.append({target: digest(server.get(target)) for target in cls.targets})
             server.stop()
-        for target in cls.targets:  # or the test could not tell them apart
+        for target in cls.targets:  # otherwise the test could not distinguish them
             assert cls.known[0][target] != cls.known[1][target], target
 
     @staticmethod
@@ -205,7 +205,7 @@ class Source(ReloadTest):
         home = self.folder / "home"
         home.mkdir()
         self.path = home / NAME
-        # Links must stay on one file system.
+        # Hard links need one file system.
         for i, model in enumerate(self.models):
             shutil.copy2(model, self.folder / f"{i}.hgt")
         self.here = [self.folder / "0.hgt", self.folder / "1.hgt"]
@@ -244,7 +244,7 @@ class Source(ReloadTest):
         self.assertLess(load.refused_for, 20)
 
     def test_no_answer_is_wrong_while_files_are_overwritten_and_deleted(self):
-        """As no operator should: the bytes of a file that is served change under the server."""
+        """Overwrites the bytes of a served file in place, which operators should not do."""
         server = self.serve(self.path, "--name", "hills", "--log-level", "warn")
         load = Load(server, self.targets, self.judge)
         chance, rounds = random.Random(2), 60 if SWAPS > 100 else 8
@@ -254,7 +254,7 @@ class Source(ReloadTest):
                 self.path.unlink()
                 time.sleep(chance.choice((0.1, 0.6)))
                 replace(self.path, self.here[turn % 2])
-            elif turn % 4 == 1:  # another file takes the place of the link before its bytes change
+            elif turn % 4 == 1:  # replaces the link by another file before its bytes change
                 shutil.copyfile(self.here[turn % 2], self.path.with_suffix(".new"))
                 os.rename(self.path.with_suffix(".new"), self.path)
             else:
@@ -272,7 +272,7 @@ class Source(ReloadTest):
         slowest = 0
         for turn in range(1, 6):
             beside = self.path.with_suffix(".new")
-            shutil.copyfile(self.here[turn % 2], beside)  # written this very moment
+            shutil.copyfile(self.here[turn % 2], beside)  # has the current time
             os.rename(beside, self.path)
             begun = time.monotonic()
             target = self.targets[turn]
@@ -285,7 +285,7 @@ class Source(ReloadTest):
         server = self.serve(self.path, "--name", "hills")
         target = self.targets[0]
         old = digest(server.get(target))
-        # Neither the old one nor any other: nothing can be built.
+        # No tile can be built, neither of the old nor of another source.
         self.path.unlink()
         self.assertTrue(eventually(lambda: server.get("/readyz")[2].startswith(b"degraded\n")))
         self.assertEqual(server.get("/readyz")[0], 200)
@@ -294,7 +294,7 @@ class Source(ReloadTest):
         status, headers, body = server.get(self.targets[-1])
         self.assertEqual((status, headers["Retry-After"]), (503, "1"))
         self.assertNotIn(str(self.folder).encode(), body + server.get("/readyz")[2])
-        # A file that cannot be opened is no reason to give up, nor to forget.
+        # If a file cannot be opened, the server keeps the old dataset and tries again.
         self.path.write_bytes(b"not a raster")
         os.utime(self.path, (1, 1))
         time.sleep(1.5)
@@ -347,7 +347,7 @@ class Configuration(ReloadTest):
 
         load = Load(server, targets, judge)
         for turn in range(12):
-            # Datasets come and go before the two that are asked for, so that their places change.
+            # Datasets are added and removed before the two requested ones, so that their positions change.
             config["datasets"] = ([self.dataset("new", error_fraction=0.3)] if turn % 2 else []) + \
                 [self.dataset("a"), self.dataset("b")][::1 if turn % 3 else -1]
             config["cache_bytes"] = (1 + turn % 4) * 200_000
@@ -369,7 +369,7 @@ class Configuration(ReloadTest):
         self.assertEqual(server.get("/a/0/0/0.terrain")[0], 200)
         self.assertIn('/lissten: unknown key; did you mean "listen"?', server.log())
         self.assertIn("/io_threads: must be", server.log())
-        # By a signal it says so again.
+        # After a signal the server logs it again.
         server.process.send_signal(signal.SIGHUP)
         self.assertTrue(eventually(lambda: server.log().count("/lissten") == 2), server.log())
         self.write_config(good)
@@ -402,7 +402,7 @@ class Configuration(ReloadTest):
         self.assertIn(f"{warning}, which takes a restart; until then everybody sees it", server.log())
         self.write_config({"tokens": [token], "datasets": [other, public, self.dataset("c", public=True)]})
         self.assertTrue(eventually(lambda: "until then it takes a token to see it" in server.log()), server.log())
-        self.assertEqual(server.log().count(warning), 1)  # it is as it was at the start
+        self.assertEqual(server.log().count(warning), 1)  # unchanged since the start
 
     def test_a_glob_finds_what_is_put_into_its_folder(self):
         home = self.folder / "dems"
@@ -477,4 +477,4 @@ class Configuration(ReloadTest):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2, warnings="ignore")  # sockets of threads that have ended
+    unittest.main(verbosity=2, warnings="ignore")  # ignores sockets of finished threads

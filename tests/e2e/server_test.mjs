@@ -1,4 +1,4 @@
-// The real binary on port 0, asked as real clients ask.
+// Sends requests of real clients to the real binary on port 0.
 import assert from 'node:assert/strict';
 import { createHash } from 'node:crypto';
 import fs from 'node:fs';
@@ -34,8 +34,8 @@ describe('a served dataset', () => {
     assert.equal(layer.available.length, 14);
   });
 
-  // cesium-native sends no Accept, appends its extensions to the template's own query, uses tiles[0] only, and makes all
-  // four children as soon as one is available.
+  // cesium-native sends no Accept, appends its extensions to the query of the template, uses only tiles[0], and creates
+  // all four children as soon as one is available.
   it('answers the requests of cesium-native', async () => {
     let [x, y] = [layer.available[13][0].startX, layer.available[13][0].startY];
     for (let z = 13; z >= 0; z--, x >>= 1, y >>= 1) {
@@ -126,7 +126,7 @@ describe('a served dataset', () => {
     const builds = await metric(server.url, 'terrace_tile_builds_total');
     const answers = await Promise.all(Array.from({ length: 200 }, () => request(url)));
     assert.ok(answers.every((answer) => answer.status === 200 && answer.body.equals(answers[0].body)));
-    await new Promise((resolve) => setTimeout(resolve, 1100)); // the page of metrics is kept for a second
+    await new Promise((resolve) => setTimeout(resolve, 1100)); // the page of metrics is cached for a second
     assert.equal((await metric(server.url, 'terrace_tile_builds_total')) - builds, 1);
   });
 

@@ -1,4 +1,4 @@
-"""A synthetic elevation model in the form of SRTM, for tests that need a raster of their own."""
+"""A synthetic elevation model in SRTM's format, for tests that need a separate raster."""
 import array
 import math
 import os
@@ -9,7 +9,7 @@ SIDE = 1201
 
 
 def write_hgt(path, phase=0.0):
-    """A square degree of hills, one file without companions, written an hour ago; another phase gives other hills."""
+    """Writes a square degree of hills in one file whose time is an hour ago; another phase gives other hills."""
     rows = [[math.sin(i / 37 + phase) for i in range(SIDE)], [math.cos(i / 53 + phase) for i in range(SIDE)]]
     heights = array.array("h", (int(1000 + 400 * rows[0][x] * rows[1][y] + 30 * rows[0][(x * 7 + y * 3) % SIDE])
                                 for y in range(SIDE) for x in range(SIDE)))

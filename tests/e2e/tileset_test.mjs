@@ -1,5 +1,5 @@
-// 3D Tiles of the shipped samples over HTTP: what tileset.json and the subtrees promise is what layer.json lists, and
-// every promise is kept.
+// 3D Tiles of the sample data over HTTP: tileset.json and the subtrees have the tiles that layer.json lists, and all of
+// them exist.
 import assert from 'node:assert/strict';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
@@ -7,7 +7,7 @@ import { json, plain, request, samples, serve } from './harness.mjs';
 
 const fill = (template, level, x, y) => template.replace('{level}', level).replace('{x}', x).replace('{y}', y);
 
-// A subtree as [level][index] -> available, read as the specification says.
+// A subtree as [level][index] -> available, parsed by the specification.
 function readSubtree(file, levels) {
   assert.equal(file.toString('latin1', 0, 4), 'subt');
   const jsonBytes = Number(file.readBigUInt64LE(8)), binary = file.subarray(24 + jsonBytes);
@@ -33,7 +33,7 @@ function* mortonOrder(level) {
   }
 }
 
-// Every tile of an implicit root as [z, x, y] on the globe, together with the tile's own place under the root.
+// Every tile of an implicit root as [z, x, y] on the globe, with its position under the root.
 async function tilesOf(root, base) {
   const { subtreeLevels, availableLevels, subtrees } = root.implicitTiling;
   const [rz, rx, ry] = /3dtiles\/(\d+)-(\d+)-(\d+)\//.exec(subtrees.uri).slice(1).map(Number);
@@ -91,7 +91,7 @@ for (const dataset of ['jacksboro', 'earth']) {
         for (let x = r.startX; x <= r.endX; x++) for (let y = r.startY; y <= r.endY; y++) keys.push(`${z}/${x}/${y}`);
         return keys;
       })));
-      // What layer.json lists beside the roots only makes four children of a tile's.
+      // Tiles of layer.json beside the roots exist only because a tile has four children.
       const tops = new Set(roots.map(({ content }) => /3dtiles\/(\d+-\d+-\d+)\//.exec(content.uri)[1].replaceAll('-', '/')).concat(above));
       const isUnder = (key) => {
         for (let [z, x, y] = key.split('/').map(Number); z >= top; [z, x, y] = [z - 1, x >> 1, y >> 1]) if (tops.has(`${z}/${x}/${y}`)) return true;
@@ -164,7 +164,7 @@ for (const dataset of ['jacksboro', 'earth']) {
       const glb = await request(new URL(fill(uri, 0, 0, 0), base));
       assert.equal(glb.status, 200);
       assert.doesNotMatch(glb.body.toString('latin1'), /KHR_draco/);
-      // deck.gl appends the tileset's own query to URLs that have one.
+      // deck.gl appends the query of the tileset to URLs that already have a query.
       assert.equal((await request(new URL(`${fill(uri, 0, 0, 0)}&error=20&compression=none`, base))).status, 200);
       for (const query of ['error=0', 'compression=zip', 'colour=red', 'error=5&fraction=1']) {
         assert.equal((await request(`${base}?${query}`)).status, 400, query);

@@ -1,7 +1,7 @@
 """Versions of datasets, of the real binary: versions_test.py BINARY SOURCE_DIR.
 
-Two servers on copies of one elevation model are replicas: everything that they say of it is the same. What differs in a
-sample, an option or the order of its sources has another version, and nothing of the old one is kept under it.
+Two servers with copies of one elevation model are replicas: all their replies about it are equal. A dataset that differs in a
+sample, an option or the order of its sources has another version, and no cache keeps old bytes under the new version.
 """
 import http.client
 import json
@@ -83,7 +83,7 @@ class Versions(unittest.TestCase):
 
     @classmethod
     def copy(cls, path, time_of=946684800):
-        """Of another inode and time, in a folder of its own."""
+        """Copies the file into another folder, with another inode and time."""
         copy = pathlib.Path(tempfile.mkdtemp(dir=cls.folder)) / path.name
         shutil.copyfile(path, copy)
         os.utime(copy, (time_of, time_of))

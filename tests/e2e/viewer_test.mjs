@@ -1,4 +1,4 @@
-// The viewer in a real browser: what it draws, what its controls do, and that it asks nobody but the server.
+// The viewer in a real browser: what it draws, what its controls do, and that it connects only to the server.
 // TERRACE_URL names a running server; otherwise TERRACE_BINARY is started with TERRACE_CONFIG.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
@@ -12,10 +12,10 @@ const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
 const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
                 '--disable-background-networking', '--no-first-run'];
 const kSettleMs = 90000;  // a software renderer on a busy machine draws two frames a second
-// What Chromium says about its own graphics driver.
+// Messages of Chromium about its graphics driver.
 const kDriverTalk = /GL Driver Message|GPU stall|SwiftShader/i;
 
-// A page of the viewer that keeps everything that went wrong on it.
+// Opens a page of the viewer and records all its errors.
 async function openPage(browser, url, size = { width: 800, height: 500 }) {
   const page = await browser.newPage({ viewport: size });
   const origin = new URL(url).origin;
@@ -38,7 +38,7 @@ async function openPage(browser, url, size = { width: 800, height: 500 }) {
   return page;
 }
 
-// Waits until nothing has been loading for a second, the last picture's curtain is gone, and terrain is drawn.
+// Waits until nothing has been loading for a second, the still image of the last view is gone, and terrain is drawn.
 async function settle(page) {
   await page.evaluate(() => (window.calmSince = undefined));
   await page.waitForFunction(() => {
@@ -51,7 +51,7 @@ async function settle(page) {
   return page.evaluate(() => terrace.globe.drawn());
 }
 
-// The picture without the panel, as coarse colours: 5 bits a channel, one number a pixel.
+// The view without the panel in coarse colours: 5 bits a channel, one number a pixel.
 async function picture(page) {
   const png = (await page.screenshot({ clip: { x: 320, y: 0, width: 480, height: 500 } })).toString('base64');
   return page.evaluate(async (base64) => {
@@ -133,7 +133,7 @@ describe('the viewer', () => {
     const tiles = await page.evaluate(() => terrace.globe.tiles3d.drawn());
     assert.ok(tiles.triangles > mesh.withSkirts / 8 && tiles.triangles < mesh.withSkirts * 8, `${tiles.triangles} ${mesh.withSkirts}`);
     assert.ok(await page.evaluate(() => terrace.traffic.tiles3d.bytes > 1000));
-    // The same ground in the same colours: other triangles, but not another picture.
+    // Other triangles, but the same ground in the same colours.
     const after = await picture(page);
     const hue = (colour) => [colour >> 10, (colour >> 5) & 31, colour & 31];
     const far = after.filter((colour, i) => hue(colour).some((channel, k) => Math.abs(channel - hue(before[i])[k]) > 6));
@@ -231,7 +231,7 @@ describe('the viewer', () => {
   });
 });
 
-// A server of its own for each: `config` besides the address.
+// Starts a separate server with `config` and an address.
 async function serveConfig(config) {
   const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-'));
   fs.writeFileSync(path.join(folder, 'terrace.json'), JSON.stringify(config));

@@ -1,4 +1,4 @@
-"""The example program for embedders makes the tile that the server sends, and says what is wrong with its arguments.
+"""The example program for embedders makes the same tile as the server, and reports errors in its arguments.
 
     embed_test.py EMBED TERRACE SOURCE_DIR
 """

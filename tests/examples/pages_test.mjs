@@ -1,5 +1,5 @@
-// Each page and script of examples/, as its reader gets it: the page in a real browser, its library from node_modules in
-// place of the CDN, the server the real one with the sample data. What a client says of a height is compared with /heights.
+// Runs each page of examples/ in a real browser, with libraries from node_modules instead of the CDN, and each script,
+// against the real server with the sample data. Heights that a client shows are compared with /heights.
 import assert from 'node:assert/strict';
 import { execFile } from 'node:child_process';
 import fs from 'node:fs';
@@ -23,7 +23,7 @@ const kSize = { width: 330, height: 220 };
 const kSettleMs = 40000;
 const run = promisify(execFile);
 
-// The file of node_modules that a URL of the CDN names; its version has to be the installed one.
+// The file of node_modules for a URL of the CDN; its version must be the installed one.
 function fileOf(url) {
   const [, name, version, file] = url.match(/^https:\/\/cdn\.jsdelivr\.net\/npm\/((?:@[^/]+\/)?[^@/]+)@([\d.]+)\/([^?#]+)/) ?? [];
   const folder = name && kModules.map((modules) => path.join(modules, name)).find((folder) => fs.existsSync(folder));
@@ -61,7 +61,7 @@ async function settle(page, ready) {
   });
 }
 
-// Clicks there and reads place and height from the page's line.
+// Clicks at (x, y) and reads position and height from the page's line.
 async function click(page, x, y) {
   const before = await line(page);
   await page.mouse.click(x * kSize.width, y * kSize.height);
@@ -72,7 +72,7 @@ async function click(page, x, y) {
   return { latitude, longitude, height };
 }
 
-// How many colours, at 5 bits a channel, the picture below the line has.
+// Number of colours below the line, at 5 bits a channel.
 async function colours(page) {
   const clip = { x: 0, y: 80, width: kSize.width, height: kSize.height - 80 };
   const png = (await page.screenshot({ clip, timeout: kSettleMs })).toString('base64');
@@ -87,10 +87,10 @@ async function colours(page) {
   }, png);
 }
 
-// Metres of a pixel of a Web Mercator tile.
+// Size of a pixel of a Web Mercator tile in metres.
 const pixelMetres = (latitude, zoom, size) => 40075016 * Math.cos(latitude * Math.PI / 180) / size / 2 ** zoom;
 
-// Runs in the page of deck.gl: height and level of the deepest mesh at a place.
+// Runs in the page of deck.gl: height and level of the deepest mesh at a position.
 function meshHeight({ longitude, latitude }) {
   const x = 512 * (longitude + 180) / 360, y = 256 + 256 / Math.PI * Math.asinh(Math.tan(latitude * Math.PI / 180));
   const level = ({ id }) => Number(id.split('-').at(-1));
@@ -131,7 +131,7 @@ describe('the pages of examples/', () => {
     await server?.stop();
   });
 
-  // The server's height there, the deepest tile, and how far that may be from the height.
+  // The server's height there, the deepest tile, and its largest permitted distance from the height.
   async function truth(dataset, { latitude, longitude }) {
     const url = `${server.url}/${dataset}/heights?certify=deepest&locations=${latitude},${longitude}`;
     const { results: [{ elevation, certified_error: error, tile }] } = await json(url);
@@ -139,7 +139,7 @@ describe('the pages of examples/', () => {
   }
   const certified = async (url) => Number((await request(url, { method: 'HEAD' })).headers['terrain-certified-error']);
 
-  // The lowest and the highest of the server's heights within `metres` of a place.
+  // The lowest and the highest of the server's heights within `metres` of a position.
   async function range(dataset, { latitude, longitude }, metres) {
     const steps = [-1, -0.5, 0, 0.5, 1].map((share) => share * metres / 111320);
     const points = steps.flatMap((y) => steps.map((x) => `${latitude + y},${longitude + x / Math.cos(latitude * Math.PI / 180)}`));
@@ -153,7 +153,7 @@ describe('the pages of examples/', () => {
     assert.ok(height >= low && height <= high, `${what}: ${height} m is not between ${low} and ${high} m`);
   }
 
-  // Height and place of clicks, each against what `allowed` says of it.
+  // Clicks, and compares each height with `allowed` for its position.
   async function clicks(page, client, dataset, allowed) {
     for (const [x, y] of dataset === 'earth' ? [[0.46, 0.6]] : [[0.5, 0.55], [0.42, 0.65]]) {
       const place = await click(page, x, y);
@@ -180,7 +180,7 @@ describe('the pages of examples/', () => {
     three: {
       ready: 'window.example?.tiles.visibleTiles.size > 0 && !Object.entries(example.tiles.stats).some(([name, n]) => /queued|downloading|parsing/.test(name) && n > 0)',
       check: (page, dataset) => clicks(page, 'three', dataset, async (place) => {
-        // The smallest of the drawn tiles that hold the place.
+        // The smallest drawn tile that contains the position.
         const uri = await page.evaluate(({ latitude, longitude }) => {
           const [y, x] = [latitude, longitude].map((degrees) => degrees * Math.PI / 180);
           return [...example.tiles.visibleTiles].filter(({ boundingVolume: { region } }) =>
@@ -198,14 +198,15 @@ describe('the pages of examples/', () => {
         const place = await click(page, 0.5, 0.55);
         const { height } = await truth(dataset, place);
         within(place.height, [height - 0.01, height + 0.01], `deck, ${dataset}, as asked from the server`);
-        // The mesh that is drawn there from near by.
+        // The mesh that is drawn there from a short distance.
         const { maxzoom } = await json(`${server.url}/${dataset}/tiles.json?size=512`);
         await page.evaluate(({ longitude, latitude, zoom }) => example.setProps({ initialViewState: { longitude, latitude, zoom } }),
                             { ...place, zoom: maxzoom + 1 });
         await settle(page, `${pages.deck.ready} && (${meshHeight})(${JSON.stringify(place)})?.zoom === ${maxzoom}`);
         const drawn = await page.evaluate(meshHeight, place);
-        const [times, base] = dataset === 'earth' ? [25, 0] : [1, 236];  // the page draws so that it can be seen
-        // deck.gl draws pixels up to 1.5 beside their places; the page lets its meshes be off by a 400th of the relief.
+        const [times, base] = dataset === 'earth' ? [25, 0] : [1, 236];  // the page exaggerates heights like this
+        // deck.gl draws pixels up to 1.5 pixels off their positions; the page permits meshes an error of a 400th of the
+        // relief.
         const { datasets } = await json(`${server.url}/datasets`), { heights } = datasets.find(({ name }) => name === dataset);
         const error = (heights.max - heights.min) / 400 + 0.1;
         const [low, high] = await range(dataset, place, 1.5 * pixelMetres(place.latitude, maxzoom, 512));
@@ -220,7 +221,7 @@ describe('the pages of examples/', () => {
         await page.evaluate(({ place, zoom }) => map.jumpTo({ center: [place.longitude, place.latitude], zoom, pitch: 0 }), { place, zoom: maxzoom + 2 });
         await settle(page, 'map.loaded() && map.areTilesLoaded()');
         for (const there of [place, await click(page, 0.4, 0.7)]) {
-          // MapLibre takes a pixel's height for that of its corner.
+          // MapLibre uses the height of a pixel as that of its corner.
           const height = await page.evaluate(({ longitude, latitude }) => map.queryTerrainElevation([longitude, latitude]), there);
           const [low, high] = await range(dataset, there, 1.5 * pixelMetres(there.latitude, maxzoom, 256));
           within(height, [low - 0.1, high + 0.1], `maplibre, ${dataset} at ${there.latitude}, ${there.longitude}`);

@@ -1,5 +1,5 @@
-// A configuration file of arbitrary bytes: refused with reasons that point into it, or read, written and read to the
-// same.
+// A configuration file of arbitrary bytes is either rejected with errors that have a location, or it is read, and
+// writing and reading it again gives the same.
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +15,7 @@
 namespace terrace::fuzz {
 namespace {
 
-// Globs over the machine's own folders take long and tell nothing.
+// Globs over the folders of the machine would take long and test nothing.
 bool LooksFarAround(const nlohmann::json& json) {
   if (json.is_string()) {
     const auto& text = json.get_ref<const std::string&>();

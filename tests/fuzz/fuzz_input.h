@@ -1,4 +1,4 @@
-// The bytes of a fuzz target's input, taken one value after the other; zeros when there are no more.
+// Takes values one by one from the bytes of a fuzz target's input; zeros at the end.
 #pragma once
 
 #include <algorithm>
@@ -32,5 +32,5 @@ class FuzzInput {
 
 }  // namespace terrace::fuzz
 
-// The target, one to a program: returns 0, or aborts where a promise is broken.
+// The target, one in each program. Returns 0, or aborts if a promise is broken.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);

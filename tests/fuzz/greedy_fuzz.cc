@@ -1,4 +1,4 @@
-// Greedy insertion on a small field of arbitrary floats: the bound is kept and the field covered, whatever the bits.
+// Greedy insertion on a small field of arbitrary floats keeps the bound and covers the field.
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -28,7 +28,7 @@ constexpr int kMaxSide = 20;
 
 enum class Sort { kAnyBits, kPalette, kWholeMetres };
 
-// One byte a sample makes fields with ties and plateaus, four a field of any floats.
+// One byte a sample makes fields with ties and plateaus, four bytes fields of arbitrary floats.
 HeightField FieldOf(Sort sort, FuzzInput& input) {
   const int width = 2 + input.Below(kMaxSide - 1), height = 2 + input.Below(kMaxSide - 1);
   std::array<float, 8> palette{};
@@ -52,7 +52,7 @@ HeightField FieldOf(Sort sort, FuzzInput& input) {
   std::size_t valid = 0;
   for (const float value : heights) valid += std::isfinite(value) ? 1 : 0;
   Result<HeightField> field = HeightField::Make(width, height, heights);
-  TERRACE_CHECK(field.has_value() == (valid > 0));  // the only reason to refuse these
+  TERRACE_CHECK(field.has_value() == (valid > 0));  // the only reason to reject these
   if (field) return *std::move(field);
   heights[0] = 0;
   return HeightField::Make(width, height, std::move(heights)).value();

@@ -1,4 +1,4 @@
-// The body of a POST for heights, by both of its content types, on arbitrary bytes.
+// Parses arbitrary bytes as the body of a POST for heights, in both content types.
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,7 +19,7 @@ void Try(std::string_view content_type, std::string_view body) {
   const auto query = server::ParseHeights({{}, content_type, body}, kMaxPoints);
   if (!query) {
     TERRACE_CHECK(query.error().code == ErrorCode::kInvalidArgument);
-    // Nothing of the request comes back: messages are the server's words and numbers.
+    // Messages contain no bytes of the request, only the server's words and numbers.
     for (const unsigned char c : query.error().message) TERRACE_CHECK(c >= 0x20 && c < 0x7f);
     return;
   }

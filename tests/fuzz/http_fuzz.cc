@@ -1,6 +1,6 @@
-// The bytes of a connection, sent in three pieces: the server reads them as a plain second reader does, however they
-// are cut, and ends. That reader knows nothing but where messages end: two of them that disagree are a smuggled
-// request.
+// Sends the bytes of a connection in three pieces. However they are split, the server must read the same messages as a
+// second, simple parser, and end. That parser finds only where messages end: if two parsers disagree on that, requests
+// can be smuggled.
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -28,16 +28,16 @@ namespace {
 using namespace server;
 using asio::ip::tcp;
 
-constexpr std::size_t kMaxBytes = 48 * 1024;  // what a pair of sockets holds unread
+constexpr std::size_t kMaxBytes = 48 * 1024;  // fits into the buffers of a socket pair
 constexpr std::size_t kMaxBody = 16 * 1024;
 
 struct Seen {
   std::vector<Request> requests;
-  int refused = 0;  // status; 0: the client ended
+  int refused = 0;  // status; 0: the client closed
   bool done = false;
 };
 
-// As a session reads, without replies.
+// Reads as a session does, without replies.
 asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
   for (bool more = true; more;) {
     Request request;
@@ -84,7 +84,7 @@ Seen Converse(const std::array<std::string_view, 3>& pieces) {
   {
     asio::io_context io(1);
     tcp::socket socket(io);
-    socket.assign(tcp::v4(), ends[0]);  // only what works on either sort of socket is done with it
+    socket.assign(tcp::v4(), ends[0]);  // uses only operations that also work on a Unix socket
     Stream stream(std::move(socket), nullptr);
     RequestReader reader(stream, {});
     asio::co_spawn(io, ReadAll(reader, seen), asio::detached);
@@ -94,7 +94,7 @@ Seen Converse(const std::array<std::string_view, 3>& pieces) {
     }
     ::shutdown(ends[1], SHUT_WR);
     Poll(io);
-    TERRACE_CHECK(seen.done);  // the client has ended: there is nothing to wait for
+    TERRACE_CHECK(seen.done);  // the client has closed, so there is nothing to wait for
     stream.Close();
     Poll(io);
   }
@@ -102,8 +102,8 @@ Seen Converse(const std::array<std::string_view, 3>& pieces) {
   return seen;
 }
 
-// Where the message ends whose head begins `bytes`, by RFC 9112 and the rule that only a POST has a body. The head is
-// one that the server took, so it has an end.
+// The end of the message at the beginning of `bytes`, by RFC 9112 and the rule that only a POST has a body. The server
+// has accepted its head, so the head is complete.
 std::size_t EndOfMessage(std::string_view bytes, const Request& request) {
   const std::size_t end = bytes.find("\r\n\r\n");
   TERRACE_CHECK(end != std::string_view::npos);
@@ -135,7 +135,7 @@ std::size_t EndOfMessage(std::string_view bytes, const Request& request) {
   return end + 4 + length;
 }
 
-// A connection remembers the header of its last request: what is read does not depend on that.
+// A connection remembers the header lines of its last request. The result must not depend on them.
 void ExpectAsAlone(std::string_view head, const Request& request) {
   const auto alone = ParseHead(head);
   TERRACE_CHECK(alone.has_value());
@@ -162,7 +162,7 @@ void ExpectOneReading(std::string_view bytes, const Seen& seen) {
 
 void ExpectSame(const Seen& a, const Seen& b) {
   TERRACE_CHECK(a.requests.size() == b.requests.size());
-  // Of a head with two faults the one that is seen first is told, which depends on the cut.
+  // If a head has two errors, the one that is found first is reported, which depends on the split.
   TERRACE_CHECK((a.refused != 0) == (b.refused != 0));
   for (std::size_t i = 0; i < a.requests.size(); ++i) {
     const Request &x = a.requests[i], &y = b.requests[i];

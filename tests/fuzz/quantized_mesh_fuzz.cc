@@ -1,5 +1,5 @@
-// The tests' decoder of quantized-mesh on arbitrary bytes: refused, or a mesh whose indices have vertices. The tests
-// lean on it, so it must neither read past the end nor take what is no tile.
+// The tests' decoder of quantized-mesh either rejects arbitrary bytes, or returns a mesh with valid indices. Tests
+// depend on it, so it must neither read past the end nor accept invalid tiles.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -19,7 +19,7 @@ const std::string& SoundTile() {
   return *tile;
 }
 
-// The input as it is, or a sound tile with edits: chance alone never gets past the header.
+// The input itself, or a valid tile with edits, because random bytes alone never get past the header.
 std::string BytesOf(FuzzInput& input) {
   if (input.Below(2) == 0) return std::string(input.rest());
   std::string bytes = SoundTile();
@@ -48,7 +48,7 @@ void Run(FuzzInput& input) {
   }
   std::size_t extensions = 0;
   for (const auto& extension : tile->extensions) extensions += 5 + extension.bytes.size();
-  // Every byte is accounted for: 92 of the header with its count, but for what aligns the indices.
+  // The sizes of all parts add up, with 92 bytes of the header and its count, except for the padding of the indices.
   const std::size_t width = vertices > 65536 ? 4 : 2;
   const std::size_t indices =
       3 * tile->triangles.size() + tile->west.size() + tile->south.size() + tile->east.size() + tile->north.size();

@@ -1,5 +1,5 @@
-// Records of the disk cache: what was not written under a key is not believed, and what is believed is sound or
-// refused.
+// Records of the disk cache: bytes that were not written under a key are rejected, and accepted bytes are valid or
+// rejected by their parser.
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -28,7 +28,7 @@ std::string SoundTile() {
   return SerializeTile(tile);
 }
 
-// 8 x 8 cells, with the ring around them that normals are made of.
+// 8 x 8 cells and the ring around them that normals need.
 std::string SoundRefinement() {
   constexpr int kCells = 8;
   const tin::HeightField field = tin::HillField(kCells + 1, kCells + 1, 1);
@@ -60,7 +60,7 @@ void Run(FuzzInput& input) {
   const int sort = input.Below(3);
   if (sort == 2) {
     TryRecord(input.rest());
-    TERRACE_CHECK(!StripChecksum(Key(), input.rest()));  // but for one case in 2^64
+    TERRACE_CHECK(!StripChecksum(Key(), input.rest()));  // except for one case in 2^64
     return;
   }
   const std::string written = AddChecksum(Key(), sound[sort]);

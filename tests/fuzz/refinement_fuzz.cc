@@ -1,4 +1,4 @@
-// Refinement::Parse on arbitrary bytes with a right checksum, and meshes of what it takes: refused, or sound.
+// Refinement::Parse on arbitrary bytes with a correct checksum: it rejects them, or the meshes of the result are valid.
 #include <xxhash.h>
 
 #include <cstddef>
@@ -19,7 +19,7 @@ namespace {
 using tin::Refinement;
 using tin::TinMesh;
 
-// Of a field of 9 x 9 samples, without the checksum.
+// A refinement of 9 x 9 samples, without the checksum.
 const std::string& SerializedSeed() {
   static const auto* const seed = [] {
     const tin::HeightField field = tin::HillField(9, 9, 1);
@@ -34,7 +34,8 @@ const std::string& SerializedSeed() {
   return *seed;
 }
 
-// The input behind a sound beginning, or a sound refinement with edits: random bytes alone never get past the start.
+// The input after a valid beginning, or a valid refinement with edits, because random bytes alone never get past the
+// start.
 std::string ContentOf(FuzzInput& input) {
   std::string content = SerializedSeed();
   if (input.Below(4) == 0) {

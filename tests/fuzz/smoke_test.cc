@@ -1,4 +1,4 @@
-// A fuzz target without a fuzzer: its corpus, then inputs that chance makes, the same in every run.
+// Runs a fuzz target without a fuzzer: its corpus, then random inputs, the same in every run.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ std::vector<Bytes> Corpus() {
 }
 
 void Try(const Bytes& input) {
-  // A copy of the very size: a sanitizer sees the first byte that is read behind it.
+  // A copy of exactly this size, so that a sanitizer finds the first byte that is read past it.
   const Bytes exact(input.begin(), input.end());
   LLVMFuzzerTestOneInput(exact.data(), exact.size());
 }
@@ -39,7 +39,7 @@ class Mutator {
  public:
   explicit Mutator(const std::vector<Bytes>& corpus) : corpus_(corpus) {}
 
-  // Of inputs of the corpus with a few edits three in four, noise the others: mostly short, a few edits, a small field.
+  // Three in four are inputs of the corpus with a few edits, the others noise, mostly short.
   Bytes Next() {
     if (corpus_.empty() || Below(4) == 0) return Noise(Below(4) == 0 ? 2000 : 40);
     Bytes bytes = Any();

@@ -1,4 +1,4 @@
-// Everything that reads a request's target and the headers that choose a reply, on arbitrary text.
+// All code that parses a request's target and the headers that select a reply, on arbitrary text.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -26,7 +26,7 @@ using namespace server;
 
 constexpr int kDeepest = 12;
 
-// A dataset of the whole Earth, with everything a request may ask for.
+// A dataset of the whole Earth with everything that a request may name.
 const std::vector<DatasetView>& Datasets() {
   static const auto* const datasets = [] {
     DatasetView view;
@@ -82,7 +82,7 @@ void TryQuery(std::string_view query) {
   }
 }
 
-// One tile has one URL: what was understood, written again, is what was asked for.
+// One tile has one URL: writing the parsed target again gives the requested one.
 void ExpectOneUrl(const Route& route) {
   const std::string written = "/earth/" + geo::ToString(route.key) + std::string(route.format->suffix);
   const auto again = Routes().Match(written);
@@ -91,7 +91,7 @@ void ExpectOneUrl(const Route& route) {
 
 void TryTarget(std::string target) {
   (void)TakeToken(target);
-  TERRACE_CHECK(!TakeToken(target));  // none is left for the log
+  TERRACE_CHECK(!TakeToken(target));  // the log must not contain one
   for (const bool is_known : {false, true}) {
     const std::string shown = RedactTarget(target, is_known);
     TERRACE_CHECK(std::all_of(shown.begin(), shown.end(), [](char c) { return c > 0x20 && c < 0x7f && c != ';'; }));

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""How long tiles take end to end, by level and by stage: `make bench-serve`.
+"""Measures the time of tiles end to end, by level and by stage: `make bench-serve`.
 
     tests/load/bench_serve.py [--data FOLDER] [--only NAME,...] [--tiles N] [--rounds N] BINARY [BINARY...]
 
-Each BINARY serves each dataset with one worker, without caches, and is asked for the same tiles of each level, one
-after the other. Binaries take turns within each round: what else the machine does hits all of them. Printed per level:
-the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary,
-and the medians of the last binary's stages. Before that, the processor time of the first start and of one with statistics
-kept; after it, the peak of memory and the processor time of a warm tile (another error of a refinement that is kept).
+Each BINARY serves each dataset with one worker, without caches, and gets requests for the same tiles of each level, one
+after the other. Binaries take turns within each round, so that other load on the machine affects all of them. The output for each
+level is the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary,
+and the medians of the last binary's stages. Before the levels it has the processor time of the first start and of a start with cached
+statistics; after them, the peak memory and the processor time of a warm tile (another error of a refinement in the cache).
 
-`--peer COMMAND` runs a shell command in each round as well, which writes the same levels of the same source to
-{folder}/{z}/{x}/{y}; {source}, {first} and {last} are replaced too. Its processor time a tile is printed beside.
+`--peer COMMAND` also runs a shell command in each round, which must write the same levels of the same source to
+{folder}/{z}/{x}/{y}; {source}, {first} and {last} are replaced too. The output then has its processor time a tile as well.
 """
 import argparse
 import contextlib
@@ -153,7 +153,7 @@ def bench(name, sources, levels, arguments):
 
 
 def rounds_of(servers, urls_of, rounds):
-    """Takes turns: ([[milliseconds a tile by round] by server], stages of the last). The round 0 is not counted."""
+    """Runs servers in turns: ([[milliseconds a tile by round] by server], stages of the last). Round 0 does not count."""
     times, stages = [[] for _ in servers], {}
     for turn in range(rounds + 1):
         for server, of_server in zip(servers, times):
@@ -174,7 +174,7 @@ def cold_level(servers, level, tiles, sources, arguments):
 
 
 def warm_tiles(servers, tiles, rounds):
-    """Coarser errors of refinements that were made for a fine one."""
+    """Requests coarser errors of refinements that were made for a fine one."""
     keys = [f"{level}/{x}/{y}" for level, of_level in tiles.items() for x, y in of_level]
     times, _ = rounds_of(servers, lambda turn: [f"/d/{key}.terrain?fraction={0.25 * 2 ** (turn / 4):.6f}" for key in keys], rounds)
     return ", ".join(f"{min(t):.2f} / {statistics.median(t):.2f}" for t in times)

@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
-# How quickly a cached tile leaves, beside nginx sending the same bytes from a file. Prints a Markdown table.
+# Compares the rate of cached tiles with nginx, which sends the same bytes from a file. Prints a Markdown table.
 #
 #   tests/load/beside_nginx.sh TERRACE TILE_URL [TURNS] [SECONDS] [CONNECTIONS]     default: 5 turns, 3 seconds, 64 connections
-#
-# TERRACE: the binary's process id, or a pattern that `pgrep -f` finds it by. TILE_URL: any tile of it, asked for with
-# Accept-Encoding: gzip; with TILES=FILE, paths a line, these tiles in turn in the place of one that is in every processor's cache.
-# Start the server with one io thread and `log_level` warn: nginx runs one worker without a log.
-#
-# Both take turns. Requests a second are those of wrk; microseconds are the processor time of the serving process alone, which
-# stands other work on the machine better. Minimum and median of all turns; of requests a second the best and the median.
+# TERRACE: the process id of the server, or a pattern for `pgrep -f`. TILE_URL: any of its tiles, requested with
+# Accept-Encoding: gzip. With TILES=FILE, one path a line, these tiles are requested in turn, because a single tile
+# stays in every processor's cache. Start the server with one io thread and `log_level` warn, because nginx runs one
+# worker without a log.  Both take turns. Requests a second are those of wrk. Microseconds are the processor time of the
+# serving process, which other load on the machine affects less. The table has the minimum and the median of all turns;
+# of requests a second, the best and the median.
 set -euo pipefail
 export LC_ALL=C
 [[ $# -ge 2 && $# -le 5 ]] || { sed -n '2,/^set /{s/^# \{0,1\}//;/^set /!p}' "${BASH_SOURCE[0]}" >&2; exit 2; }
@@ -28,7 +27,7 @@ for i in "${!paths[@]}"; do
   printf 'url = "%s%s"\noutput = "%s/tile%d"\n' "$origin" "${paths[i]}" "$folder" "$i"
 done > "$folder/curl"
 curl -fsS --no-progress-meter -H 'Accept-Encoding: gzip' --config "$folder/curl"
-# wrk asks both servers in the same way: requests made beforehand, in turn.
+# wrk sends the same prepared requests to both servers.
 cat > "$folder/turns.lua" <<'LUA'
 local requests, turn = {}, 0
 function init(arguments)
@@ -54,7 +53,7 @@ CONF
 nginx -c "$folder/nginx.conf"
 sleep 0.5
 worker=$(pgrep -P "$(cat "$folder/pid")" | head -n 1)
-# One processor for the server, one for the client: where threads may wander, both servers lose turns to it.
+# One processor for the server, one for the client: threads that change processors would slow both servers down.
 wrk=(wrk)
 if [[ $(nproc) -gt 1 ]] && command -v taskset > /dev/null; then
   taskset -a -c -p 0 "$terrace" > /dev/null

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""How many instructions a cold tile costs, of one or more binaries, by valgrind: a figure that no other work on the machine moves.
+"""Counts the instructions of a cold tile with valgrind, for one or more binaries. The count does not depend on other load.
 
     tests/load/cold_instructions.py DEM SUFFIX TILES BINARY [BINARY...]     SUFFIX: .terrain or .glb
 
-Each binary serves the DEM with one worker and no caches, and is asked for the same tiles of its six deepest levels, drawn with a
-fixed seed. Prints instructions a tile and the ratio to the first binary.
+Each binary serves the DEM with one worker and no caches, and gets requests for the same random tiles of its six deepest levels,
+with a fixed seed. Prints instructions a tile and the ratio to the first binary.
 """
 import http.client
 import json

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Distinct tiles that nobody has asked for yet, all at once: what of the pipeline's speed arrives through HTTP.
+"""Requests many distinct cold tiles at once, to compare the server's rate with that of the pipeline.
 
     tests/load/cold_storm.py CONFIG DATASET LEVEL --box=WEST,SOUTH,EAST,NORTH
                              [--tiles 2000] [--connections 64] [--turns 3] [--build build/release]
 
-The pipeline alone (terrace_cold_tiles) and a server started afresh take turns at the same tiles, drawn from the box, on the
-same cores; the server's client runs there as well. Prints a Markdown table, and ends with 1 where the server is slower than
-85 % of the pipeline, fails a request, or takes more memory than its caches and 128 MB.
+The pipeline alone (terrace_cold_tiles) and a new server take turns with the same random tiles of the box, on the
+same cores; the server's client runs there as well. Prints a Markdown table. The exit status is 1 if the server is slower than
+85 % of the pipeline, fails a request, or takes more than 128 MB of memory beside its caches.
 """
 import argparse
 import json
@@ -83,7 +83,7 @@ def main():
     arguments = parser.parse_args()
     runs = {"pipeline": [], "server": []}
     with tempfile.NamedTemporaryFile("w", suffix=".txt") as walk, tempfile.TemporaryDirectory() as caches:
-        os.environ["XDG_CACHE_HOME"] = caches  # not the home of whoever runs this
+        os.environ["XDG_CACHE_HOME"] = caches  # not the user's home
         walk.write("\n".join(paths(arguments.dataset, arguments.level, arguments.box, arguments.tiles)) + "\n")
         walk.flush()
         for _ in range(arguments.turns):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws tiles of a served dataset at random, one path a line, the same ones every time: for terrace_cold_tiles and once.py.
+"""Prints random tiles of a served dataset, one path a line, the same ones every time, for terrace_cold_tiles and once.py.
 
     tests/load/draw_tiles.py http://HOST:PORT/DATASET COUNT SHALLOWEST_LEVEL --box=WEST,SOUTH,EAST,NORTH
 """
@@ -23,7 +23,7 @@ def main():
         layer = json.load(reply)
     name = urllib.parse.urlsplit(arguments.dataset).path.strip("/")
     random.seed(5)
-    drawn = {}  # in order, each once
+    drawn = {}  # in order, without duplicates
     for _ in range(50 * arguments.count):
         level = random.randint(arguments.shallowest, layer["maxzoom"])
         side = 180 / 2**level

@@ -1,9 +1,8 @@
 #!/usr/bin/env bash
-# How many instructions a cached tile costs outside the kernel, by valgrind: a figure that no other work on the machine moves.
+# Counts the instructions of a cached tile outside the kernel with valgrind. The count does not depend on other load.
 #
 #   tests/load/instructions.sh BINARY CONFIG PATH [REQUESTS]     PATH: of any tile; default: 3000 requests
-#
-# Prints the instructions a request. The profile stays in ./callgrind.out.*, for callgrind_annotate.
+# Prints instructions a request. Leaves the profile in ./callgrind.out.* for callgrind_annotate.
 set -euo pipefail
 export LC_ALL=C
 [[ $# -ge 3 && $# -le 4 ]] || { sed -n '2,/^set /{s/^# \{0,1\}//;/^set /!p}' "${BASH_SOURCE[0]}" >&2; exit 2; }

@@ -1,11 +1,10 @@
-// For k6 (https://k6.io): viewers that come and go, at a rate that does not wait for the server. Each takes six requests of
-// the walk at a time, as a browser does, and looks for a moment.
+// For k6 (https://k6.io): viewers arrive at a rate that does not depend on the server. Each sends six requests of the
+// walk at a time, as a browser does, and pauses.
 //
 //   tests/load/walk.py http://HOST:PORT/DATASET --flight > walk.txt
 //   k6 run -e BASE=http://HOST:PORT -e WALK=$PWD/walk.txt -e VIEWERS=5 -e SECONDS=60 tests/load/k6.js
-//
-// VIEWERS: new ones a second. 503 with Retry-After is an answer to overload and counted apart; any other 5xx, and a client that
-// is told nothing, fail the run.
+// VIEWERS: new viewers a second. 503 with Retry-After is allowed during overload and counted separately. Any other 5xx,
+// and a request without a reply, fail the run.
 import http from "k6/http";
 import { check, sleep } from "k6";
 import { Counter, Trend } from "k6/metrics";

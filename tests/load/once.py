@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Asks for every tile of a walk once, in its order, over several connections, and prints one line of JSON.
+"""Requests every tile of a walk once, in its order, over several connections, and prints one line of JSON.
 
     tests/load/once.py http://HOST:PORT WALK_FILE CONNECTIONS
 
-On a server that has built nothing, every request is a build: what is measured is the making of tiles. curl asks, which leaves the
-server more of the processors than a client in Python would.
+On a server without cached tiles every request is a build, so this measures building. The client is curl, because it takes less
+processor time than one in Python.
 """
 import json
 import subprocess

@@ -1,5 +1,5 @@
--- wrk script: sends the requests of the file in WALK, in its order. Each thread starts at its own place and goes round.
--- At the end one line of JSON goes to stdout.
+-- wrk script: sends the requests of the file in WALK in a loop, in its order. Each thread starts at a different
+-- request. At the end it prints one line of JSON to stdout.
 local paths = {}
 for line in io.lines(os.getenv("WALK")) do
   paths[#paths + 1] = line

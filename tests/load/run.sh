@@ -1,12 +1,11 @@
 #!/usr/bin/env bash
-# Measures a running server as its viewers load it, cold and warm, and prints a Markdown table.
+# Measures a running server under the load of viewers, cold and warm, and prints a Markdown table.
 #
 #   tests/load/run.sh http://HOST:PORT/DATASET [SECONDS] [CONNECTIONS]     default: 20 seconds, 32 connections
-#
-# cold: every tile of the walk once. Start the server afresh, or it has built some already; the column "built" tells.
-# warm: the walk as it is, popular tiles more often, by wrk, for SECONDS.
-# WALK_OPTIONS="--flight" and others go to walk.py. PID=... of the server adds its processor time a request.
-# Client and server share a machine unless you separate them.
+# cold: every tile of the walk once. Start a new server, otherwise it has built some tiles already; the column "built"
+# shows the number. warm: the whole walk, with popular tiles more often, by wrk, for SECONDS. WALK_OPTIONS="--flight"
+# and others are passed to walk.py. With PID=... of the server the table has its processor time a request. Client and
+# server share a machine unless you separate them.
 set -euo pipefail
 export LC_ALL=C
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -23,7 +22,7 @@ read -ra walk_options <<< "${WALK_OPTIONS:-}"
 "$here/walk.py" "$dataset" "${walk_options[@]}" > "$WALK"
 echo "$(wc -l < "$WALK") requests for $(sort -u "$WALK" | wc -l) tiles, $connections connections, $seconds s" >&2
 
-# Milliseconds of processor time that the server has used; 0 if its process is not known.
+# Milliseconds of processor time that the server has used; 0 if PID is not set.
 used_ms() {
   if [[ -z ${PID:-} ]]; then echo 0; return; fi
   python3 -c 'import os, sys

@@ -3,14 +3,14 @@
 
     tests/load/walk.py URL/DATASET [--flight] [--views N] [--places N] [--seed S] [--query K=V]
 
-A viewer looks at a place and refines from the root to the deepest level, asking for all four children of each tile on the
-way, as CesiumJS and cesium-native do. Places lie in the dataset's deepest tiles; the k-th most popular one is looked at with
-a weight of 1 / k (Zipf), so that some tiles are asked for all the time and most hardly ever. The same seed gives the same
+A viewer looks at a place and refines from the root to the deepest level. It requests all four children of each tile on the
+way, as CesiumJS and cesium-native do. Places are in the dataset's deepest tiles; the k-th most popular place has
+a weight of 1 / k (Zipf), so some tiles are requested often and most hardly ever. The same seed gives the same
 requests.
 
-With --flight a viewer flies from one such place to another, from far above down to the ground and up again. In every frame
-it asks for the tiles that it lacks: those above the horizon whose error would be more than two pixels of the screen, children
-after parents, as CesiumJS chooses them. It keeps what it has.
+With --flight a viewer flies from one place to another, from high above down to the ground and up again. In every frame
+it requests the missing tiles: those above the horizon whose error would be more than two pixels of the screen, children
+after parents, as CesiumJS selects them. It keeps all tiles that it has.
 """
 import argparse
 import bisect
@@ -25,7 +25,7 @@ EXTENSIONS = "extensions=octvertexnormals"
 
 
 class Layer:
-    """Which tiles a layer.json promises, and their paths."""
+    """The tiles that a layer.json lists, and their paths."""
 
     def __init__(self, base, query):
         with urllib.request.urlopen(base + "/layer.json", timeout=30) as reply:
@@ -43,7 +43,7 @@ class Layer:
         return self.template.replace("{z}", str(z)).replace("{x}", str(x)).replace("{y}", str(y))
 
     def random_deepest(self, rng):
-        """(z, x, y) of a tile of the deepest level, each with the same chance."""
+        """(z, x, y) of a random tile of the deepest level, with equal probability."""
         level = len(self.available) - 1
         ranges = self.available[level]
         sizes = [(r["endX"] - r["startX"] + 1) * (r["endY"] - r["startY"] + 1) for r in ranges]
@@ -61,8 +61,8 @@ def view(layer, z, x, y):
 
 
 EARTH_M = 6_371_000
-LEVEL_ZERO_ERROR_M = 77_067.34  # what clients take a root to be off by
-PIXELS_FOR_ERROR = 1080 / (2 * math.tan(math.radians(60) / 2))  # of a metre, a metre away, on a screen 1080 high
+LEVEL_ZERO_ERROR_M = 77_067.34  # the error that clients assume for a root
+PIXELS_FOR_ERROR = 1080 / (2 * math.tan(math.radians(60) / 2))  # of one metre at a distance of one metre, on a screen of 1080 lines
 MOST_PIXELS = 2
 
 
@@ -93,7 +93,7 @@ def seen(layer, camera):
 
 
 def flight(layer, start, end, frames=40, top_m=400_000, bottom_m=1_500):
-    """The tiles that a camera on its way asks for, each once."""
+    """The tiles that a moving camera requests, each once."""
     have = set()
 
     def middle(place):

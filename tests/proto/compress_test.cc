@@ -123,8 +123,8 @@ TEST(Compress, LongTextsComeBack) {
   }
 }
 
-// A text that requests a stop when its second piece is first read, and counts the pages that are read after it: its
-// pages cannot be read until the handler of the fault has counted them.
+// A text that requests a stop when its second piece is first read, and counts the pages read afterwards. Its pages are
+// protected, and a handler of the fault counts each page and makes it readable.
 class WatchedText {
  public:
   static constexpr std::size_t kPieces = 16, kSize = kPieces * kCompressedAtOnce;

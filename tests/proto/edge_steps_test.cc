@@ -25,7 +25,7 @@ TEST(NeededStep, LeavesHalfOfTheFormatForRounding) {
   EXPECT_EQ(NeededStep(5, 5), kHeightResolution);
 }
 
-// The rule that makes cracks impossible: both sides of an edge, and all four tiles of a corner, derive the same step.
+// This rule prevents cracks: both tiles of an edge, and all four tiles of a corner, derive the same step.
 TEST(EdgeSteps, AgreeBetweenNeighbours) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> relief(0, 9000);

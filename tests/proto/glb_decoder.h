@@ -1,5 +1,5 @@
-// Reads GLB tiles as a client does: container, JSON, arrays or Draco or meshopt, node matrix, y-up to z-up. Shares no
-// code with the encoder.
+// Reads GLB tiles as a client does: container, JSON, plain arrays, Draco or meshopt, node matrix, y-up to z-up. Shares
+// no code with the encoder.
 #pragma once
 
 #include <array>
@@ -24,17 +24,17 @@ struct DecodedGlb {
   std::string image;                      // bytes of the only image; empty: none
 };
 
-// Nothing where anything is missing, left over or out of range: counts and lengths that disagree, an index without a
-// vertex, a view outside its buffer.
+// Returns nothing if anything is missing, left over or out of range: counts and lengths that disagree, an index without
+// a vertex, a view outside its buffer.
 std::optional<DecodedGlb> DecodeGlb(std::string_view bytes);
 
-// The corners of the triangles as positions, each triangle begun at its smallest corner, sorted: equal for two tiles
-// that draw the same surface, whatever their order.
+// The corners of the triangles as positions, each triangle starting at its smallest corner, sorted: equal for two tiles
+// with the same surface, whatever the order of their triangles.
 using Corner = std::array<double, 3>;
 std::vector<std::array<Corner, 3>> Surface(const DecodedGlb& glb);
 
-// The sides of triangles that no other triangle has in the opposite sense: the open border. A side that two triangles
-// have in the same sense is counted in `doubled`.
+// Sides of triangles that no other triangle has in the opposite direction: the open border. `doubled` counts sides that
+// two triangles have in the same direction.
 struct OpenSides {
   std::vector<std::array<Corner, 2>> sides;
   int doubled = 0;

@@ -45,7 +45,7 @@ DecodedGlb DecodedTexture(const GridMesh& mesh, const GlbOptions& options) {
   return glb.value_or(DecodedGlb{});
 }
 
-// Bowring's iteration, degrees: independent of the encoder, which goes the other way.
+// Degrees by Bowring's iteration, independent of the encoder, which computes the inverse.
 std::array<double, 2> Degrees(const geo::Vec3& p) {
   const double a = geo::kSemiMajorAxis, b = geo::kSemiMinorAxis, e2 = 1 - b * b / (a * a);
   const double r = std::hypot(p.x, p.y);
@@ -58,7 +58,7 @@ std::array<double, 2> Degrees(const geo::Vec3& p) {
   return {std::atan2(p.y, p.x) * kDegrees, latitude * kDegrees};
 }
 
-// The picture's edges are the tile's, its top the tile's north; skirts hang below their rim.
+// The edges of the texture are those of the tile, with north at the top. Skirts are below their rim.
 TEST(GlbTexture, EveryVertexIsWhereThePictureShowsIt) {
   for (const int cells : {32, 256}) {
     const GridMesh mesh = TexturedTile(kKey, cells);
@@ -114,7 +114,7 @@ TEST(GlbTexture, TilesWithoutOneAreAsBefore) {
   }
 }
 
-// Where a pole's row of nodes is one point, triangles are left out and vertices merged.
+// The row of a pole is one point, so triangles are left out and vertices merged.
 TEST(GlbTexture, SurvivesThePoles) {
   for (const geo::TileKey key : {geo::TileKey{0, 0, 0}, geo::TileKey{4, 3, 15}}) {
     for (const GlbCompression compression : kEachCompression) {

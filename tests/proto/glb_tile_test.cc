@@ -41,7 +41,7 @@ GlbTile Encode(const GridMesh& mesh, GlbCompression compression, DracoOptions dr
   return tile.value_or(GlbTile{});
 }
 
-// What the grid says, without any encoding between.
+// The mesh on the grid, without encoding.
 DecodedGlb Truth(const GridMesh& mesh) {
   DecodedGlb glb;
   for (const auto& p : mesh.positions) {
@@ -65,7 +65,7 @@ void ExpectTile(const GridMesh& mesh, const GlbTile& tile, double widest_normal_
     EXPECT_EQ(accessor.at("min").at(axis), (*low)[axis]);
     EXPECT_EQ(accessor.at("max").at(axis), (*high)[axis]);
   }
-  // Normals come back at their own vertices: positions are unique here but for merged ones.
+  // Normals must be at their vertices; positions are unique here except for merged ones.
   std::map<Corner, std::vector<geo::Vec3>> normals;
   const DecodedGlb truth = Truth(mesh);
   for (std::size_t k = 0; k < mesh.normals.size(); ++k) {
@@ -118,7 +118,7 @@ TEST(GlbTile, IsClosedButForTheFeetOfItsSkirts) {
     ASSERT_TRUE(glb.has_value());
     const OpenSides open = OpenSidesOf(*glb);
     EXPECT_EQ(open.doubled, 0);
-    // One ring: every foot is left once and reached once. A pole has one point.
+    // The feet form one ring: each has one outgoing and one incoming side. A pole has one point.
     std::map<Corner, int> degree;
     for (const auto& [from, to] : open.sides) {
       ++degree[from];
@@ -147,7 +147,7 @@ TEST(GlbTile, SaysWhatClientsNeed) {
   EXPECT_EQ(json(GlbCompression::kDraco).at("extensionsRequired"), nlohmann::json({"KHR_draco_mesh_compression"}));
   EXPECT_EQ(json(GlbCompression::kMeshopt).at("extensionsRequired"),
             nlohmann::json({"KHR_mesh_quantization", "EXT_meshopt_compression"}));
-  // The matrix of y-up content that is ECEF once the client has turned it: translation (x, z, -y).
+  // Clients rotate the y-up content to ECEF, so the translation is (x, z, -y).
   const auto matrix = json(GlbCompression::kNone).at("nodes").at(0).at("matrix").get<std::vector<double>>();
   const std::vector<double> turn(matrix.begin(), matrix.begin() + 12);
   EXPECT_EQ(turn, (std::vector<double>{1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0}));
@@ -174,7 +174,7 @@ TEST(GlbTile, TakesFloatsWhereSixteenBitsAreTooFew) {
   }
 }
 
-// A kilometre of cliff on a tile of a metre: the grid gives way, the coders do not fail.
+// A cliff of a kilometre on a tile of a metre: the grid gets coarser, and the encoders do not fail.
 TEST(GlbTile, SurvivesCliffsBeyondTheGrid) {
   const GridMesh mesh = Tile({24, 7, 9}, 32, 2, geo::kFinestStep, 4000);
   EXPECT_GT(mesh.step_m, GridStep({24, 32}, geo::LadderError(24, geo::kFinestStep), PositionWidth::kFloat));
@@ -233,7 +233,7 @@ TEST(TileErrorMeter, SeesTheGridsRounding) {
         .MeasureFlat(mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step))
         .max_m;
   };
-  // A vertex moves by sqrt(3) / 2 of a step at most, on slopes of up to 50 m over 38 m by latitude and 31 m by
+  // A vertex moves by at most sqrt(3) / 2 of a step, on slopes of up to 50 m over 38 m of latitude and 31 m of
   // longitude.
   constexpr double kMost = 0.87 * (1 + 2.1);
   EXPECT_LE(measured(1.0 / 64), kMost / 64);

@@ -25,7 +25,7 @@ TEST(GridStep, IsAPowerOfTwoWithinItsShareOfTheError) {
           const double grid = GridStep({level, cells}, error, width);
           EXPECT_EQ(grid, std::exp2(std::round(std::log2(grid))));
           EXPECT_LE(grid, std::max(error / 32, std::exp2(-16)));
-          // The longest side of a tile is its diagonal, and the Earth's is less than twice its axis.
+          // The largest extent of a tile is its diagonal, and that of the Earth less than twice its semi-major axis.
           EXPECT_LT(std::min(std::sqrt(2.0) * side, 2.0 * geo::kSemiMajorAxis), std::exp2(23) * grid);
         }
       }
@@ -35,7 +35,7 @@ TEST(GridStep, IsAPowerOfTwoWithinItsShareOfTheError) {
   }
 }
 
-// Half of a cube's diagonal is the farthest that rounding moves a point.
+// Rounding moves a point by at most half of a cube's diagonal.
 TEST(GridStep, KeepsFloatsWithinACentimetreOfTheBorder) {
   for (int level = 9; level <= geo::kMaxLevel; ++level) {
     for (int step = geo::kCoarsestStep; step <= geo::kFinestStep; ++step) {
@@ -47,10 +47,10 @@ TEST(GridStep, KeepsFloatsWithinACentimetreOfTheBorder) {
   EXPECT_EQ(GridStep({2, 256}, geo::LadderError(2, 0), PositionWidth::kFloat), 1);
 }
 
-// Tiles that meet: inside, across the two roots, across the antimeridian, beside the poles.
+// Pairs of neighbours: inside a root, across both roots, across the antimeridian, beside the poles.
 struct Meeting {
   geo::TileKey a, b;
-  bool east;  // b lies east of a; else north
+  bool east;  // b is east of a, else north
 };
 
 std::vector<Meeting> Meetings() {
@@ -163,7 +163,7 @@ TEST(MakeGridMesh, HangsSkirtsStraightDownFromEveryEdgeVertex) {
   }
 }
 
-// Away from the tile's middle and never into it: a ray from the middle of the tile leaves through the skirts' backs.
+// Skirts face away from the middle of the tile, so a ray from the middle passes through their backs.
 TEST(MakeGridMesh, SkirtsFaceOutwards) {
   const GlobalGround ground({9, 533, 388}, 32, Scattered(500));
   const tin::TinMesh mesh = RegularMesh(32, 4);
@@ -183,7 +183,7 @@ TEST(MakeGridMesh, SkirtsFaceOutwards) {
   EXPECT_EQ(walls, 64);
 }
 
-// All of the pole's row is one point; near it whole columns merge.
+// The row of a pole is one point; near it whole columns merge.
 TEST(MakeGridMesh, IsClosedAtThePoles) {
   for (const int level : {0, 2, 5}) {
     for (const std::int64_t y : {std::int64_t{0}, geo::TileRows(level) - 1}) {

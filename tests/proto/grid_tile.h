@@ -15,7 +15,7 @@ using QuantizedHeight = std::function<std::uint16_t(int column, int row)>;
 QuantizedTile GridTile(const geo::TileKey& key, int columns, int rows, float min_height, float max_height,
                        const QuantizedHeight& height);
 
-// Scattered heights that reach both 0 and 32767, the same in every run.
+// Random heights that include 0 and 32767, the same in every run.
 QuantizedHeight Rugged();
 
 }  // namespace terrace::proto

@@ -1,4 +1,4 @@
-// Lattices with heights of one's own, and meshes over them, for tests of what is made from them.
+// Lattices with given heights, and meshes over them, for tests of encoders.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 
 namespace terrace::proto {
 
-// By global column (not wrapped) and global row, metres.
+// Metres by global column (not wrapped) and global row.
 using GlobalHeight = std::function<double(std::int64_t column, std::int64_t row)>;
 
 struct GlobalGround {
@@ -31,7 +31,7 @@ struct GlobalGround {
       for (int i = -1; i <= cells + 1; ++i) {
         const std::int64_t column = ((lattice.FirstColumn(tile) + i) % columns + columns) % columns;
         const std::int64_t row = std::clamp<std::int64_t>(lattice.FirstRow(tile) + j, 0, rows);
-        const bool pole = row == 0 || row == rows;  // one value, as the contract of DemSource says
+        const bool pole = row == 0 || row == rows;  // has one height, by the contract of DemSource
         heights.push_back(static_cast<float>(std::floor(height(pole ? 0 : column, row) * 1024) / 1024));
       }
     }
@@ -39,7 +39,7 @@ struct GlobalGround {
   LatticeView view() const { return {key, lattice, heights}; }
 };
 
-// Heights between 0 and `relief`, without any order: the same for the same seed.
+// Random heights between 0 and `relief`, the same for the same seed.
 struct RandomGround {
   geo::TileKey key;
   geo::Lattice lattice;
@@ -50,7 +50,7 @@ struct RandomGround {
     for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
       heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
     }
-    // A pole has one height, as the contract of DemSource says.
+    // A pole has one height, by the contract of DemSource.
     const std::size_t stride = static_cast<std::size_t>(cells) + 3;
     const std::int64_t south = lattice.FirstRow(tile), north = south + cells;
     if (south == 0) std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(stride), stride, heights[stride]);
@@ -74,7 +74,7 @@ inline tin::TinMesh GreedyMesh(const LatticeView& lattice, const tin::GreedyGoal
   return triangulation.Mesh();
 }
 
-// Scattered heights between 0 and `relief`, the same in every run.
+// Random heights between 0 and `relief`, the same in every run.
 inline GlobalHeight Scattered(double relief) {
   return [relief](std::int64_t column, std::int64_t row) {
     std::uint64_t mixed = static_cast<std::uint64_t>(column) * 0x9e3779b97f4a7c15 + static_cast<std::uint64_t>(row);
@@ -83,7 +83,7 @@ inline GlobalHeight Scattered(double relief) {
   };
 }
 
-// Every `stride`-th sample, two triangles a cell. The corners stand first, as in every TinMesh.
+// Every `stride`-th sample, two triangles a cell. The corners are first, as in every TinMesh.
 inline tin::TinMesh RegularMesh(int cells, int stride) {
   tin::TinMesh mesh;
   const int side = cells / stride + 1;

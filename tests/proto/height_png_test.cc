@@ -1,4 +1,4 @@
-// What libpng, which is not the encoder, reads.
+// Height images decoded by libpng, which the encoder does not use.
 #include "proto/documents/height_png.h"
 
 #include <gtest/gtest.h>

@@ -10,7 +10,7 @@ namespace {
 using Levels = std::vector<std::vector<geo::TileRange>>;
 using Keys = std::vector<geo::TileKey>;
 
-// What a dataset offers whose deepest tiles are `deepest`: those, all ancestors, and both roots.
+// The tiles of a dataset whose deepest tiles are `deepest`: those, all ancestors, and both roots.
 Levels Above(const std::vector<geo::TileRange>& deepest, int max_level) {
   Levels levels(static_cast<std::size_t>(max_level) + 1);
   for (int level = 1; level <= max_level; ++level) {
@@ -134,7 +134,7 @@ void Walk(const Levels& available, const std::vector<TreeRoot>& trees, Named& na
   }
 }
 
-// A client that inherits the heights and skirts of a root far above asks for twice the tiles.
+// If a client inherits the heights and skirts of a root far above, it requests twice the tiles.
 TEST(ImplicitTrees, AreNoTallerThanASubtreeOverAnIslandOfTheGlobe) {
   const Levels available = GlobeAnd(5, {9000, 9000, 9040, 9030}, 14);
   Named named;
@@ -167,8 +167,8 @@ TEST(ImplicitTrees, OfADeepGlobeAreNamedNoFurtherThanADocumentHolds) {
   EXPECT_EQ(named.tallest, 11);
 }
 
-// loaders.gl asks for every subtree of a tree before it draws: 13 levels in subtrees of 6 end in one for each deepest
-// tile, 24,633 of them for an island.
+// loaders.gl requests every subtree of a tree before it draws. 13 levels in subtrees of 6 have one subtree for each
+// deepest tile, 24,633 of them for an island.
 TEST(SubtreeLevels, AreEqualSoThatTheLastSubtreesAreFew) {
   for (int levels = 1; levels <= geo::kMaxLevel + 1; ++levels) {
     const int each = SubtreeLevels(levels), stacked = (levels + each - 1) / each;

@@ -63,7 +63,7 @@ std::array<double, 3> StoredVertex(const Glb& glb, std::size_t i) {
   return p;
 }
 
-// The position of a vertex in the mesh's own axes: node matrix applied, then y-up turned back to z-up.
+// The position of a vertex in the axes of the mesh: applies the node matrix, then rotates y-up to z-up.
 MeshVertex GlbVertex(const Glb& glb, std::size_t i) {
   const auto m = glb.json.at("nodes").at(0).at("matrix").get<std::array<double, 16>>();
   const std::array<double, 3> stored = StoredVertex(glb, i);
@@ -161,7 +161,7 @@ TEST(MeshFile, GlbHoldsTheGridOfARasterItself) {
       EXPECT_NEAR(v.y, t[3] + g.x * t[4] + g.y * t[5], 1e-15 * 6e6);
       EXPECT_EQ(v.z, g.z);
     }
-    // The accessor's bounds are those of what is stored, and the matrix mirrors nothing.
+    // The accessor's bounds are those of the stored values, and the matrix does not mirror.
     const Json& accessor = glb.json.at("accessors").at(0);
     EXPECT_EQ(accessor.at("max").at(0), 32767.5);
     EXPECT_EQ(accessor.at("max").at(1), 8848.86F);
@@ -171,7 +171,7 @@ TEST(MeshFile, GlbHoldsTheGridOfARasterItself) {
   }
 }
 
-// No node of glTF is sheared: positions are rounded then, as those of other meshes.
+// A glTF node cannot be sheared, so positions are rounded, as those of other meshes.
 TEST(MeshFile, GlbOfAShearedRasterHasItsCoordinates) {
   const GridPlacement sheared = {100, 2, 1, 200, 0, -2};
   const std::vector<MeshVertex> grid = {{0.5, 0.5, 1}, {9.5, 0.5, 2}, {9.5, 7.5, 3}, {0.5, 7.5, 4}};
@@ -321,7 +321,7 @@ TEST(MeshFile, ReportsAFailingStream) {
   }
 }
 
-// Requests a stop with the first bytes that are written, and counts those after it.
+// Requests a stop when the first bytes are written, and counts later bytes.
 class StopAtFirstWrite : public std::streambuf {
  public:
   std::stop_source source;
@@ -342,7 +342,7 @@ TEST(WriteMesh, EndsSoonAfterAStop) {
   for (const MeshFileFormat format : {MeshFileFormat::kObj, MeshFileFormat::kPly, MeshFileFormat::kGlb}) {
     StopAtFirstWrite buffer;
     std::ostream out(&buffer);
-    if (format == MeshFileFormat::kGlb) buffer.source.request_stop();  // it is made as a whole before it is written
+    if (format == MeshFileFormat::kGlb) buffer.source.request_stop();  // a GLB is made completely before it is written
     const Result<void> written = WriteMesh(out, format, vertices, triangles, {}, {}, buffer.source.get_token());
     ASSERT_FALSE(written);
     EXPECT_EQ(written.error().code, ErrorCode::kCancelled);

@@ -11,7 +11,7 @@ namespace {
 
 using Bytes = std::array<std::uint8_t, 2>;
 
-// What CesiumJS's AttributeCompression.octEncode gives.
+// The results of CesiumJS's AttributeCompression.octEncode.
 TEST(OctEncode, AxesAreTheBytesOfCesium) {
   EXPECT_EQ(OctEncode({0, 0, 1}), (Bytes{128, 128}));
   EXPECT_EQ(OctEncode({0, 0, -1}), (Bytes{255, 255}));

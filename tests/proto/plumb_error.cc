@@ -7,13 +7,13 @@
 namespace terrace::proto {
 namespace {
 
-// The plumb line passes the first corner further off than any of the other two lie from it.
+// The plumb line is further from the first corner than both other corners are.
 bool IsFarFrom(const geo::Vec3& foot, const geo::Vec3& up, const geo::Vec3& a, const geo::Vec3& b, const geo::Vec3& c) {
   return geo::Length(geo::Cross(a - foot, up)) > std::max(geo::Length(b - a), geo::Length(c - a)) * 1.01 + 1;
 }
 
-// Triangles that are not far from every plumb line of a block of nodes: of those neither the feet nor the directions
-// differ from the middle one's by more than is added. All nodes against every triangle would take minutes.
+// Triangles that may be near a plumb line of a block of nodes. The margin is the largest difference of the block's feet
+// and directions from those of its middle node. Testing all nodes against every triangle would take minutes.
 std::vector<std::size_t> NearBlock(const LatticeView& lattice, int west, int south, int side,
                                    const std::vector<geo::Vec3>& ecef,
                                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -52,7 +52,7 @@ FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Ve
   const auto length = [](const Vector& a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); };
   FlatError largest;
   constexpr int kBlock = 8;
-  std::vector<std::vector<std::size_t>> near;  // of a row of blocks
+  std::vector<std::vector<std::size_t>> near;  // for a row of blocks
   for (int j = 0; j <= lattice.cells(); ++j) {
     if (j % kBlock == 0) {
       near.clear();

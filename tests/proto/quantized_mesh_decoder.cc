@@ -6,7 +6,7 @@
 namespace terrace::proto {
 namespace {
 
-// Assembles little-endian values byte by byte; after the first read past the end everything is zero.
+// Assembles little-endian values byte by byte. After the first read past the end all values are zero.
 class Cursor {
  public:
   explicit Cursor(std::string_view bytes) : bytes_(bytes) {}
@@ -31,7 +31,8 @@ class Cursor {
     return {x, y, z};
   }
   void AlignTo(std::size_t width) { Bytes((width - at_ % width) % width); }
-  // False, and failed, if `count` items of `width` bytes cannot follow: no allocation is larger than the input.
+  // Fails and returns false if fewer than `count` items of `width` bytes are left, so no allocation is larger than the
+  // input.
   bool Holds(std::uint64_t count, std::uint64_t width) {
     if (count * width > left()) failed_ = true;
     return !failed_;

@@ -1,5 +1,5 @@
-// A decoder of quantized-mesh-1.0 for tests, written from the format's description (CesiumGS/quantized-mesh README) and
-// sharing no code with the encoder. Bounds-checked: any input is safe.
+// A decoder of quantized-mesh-1.0 for tests, written from the format's description (CesiumGS/quantized-mesh README). It
+// shares no code with the encoder, and is safe for any input.
 #pragma once
 
 #include <array>
@@ -26,10 +26,10 @@ struct DecodedTile {
   std::vector<DecodedExtension> extensions;
 };
 
-// Nothing where the bytes end early, an index has no vertex, or bytes are left over that are no extension.
+// Returns nothing if the bytes end early, an index has no vertex, or bytes are left over that are not an extension.
 std::optional<DecodedTile> DecodeQuantizedMesh(std::string_view bytes);
 
-// The inverse of the octvertexnormals encoding, as CesiumJS's AttributeCompression.octDecode.
+// The inverse of the octvertexnormals encoding, like CesiumJS's AttributeCompression.octDecode.
 std::array<double, 3> DecodeOctNormal(std::uint8_t x, std::uint8_t y);
 
 }  // namespace terrace::proto

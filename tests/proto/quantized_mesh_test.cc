@@ -87,7 +87,7 @@ void ExpectCompleteEdges(const DecodedTile& tile) {
 TEST(QuantizedMesh, TwoTrianglesAreTheseBytes) {
   const std::string expected =
       "78cd774e20d65341b68960c1d9f8324135ad82cacf724a41"  // centre
-      "0000484100102044"                                  // least and greatest height
+      "0000484100102044"                                  // lowest and highest height
       "78cd774e20d65341b68960c1d9f8324135ad82cacf724a41"  // sphere's centre
       "0445908422e6c840"                                  // sphere's radius
       "a89fa6be5c17ea3fe778616350f4c83f223ffe71df73e13f"  // horizon occlusion point

@@ -65,7 +65,7 @@ bool ParentsExist(const ReadSubtree& subtree, int levels) {
   return true;
 }
 
-// A property of the only table, row by row, spread over the bits of its tiles.
+// A property of the only table, row by row, assigned to the bits of the tiles.
 Result<std::vector<float>> ReadProperty(const Json& json, const char* name, const BitList& tiles,
                                         std::string_view binary) {
   const Json& tables = json.at("propertyTables");

@@ -139,7 +139,7 @@ TEST(Subtree, SeparateBlocksOfALevelAreAllThere) {
   EXPECT_EQ(read->tiles, (BitList{true, true, false, true, true}));
 }
 
-// Different for each tile, and for no order of them but the right one.
+// Different for each tile, so that a wrong order is noticed.
 HeightSpan HeightsOf(const geo::TileKey& key) {
   const auto number = static_cast<double>(1000 * key.level + 31 * key.x + key.y);
   return {-number - 0.25, number + 0.5};
@@ -158,7 +158,7 @@ TEST(Subtree, EveryTileHasHeightsThatHoldThoseBelowIt) {
       for (std::int64_t y = 0; y < 1 << level; ++y) {
         for (std::int64_t x = 0; x < 1 << level; ++x) {
           if (!subtree->tiles[static_cast<std::size_t>(level)][0].Contains({level, x, y})) continue;
-          // Its own numbers are less than those of the highest tile of the deepest level below it.
+          // The tile's own heights are less than those of the highest tile of the deepest level below it.
           const int down = levels - 1 - level;
           const geo::TileRange& deepest = subtree->tiles[static_cast<std::size_t>(levels - 1)][0];
           const HeightSpan expected = HeightsOf({levels - 1, std::min(((x + 1) << down) - 1, deepest.end_x),

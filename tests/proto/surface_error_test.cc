@@ -14,7 +14,7 @@
 namespace terrace::proto {
 namespace {
 
-// Bilinear between the four samples around a place.
+// Bilinear between the four samples around a position.
 double LatticeHeight(const LatticeView& lattice, double x, double y) {
   const int i = std::min(static_cast<int>(x), lattice.cells() - 1),
             j = std::min(static_cast<int>(y), lattice.cells() - 1);
@@ -23,8 +23,8 @@ double LatticeHeight(const LatticeView& lattice, double x, double y) {
          (1 - x) * y * lattice.At(i, j + 1) + x * y * lattice.At(i + 1, j + 1);
 }
 
-// Where the plumb line of a point meets the ellipsoid, in lattice steps, and metres above it. By repeated substitution
-// into the definition of geodetic latitude, which needs no formula of its own.
+// The foot of a point's plumb line on the ellipsoid in lattice steps, and the height above it in metres. Computed by
+// repeated substitution into the definition of geodetic latitude.
 struct Foot {
   double x = 0, y = 0, height = 0;
 };
@@ -49,7 +49,7 @@ struct Largest {
   double planar = 0, drawn = 0;
 };
 
-// Many places of every triangle, and its rim, against the lattice surface.
+// Compares many points of every triangle and of its rim with the lattice surface.
 Largest Sampled(const LatticeView& lattice, const std::vector<std::array<double, 2>>& places,
                 const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -89,7 +89,7 @@ Largest SampledTile(const LatticeView& lattice, const QuantizedTile& tile) {
   return Sampled(lattice, places, heights, DecodePositions(tile), tile.triangles);
 }
 
-// Where the surface is a saddle inside a cell, the worst place of an edge is neither a sample nor a crossing.
+// If the surface is a saddle inside a cell, the largest error on an edge is neither at a sample nor at a crossing.
 TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
   for (unsigned seed = 1; seed <= 12; ++seed) {
     const RandomGround ground({12, 3000, 2000}, 32, 300, seed);
@@ -105,7 +105,7 @@ TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
 }
 
 TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
-  // All samples on the mesh but those of one cell's diagonal: what is measured lies between samples.
+  // All samples are on the mesh except those of one cell's diagonal, so the measured error is between samples.
   RandomGround ground({12, 3000, 2000}, 32, 0, 1);
   const auto set = [&](int i, int j, float height) {
     ground.heights[static_cast<std::size_t>(j + 1) * 35 + static_cast<std::size_t>(i + 1)] = height;
@@ -131,7 +131,7 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
       const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile));
       const Largest sampled = SampledTile(ground.view(), tile);
       EXPECT_GE(measured, std::max(sampled.drawn, sampled.planar)) << level << " " << latitude;
-      // What is added for the bending between samples shrinks with the square of the cells.
+      // The term for the curvature between samples decreases with the square of the cell size.
       const double cell = 180.0 / 64 / (1 << level) * 111320;
       EXPECT_LE(measured, std::max(sampled.drawn, sampled.planar) * 1.2 + 2 * cell * cell / 6.3e6 + 0.5) << level;
 

@@ -23,7 +23,7 @@ std::vector<std::uint8_t> Ramp() {
   return rgb;
 }
 
-// By GDAL, which knows nothing of the encoder. Bands one after another.
+// Decodes with GDAL, independently of the encoder. Returns one band after the other.
 std::vector<std::uint8_t> Decode(std::string bytes) {
   GDALAllRegister();
   const std::string name = "/vsimem/texture_test";

@@ -19,7 +19,7 @@ namespace {
 
 EdgeSteps FineSteps() { return {{0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}, {0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}}; }
 
-// Every node against every triangle, by signs of areas alone.
+// Measures every node against every triangle, by signs of areas.
 double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
   const std::int64_t cells = lattice.cells();
   double largest = 0;
@@ -64,10 +64,11 @@ TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
   }
 }
 
-// Rounded positions leave the nodes, so that slivers lie between rows and edges pass nodes by a hair.
+// Rounded positions are not nodes, so slivers are between rows, and edges pass very close to nodes.
 TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
   for (const int cells : {32, 64}) {
-    // The reference looks for every sample in every triangle: few of the large ones, which are slow under sanitizers.
+    // The reference searches every triangle for every sample, which is slow under sanitizers, so there are few large
+    // tiles.
     for (unsigned seed = 0; seed < 6; seed += cells == 32 ? 1 : 5) {
       const RandomGround ground({9, 300, 400}, cells, 256, seed);
       const QuantizedTile tile =
@@ -117,8 +118,8 @@ void ExpectEqual(const TileError& a, const TileError& b) {
   }
 }
 
-// Round by round: what is inserted moves the tile's lowest and highest vertex, and with them all heights, in some
-// rounds and not in others. Then another reading, a mesh of other triangles, and the same one twice.
+// Several rounds: in some of them an inserted sample changes the tile's lowest or highest vertex, and so all heights.
+// Then other heights, a mesh of other triangles, and the same mesh twice.
 TEST(TileErrorMeter, MeasuresAsIfItWereTheFirstTime) {
   const RandomGround ground({9, 300, 400}, 64, 256, 9);
   TileErrorMeter meter(ground.view(), 60);

@@ -54,7 +54,7 @@ class Occluder {
   Vec3 camera_;
 };
 
-// Cameras 10 m to 30,000 km up, most of them where the tile is about to rise over the horizon.
+// Cameras at heights of 10 m to 30,000 km; from most of them the tile is close to the horizon.
 std::vector<Vec3> CamerasAround(const QuantizedTile& tile, Vec3 center, int count) {
   std::mt19937 random(7);
   const auto next = [&] { return static_cast<double>(random()) / 4294967296.0; };
@@ -132,7 +132,8 @@ TEST(EnclosingSphere, ContainsEveryVertex) {
 }
 
 TEST(EnclosingSphere, IsNearTheSmallest) {
-  // No sphere is smaller than half the largest distance; the smallest one is at most 1.155 times that (Jung 1901).
+  // The radius of every enclosing sphere is at least half the largest distance; the smallest one has at most 1.155
+  // times that (Jung 1901).
   for (const geo::TileKey& key : kKeys) {
     const QuantizedTile tile = RuggedTile(key, {-430, 1200});
     const std::vector<Vec3> positions = DecodePositions(tile);
@@ -158,7 +159,7 @@ TEST(HorizonOcclusionPoint, IsSeenWheneverAnyVertexIs) {
       const Vec3 center = EnclosingSphere(positions).center;
       const Vec3 point = HorizonOcclusionPoint(positions, center, tile.min_height);
       const double shrink = std::max(0.0, -static_cast<double>(tile.min_height));
-      // On the ellipsoid itself, and on the one that CesiumJS shrinks down to the tile's lowest vertex.
+      // For the ellipsoid, and for the one that CesiumJS shrinks to the tile's lowest vertex.
       for (double occluder_shrink : {0.0, shrink}) {
         int seen = 0, culled = 0;
         for (const Vec3& camera : CamerasAround(tile, center, 400)) {
@@ -175,7 +176,7 @@ TEST(HorizonOcclusionPoint, IsSeenWheneverAnyVertexIs) {
   }
 }
 
-// The same value by angles instead of their sines and cosines.
+// Computes the same value from angles instead of their sines and cosines.
 TEST(HorizonOcclusionPoint, LiesWhereTheOutermostTangentMeetsTheDirection) {
   for (const geo::TileKey& key : kKeys) {
     if (key.level < 1) continue;

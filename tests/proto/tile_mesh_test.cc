@@ -13,7 +13,7 @@
 namespace terrace::proto {
 namespace {
 
-// A lattice with heights of one's own.
+// A lattice with given heights.
 struct Ground {
   geo::TileKey key;
   geo::Lattice lattice;
@@ -105,7 +105,7 @@ TEST(QuantizeTile, KeepsAFlatTileFlat) {
 }
 
 TEST(TileErrorMeter, FindsOneLiftedSample) {
-  // So small a tile that the Earth is flat.
+  // The tile is so small that the Earth's curvature does not matter.
   const Ground ground({18, 138240, 184320}, 64, [](int i, int j) { return i == 20 && j == 31 ? 107.5 : 100; });
   const QuantizedTile tile = QuantizeTile(ground.view(), TwoTriangles(64), AllSteps(0.25));
   const TileError error = TileErrorMeter(ground.view(), 5).Measure(tile);
@@ -132,7 +132,7 @@ TEST(TileErrorMeter, SeesEverySampleOfAFullMesh) {
   EXPECT_LE(TileErrorMeter(ground.view(), 1).Measure(tile).max_m, 1.0 / 128 + 2 * 100 * 128 / (2.0 * kQuantizedMax));
 }
 
-// Two flat triangles over an ocean tile cut below it by the sagitta: clients.md's table says 60 m at level 9, equator.
+// Two flat triangles over an ocean tile are below it by the sagitta: 60 m at level 9 at the equator.
 TEST(TileErrorMeter, CountsTheCurvatureOfTheEarth) {
   const Ground ground({9, 512, 256}, 64, [](int, int) { return 0; });
   const QuantizedTile tile = QuantizeTile(ground.view(), TwoTriangles(64), AllSteps(1));

@@ -45,7 +45,7 @@ TEST(TileMetadata, KeepsALevelWithoutTiles) {
   EXPECT_EQ(EncodeTileMetadata({1, 0, 0}, kAvailable, 2), R"({"available":[[],[]]})");
 }
 
-// What all tiles of a level say together is what layer.json lists.
+// The metadata of all tiles of a level together is equal to layer.json.
 TEST(TileMetadata, TogetherCoverWhatIsAvailable) {
   std::int64_t tiles = 0;
   for (std::int64_t x = 0; x < 2; ++x) {

@@ -75,7 +75,7 @@ TEST(TileNormals, AreEqualOnBothSidesOfAnEdge) {
   const auto ground_of = [&](const geo::TileKey& key) {
     return SampledGround(key, [&height, key](int i, int j) { return height(key.x * kCells + i, key.y * kCells + j); });
   };
-  // Other insides, the same edge.
+  // Different inner vertices, the same edge.
   const tin::TinMesh left = Fan(9, 20), right = Fan(27, 3);
   const SampledGround a = ground_of(west), b = ground_of(east);
   const EdgeSteps steps{{1, 1, 1, 1}, {1, 1, 1, 1}};
@@ -85,7 +85,7 @@ TEST(TileNormals, AreEqualOnBothSidesOfAnEdge) {
   EXPECT_EQ(of_west[2], of_east[3]);
 }
 
-// A lone spike: the lattice says level at its top's flank, the mesh is steep there.
+// A single spike: the lattice's gradient is level beside its top, but the mesh is steep there.
 TEST(TileNormals, StayNearTheMeshInside) {
   const geo::TileKey key{13, 8192, 4096};
   const SampledGround ground(key, [](int i, int j) { return i == 17 && j == 16 ? 2000 : 0; });
@@ -96,13 +96,13 @@ TEST(TileNormals, StayNearTheMeshInside) {
   EXPECT_GT(DegreesBetween(normals[4], up), 11);
 }
 
-// One step wide, across a corner: whichever way it falls, level ground at its head and foot is lit as such. A slope of
-// two steps is one.
+// A cliff one step wide, across a corner: in both directions the normals of level ground at its top and foot are level.
+// A slope of two steps counts as a slope.
 TEST(TileNormals, OnEdgesACliffIsNoSlope) {
   const geo::TileKey key{13, 8192, 4096};
   constexpr double kCliff = 3000;
   for (const bool is_along_x : {true, false}) {
-    for (const int end : {-1, 0, 1, 2}) {  // where it is level again
+    for (const int end : {-1, 0, 1, 2}) {  // where the ground is level again
       const SampledGround ground(key, [&](int i, int j) { return (is_along_x ? i : j) < end ? kCliff : 0; });
       const auto normals = NormalsOf(ground, Fan(16, 16));
       const geo::Vec3 up = geo::SurfaceNormal(ground.view().Longitude(0), ground.view().Latitude(0));

@@ -84,7 +84,7 @@ TEST(Tileset, SeveralRootsAreChildrenWithoutContentAbove) {
   EXPECT_EQ(root.at("boundingVolume").at("region")[2], east[2]);
 }
 
-// No client agrees with another about regions across the antimeridian.
+// Clients disagree about regions across the antimeridian.
 TEST(Tileset, RootsAcrossTheAntimeridianLieInASphere) {
   TilesetDescription tileset = Maui();
   for (const auto& roots : {std::vector<geo::TileKey>{{7, 0, 110}, {7, 255, 110}},
@@ -116,7 +116,7 @@ TEST(Tileset, RootsAcrossTheAntimeridianLieInASphere) {
   }
 }
 
-// loaders.gl makes of a region of hemispheres a box that misses most of it.
+// For a region of a hemisphere loaders.gl makes a box that misses most of it.
 TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   TilesetDescription tileset = Maui();
   tileset.roots.clear();
@@ -136,7 +136,7 @@ TEST(Tileset, RootsOfTheGlobeLieInASphere) {
   EXPECT_EQ(root.at("children").back().at("boundingVolume").at("region")[2], std::numbers::pi);
 }
 
-// Clients look at the middle of the sphere: of a map of the Arctic that is the pole.
+// Clients aim at the centre of the sphere, which for a map of the Arctic is the pole.
 TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
   for (const std::int64_t y : {0, 3}) {
     TilesetDescription tileset = Maui();
@@ -160,7 +160,7 @@ TEST(Tileset, RootsAllAroundAPoleLieInASphereAboutIt) {
   }
 }
 
-// loaders.gl makes of a region with a corner at a pole a box without width.
+// For a region with a corner at a pole loaders.gl makes a box without width.
 TEST(Tileset, TilesBesideThePolesAreBoundedBySpheres) {
   TilesetDescription tileset = Maui();
   tileset.content_query = "error=5";

@@ -10,7 +10,7 @@
 namespace terrace::proto {
 namespace {
 
-// Heights at global nodes; the halo is NaN, as nobody may look at it.
+// Heights at global nodes; the halo is NaN, because it must not be read.
 struct WaterTile {
   WaterTile(geo::TileKey key, int cells, const std::function<float(std::int64_t, std::int64_t)>& height)
       : view{key, {key.level, cells}, {}} {
@@ -66,7 +66,7 @@ TEST(SeaLevelMask, ACoastIsWaterByItsShare) {
   }
 }
 
-// The same ground seen by a tile and by its neighbour: a mask shifted by a tile is the other's mask.
+// The same ground in a tile and in its neighbour: the masks are equal after a shift by one tile.
 TEST(SeaLevelMask, IsAFunctionOfTheGlobalPosition) {
   const auto waves = [](std::int64_t column, std::int64_t row) {
     return static_cast<float>(static_cast<int>((column * 7 + row * 13) % 32) - 16);  // repeats every 32 columns

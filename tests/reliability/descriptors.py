@@ -1,4 +1,4 @@
-"""A server with few file descriptors and a disk cache of more files than these (row 39)."""
+"""A server with fewer file descriptors than its disk cache has files (row 39)."""
 import dataclasses
 import json
 import os
@@ -19,9 +19,9 @@ CLIENTS = 6
 
 @dataclasses.dataclass
 class Told:
-    wrong: list  # what must not be
+    wrong: list  # replies that violate the promise
     files: int = 0  # of records, on disk
-    most: int = 0  # descriptors that were open at a time
+    most: int = 0  # largest number of open descriptors
     tables: int = 0  # of records among them
     requests: int = 0
 
@@ -31,7 +31,7 @@ class Told:
 
 
 class Watch:
-    """What a process has open, looked at all the time."""
+    """Polls the open descriptors of a process."""
 
     def __init__(self, pid, told):
         self.pid, self.told, self.stop = pid, told, threading.Event()
@@ -58,7 +58,7 @@ class Watch:
 
 
 def targets(datasets):
-    """Tiles of two errors each: with their refinements some 24 MB a dataset."""
+    """Tiles at two errors each; with their refinements about 24 MB a dataset."""
     for dataset in datasets:
         for level, columns, rows in ((10, range(543, 546), range(717, 720)), (11, range(1087, 1092), range(1435, 1439))):
             for column in columns:
@@ -95,7 +95,7 @@ def ask_all(url, wanted, told):
 
 
 def metric(url, name):
-    """Its values; nothing where there is no answer."""
+    """Values of the metric; nothing if there is no reply."""
     try:
         with urllib.request.urlopen(url + "metrics", timeout=30) as reply:
             return [float(value) for value in re.findall(rf"^{name}(?:{{.*}})? (\S+)$", reply.read().decode(), re.M)]
@@ -104,7 +104,7 @@ def metric(url, name):
 
 
 def serve_with_few(binary, source_dir, folder, limit):
-    """Fills the two stores, beside it datasets come with a reload; then once more with full ones."""
+    """Fills the two stores while a reload adds datasets; then starts again with full stores."""
     told = Told([])
     names = ["a", "b", "c", "d"]
     for name in names:
@@ -114,7 +114,7 @@ def serve_with_few(binary, source_dir, folder, limit):
     def write(count):
         beside = folder / "beside.json"
         beside.write_text(json.dumps({
-            # Datasets that are the same but for their names would share their tiles.
+            # Datasets that differ only in their names would share their tiles.
             "datasets": [{"name": name, "sources": [f"{name}.tif"], "attribution": name} for name in names[:count]],
             "worker_threads": 2, "cache_bytes": 0,
             "refinement_cache_bytes": 0, "log_level": "warn",

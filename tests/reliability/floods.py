@@ -1,6 +1,6 @@
-"""Floods of one client beside polite requests of another, and hundreds of patient connections (rows 37, 38 and 42).
+"""Floods of one client beside single requests of another, and hundreds of waiting connections (rows 37, 38 and 42).
 
-Clients are told apart by what a trusted proxy says of them: the server must be started with --trusted-proxies 127.0.0.1.
+A trusted proxy's header names the client of each request: start the server with --trusted-proxies 127.0.0.1.
 """
 import contextlib
 import http.client
@@ -35,7 +35,7 @@ def post(body, who, length=None):
 
 
 def status_of(port, message, timeout=120):
-    """Of a request on a connection of its own, the reply read to its end; 0 where there was none."""
+    """Sends a request on a new connection and reads the whole reply. Returns its status, 0 if there was no reply."""
     try:
         with socket.create_connection(("127.0.0.1", port), timeout) as connection:
             connection.sendall(message)
@@ -48,7 +48,7 @@ def status_of(port, message, timeout=120):
 
 
 def patient(port, connections, tiles_each, targets):
-    """As many connections at once, each with so many cold tiles one after the other: {status: count} and the slowest in seconds."""
+    """Opens connections in parallel, each of which requests cold tiles one by one: {status: count}, and seconds of the slowest."""
     statuses, lock, slowest = {}, threading.Lock(), [0]
 
     def run(targets):
@@ -69,7 +69,7 @@ def patient(port, connections, tiles_each, targets):
 
 @contextlib.contextmanager
 def repeated(port, count, message):
-    """So many connections ask, and ask again, until the end; cut off then."""
+    """Connections that repeat a request until the end, where they are cut off."""
     stop, sockets, lock = threading.Event(), set(), threading.Lock()
 
     def run():
@@ -103,7 +103,7 @@ def repeated(port, count, message):
 
 @contextlib.contextmanager
 def trickled(port, count):
-    """So many uploads that have sent 20 kB of 640, and send a little more ten times a second."""
+    """Uploads that have sent 20 kB of 640, and send a little more ten times a second."""
     stop, connections = threading.Event(), []
     for _ in range(count):
         connection = socket.create_connection(("127.0.0.1", port), 10)
@@ -128,7 +128,7 @@ def trickled(port, count):
 
 
 def floods(port):
-    """Each flood, beside the polite requests that it has kept from their answers."""
+    """For each flood, the single requests of other clients that failed because of it."""
     mesh = "/jacksboro/mesh?bbox=-84.4,36.1,-84.1,36.4&error=1"
     body = json.dumps({"locations": POINTS})
     tiles = cold_tiles("jacksboro", -84.25, 36.3)
@@ -143,7 +143,7 @@ def floods(port):
 
 
 def beside(flood, polite, port, times):
-    """{kind: {status: count}} of the polite requests while the flood goes on."""
+    """{kind: {status: count}} of the single requests during the flood."""
     statuses = {}
     with flood:
         for _ in range(times):
@@ -155,7 +155,7 @@ def beside(flood, polite, port, times):
 
 
 def leave(port, count, at_once):
-    """Uploads of 600 kB that are sent whole, and whose clients leave at once. Each asks for as many heights as a worker takes a while for."""
+    """Sends complete uploads of 600 kB and disconnects. Each requests so many heights that a worker takes a while."""
     body = json.dumps({"locations": "|".join(f"{36.2 + i * 2e-5:.5f},{-84.4 + i * 3e-5:.5f}" for i in range(9000))})
     message = post(body + " " * (600_000 - len(body)), FLOOD)
 

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Writes a folder of elevation rasters like those of a product of the whole Earth: one a degree, most of each not stored.
+"""Writes a folder of elevation rasters like those of a global product: one a degree, each sparse.
 
     tests/reliability/many_sources.py FOLDER [--count N] [--cells FILE] [--pixels N]
 
-Cells are named by their south-western corners (N46E008). Without a file of them: around the Earth from 85 degrees south on.
-Pixels grow longer towards the poles, as Copernicus' do, so that not all cells lie on one grid.
+Cells are named by their south-western corners (N46E008). Without a file of cells they go around the Earth from 85 degrees south on.
+Pixels are longer towards the poles, as in Copernicus, so not all cells are on one grid.
 """
 import argparse
 import math
@@ -34,7 +34,7 @@ def corner(text):
 
 
 def columns(latitude, pixels):
-    """Of a cell, by the latitude of its edge nearer to the equator."""
+    """Columns of a cell, by the latitude of its edge nearer to the equator."""
     edge = latitude if latitude >= 0 else -latitude - 1
     shares = {50: 1, 60: 2 / 3, 70: 1 / 2, 80: 1 / 3, 85: 1 / 5, 90: 1 / 10}
     return round(pixels * next(share for end, share in shares.items() if edge < end))
@@ -54,7 +54,7 @@ def raster(latitude, longitude, pixels, heights):
     offsets, counts = [0] * (across * down), [0] * (across * down)
     keys = (1, 1, 0, 3, 1024, 0, 1, 2, 1025, 0, 1, 1, 2048, 0, 1, 4326)
     x, y = 1 / width, 1 / height
-    tags = [  # number, type, values; without values of less than four bytes their place in the file
+    tags = [  # number, type, values; values longer than four bytes are stored elsewhere, with their offset here
         (256, "H", (width,)), (257, "H", (height,)), (258, "H", (16,)), (259, "H", (8,)), (262, "H", (1,)), (277, "H", (1,)),
         (322, "H", (TILE,)), (323, "H", (TILE,)), (324, "I", offsets), (325, "I", counts), (339, "H", (2,)),
         (33550, "d", (x, y, 0)), (33922, "d", (0, 0, 0, longitude, latitude + 1, 0)), (34735, "H", keys),
@@ -78,7 +78,7 @@ def raster(latitude, longitude, pixels, heights):
 
 
 def write(folder, wanted, pixels=3600):
-    """Returns how many."""
+    """Returns the number of rasters."""
     heights = block()
     folder.mkdir(parents=True, exist_ok=True)
     count = 0

@@ -1,7 +1,7 @@
-"""A server that is restarted on a listening socket which somebody else holds, under clients that keep their connections (row 43).
+"""Restarts a server on a listening socket that another process holds, under clients with persistent connections (row 43).
 
-A client sends a request again only where HTTP lets it (RFC 9112, section 9.3.1): the connection had been used before, and was closed,
-not reset, before a byte of the reply had come.
+A client repeats a request only if HTTP allows it (RFC 9112, section 9.3.1): the connection had been used before, and was closed,
+not reset, before the first byte of the reply.
 """
 import contextlib
 import fcntl
@@ -18,7 +18,7 @@ import time
 SAMPLES = pathlib.Path(__file__).resolve().parents[2] / "config/samples/samples.json"
 TARGETS = [f"/jacksboro/11/{column}/{row}.{suffix}" for column in range(1087, 1092) for row in range(1435, 1439)
            for suffix in ("terrain", "glb")] + ["/jacksboro/layer.json", "/earth/0/0/0.terrain", "/datasets"]
-# As systemd does it: the socket is descriptor 3, and the variables are for this process.
+# As systemd does: the socket is descriptor 3, and the variables name this process.
 PASS = 'export LISTEN_PID=$$ LISTEN_FDS=1; exec "${@:2}" 3<&"$1"'
 
 
@@ -43,7 +43,7 @@ class HeldSocket:
 
 @contextlib.contextmanager
 def leased(path):
-    """Opening the file waits for up to 45 s meanwhile, as on a mount that does not answer."""
+    """While this is active, opening the file blocks for up to 45 s, as on a mount that does not answer."""
     before = signal.signal(signal.SIGIO, signal.SIG_IGN)
     with open(path, "rb+") as file:
         fcntl.fcntl(file, fcntl.F_SETLEASE, fcntl.F_WRLCK)
@@ -52,11 +52,11 @@ def leased(path):
 
 
 class Lost(Exception):
-    """A request that has no answer."""
+    """A request got no reply."""
 
 
 class PatientClient:
-    """Asks on one connection for as long as that stands."""
+    """Sends requests on one connection as long as it stays open."""
 
     def __init__(self, port, timeout=60):
         self.port, self.timeout, self.connection, self.again = port, timeout, None, 0
@@ -82,7 +82,7 @@ class PatientClient:
             self.again += 1
 
     def exchange(self, target, was_used):
-        """The status, or nothing where the request may be sent again."""
+        """The status, or nothing if the request may be repeated."""
         reply = b""
         try:
             self.connection.sendall(f"GET {target} HTTP/1.1\r\nHost: x\r\n\r\n".encode())
@@ -112,7 +112,7 @@ class PatientClient:
 
 
 class Load:
-    """So many clients that ask over and over, with pauses of up to a second now and then; `failures` has what went wrong."""
+    """Clients that send requests in a loop, with occasional pauses of up to a second; `failures` lists errors."""
 
     def __init__(self, port, clients, targets):
         self.stop, self.failures, self.count, self.again, self.slowest = threading.Event(), [], 0, 0, 0
@@ -151,7 +151,7 @@ class Load:
 
 
 def restart_under_load(binary, times, clients, targets, *arguments):
-    """The load, after so many restarts; each server has ended with status 0."""
+    """Runs the load during the restarts, and returns it. Each server must end with status 0."""
     with HeldSocket() as held, contextlib.ExitStack() as after:
         def start():
             process = held.start(binary, "serve", *arguments, stderr=subprocess.DEVNULL)
@@ -162,7 +162,7 @@ def restart_under_load(binary, times, clients, targets, *arguments):
         process = start()
         load = Load(held.port, clients, targets)
         with load:
-            process.stdout.readline()  # it is ready
+            process.stdout.readline()  # returns when the server is ready
             for _ in range(times):
                 time.sleep(0.5)
                 os.kill(process.pid, signal.SIGTERM)

@@ -1,4 +1,4 @@
-"""The rows of docs/reliability.md that a client can try on the real binary. Each returns (kept, figures)."""
+"""The rows of docs/reliability.md that a client can test on the real binary. Each returns (kept, figures)."""
 import itertools
 import json
 import math
@@ -26,7 +26,7 @@ HOT = "/earth/0/0/0.terrain"
 
 
 def run_tests(binary, pattern, long=False):
-    """Runs GoogleTest's tests: what each of them reports."""
+    """Runs GoogleTest tests, and returns the report of each."""
     with tempfile.NamedTemporaryFile(suffix=".json") as report:
         subprocess.run([str(binary), f"--gtest_filter={pattern}", f"--gtest_output=json:{report.name}"], stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL, timeout=14400 if long else 600, check=False,
@@ -40,7 +40,7 @@ def recorded_by(case):
 
 
 def tests(binary, pattern):
-    """Runs GoogleTest's tests: (all passed and there were some, how many, what they recorded, those that did not)."""
+    """Runs GoogleTest tests: (whether there were any and all passed, their number, recorded properties, failed tests)."""
     cases = run_tests(binary, pattern)
     recorded = {key: value for case in cases for key, value in recorded_by(case).items()}
     failed = [case["name"] for case in cases if case.get("failures") or case.get("result") == "SKIPPED"]
@@ -48,12 +48,12 @@ def tests(binary, pattern):
 
 
 def binary_of(test_binary, path):
-    """Of another test in the same build: "http/server_http_test" beside server_test."""
+    """The binary of another test in the same build, such as "http/server_http_test" beside server_test."""
     return (test_binary.parent / path).resolve()
 
 
 def fuzzed(test_binary, *names):
-    """Runs fuzz targets' smoke tests, which replay the corpus and try so many inputs made from it."""
+    """Runs smoke tests of fuzz targets, which replay the corpus and run the given number of inputs derived from it."""
     kept, runs = True, []
     for name in names:
         passed, _, recorded, _ = tests(binary_of(test_binary, f"../fuzz/{name}_fuzz_smoke_test"), "*")
@@ -128,8 +128,8 @@ def latencies(server, count):
     return times
 
 
-# A process of its own: opens 1,000 connections, sends a byte of a header on each once a second, evenly spread, and
-# prints how many were still open when the time was over and how old the oldest became.
+# A separate process: opens 1,000 connections, sends one byte of a header on each once a second, evenly distributed, and
+# prints how many were still open at the end, and the age of the oldest.
 SLOW_SENDERS = """
 import select, socket, sys, time
 opened, sockets, poll, oldest = {}, {}, select.epoll(), 0
@@ -241,7 +241,7 @@ def row_14(binary, _, __):
     times, statuses = [], {}
     with Server(binary) as server, server.connect() as connection:
         for target in abuse():
-            best = math.inf  # of five: what other processes take is not the server's
+            best = math.inf  # of five, because other processes delay some
             for _ in range(5):
                 begun = time.perf_counter()
                 connection.sendall(get(target))
@@ -283,7 +283,7 @@ def row_15(binary, _, __):
 
 
 def tiles_of(dataset, level):
-    """Column and row of the tiles around the middle of the sample data of 36.3 N, 84.25 W."""
+    """Columns and rows of the tiles around 36.3 N, 84.25 W, the centre of the sample data."""
     assert dataset == "jacksboro"
     width = 180 / 2 ** level
     x, y = int((180 - 84.25) / width), int((90 + 36.3) / width)
@@ -305,8 +305,8 @@ def row_18(_, test_binary, __):
     return kept, f"{recorded.get('files', 0)} files, each in a process of its own: " + ("0 crashes, hangs or over 512 MB" if kept else "FAILED")
 
 
-# A process of its own: 200 connections ask for one tile at the same time. Prints the milliseconds until the first reply and until
-# the last was read whole, and how many were 200.
+# A separate process: 200 connections request one tile at the same time. Prints the milliseconds until the first and
+# until the last reply was read completely, and how many replies were 200.
 CROWD = """
 import select, socket, sys, time
 port, target = int(sys.argv[1]), sys.argv[2]
@@ -354,14 +354,14 @@ def row_20(_, test_binary, __):
 
 
 def tiles():
-    """Distinct tiles of about equal work, over and over at other errors of the ladder."""
+    """Distinct tiles of about equal work, repeated at other errors of the ladder."""
     for step in range(4, 41):
         for y, x in itertools.product(range(2871, 2877), range(2176, 2182)):
             yield f"/jacksboro/12/{x}/{y}.terrain?fraction={0.5 * 2 ** ((16 - step) / 4):.6f}"
 
 
 def load(server, connections, seconds, targets):
-    """Closed loop: [(status, has Retry-After)], each client on with the next target at once."""
+    """Closed loop: each client requests the next target without a pause. Returns (status, has Retry-After, in time) of each."""
     lock, results, end = threading.Lock(), [], time.monotonic() + seconds
 
     def run():
@@ -381,7 +381,7 @@ def load(server, connections, seconds, targets):
     return results
 
 
-# A process of its own: asks for a cached tile 50 times a second, and prints the 99th percentile of the milliseconds.
+# A separate process: requests a cached tile 50 times a second, and prints the 99th percentile in milliseconds.
 HOT_ASKER = """
 import socket, sys, time
 port, target, seconds = int(sys.argv[1]), sys.argv[2], float(sys.argv[3])
@@ -420,7 +420,7 @@ def row_21(binary, _, __):
 
 
 def row_22(binary, _, __):
-    """A crawler asks for every tile there is, others for the same few over and over."""
+    """A crawler requests all tiles, while others repeatedly request the same few."""
     capacity, found, scanned, asked = 2 << 20, 0, 0, 0
     hot = itertools.cycle([f"/earth/3/{x}/{y}.terrain" for x in range(5) for y in range(4)])
     with Server(binary, "--cache-bytes", str(capacity)) as server, server.connect(60) as connection:
@@ -447,7 +447,7 @@ def row_23(binary, _, __):
     count = 10_000
     with Server(binary, "--worker-threads", "1", "--cache-bytes", "4MiB", "--refinement-cache-bytes", "4MiB") as server:
         targets = itertools.cycle(list(tiles()))
-        # Each tile once: what the largest build takes for itself stays with its thread, and is no leak.
+        # Builds each tile once first: a thread keeps the working memory of its largest build, which is not a leak.
         for target in tiles():
             assert fetch(server, target)[0] == 200
         idle = server.sockets()
@@ -471,14 +471,14 @@ def reset_one(server, target):
 
 
 def end_to_end(binary, script, *names, long=False):
-    """Runs some of a script's tests: (all passed, what they printed with figures in it)."""
+    """Runs some tests of a script: (whether all passed, the printed lines with figures)."""
     root = pathlib.Path(__file__).resolve().parents[2]
     options = [part for name in names for part in ("-k", name)]
     done = subprocess.run([sys.executable, root / "tests/e2e" / script, binary, root, *options], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
                           env=os.environ | ({"TERRACE_LONG_TESTS": "1"} if long else {}), check=False)
     lines = [line.lstrip(".") for line in done.stderr.splitlines() if re.search(r": .*\d|seen after", line)]
     last = done.stderr.strip().splitlines()[-1]
-    passed = done.returncode == 0 and "skipped=" not in last  # what could not be tried is not kept
+    passed = done.returncode == 0 and "skipped=" not in last  # a skipped test is not kept
     return passed, "; ".join(lines) if passed else last
 
 
@@ -542,7 +542,7 @@ def row_32(binary, _, long):
                                 broken.append(1)
                                 return
                 except OSError:
-                    if pending:  # a reply had begun
+                    if pending:  # a reply had started
                         broken.append(1)
 
             threads = [threading.Thread(target=run) for _ in range(8)]
@@ -563,7 +563,7 @@ def row_32(binary, _, long):
 def row_33(binary, _, long):
     seconds = 600 if long else 90
     samples, tally, words = soak.soak(binary, seconds)
-    # A short run, or one on a busy machine, does not fill the caches, and so grows.
+    # A short run, or one on a busy machine, does not fill the caches, so memory still grows.
     return soak.kept(samples, tally, 1 if long else math.inf), soak.told(seconds, samples, tally, words)
 
 
@@ -574,7 +574,7 @@ def row_34(_, test_binary, __):
 
 
 def row_37(binary, _, __):
-    """RSS beside a flood that keeps the workers busy, before 260 clients send whole uploads and leave, and at most while they do."""
+    """While a flood keeps the workers busy: RSS before 260 clients send complete uploads and disconnect, and its peak meanwhile."""
     with Server(binary, "--worker-threads", "2", "--trusted-proxies", "127.0.0.1") as server:
         everything, _ = floods.floods(server.port)
         with everything["12 meshes"]:
@@ -602,7 +602,7 @@ def row_38(binary, test_binary, long):
 
 
 def row_42(binary, _, long):
-    """Clients that never retry: as many connections at once as a crowd of them has, each with cold tiles one after the other."""
+    """Many connections of clients that never retry; each requests cold tiles one by one."""
     connections, tiles_each = 480, 2
     with Server(binary, "--worker-threads", "2", "--cache-bytes", "0", "--refinement-cache-bytes", "0") as server:
         told, kept = [], True
@@ -628,7 +628,7 @@ def row_43(binary, _, __):
 
 
 def row_46(binary, _, long):
-    """Many sources around the Earth, started twice, and the cost of cold tiles beside the antimeridian with and without the others."""
+    """Starts twice with many sources around the Earth, and measures cold tiles beside the antimeridian with and without the others."""
     count, pixels = (24_649, 3600) if long else (2_000, 600)
     place = (-83, -180)
     with tempfile.TemporaryDirectory() as scratch:
@@ -643,7 +643,7 @@ def row_46(binary, _, long):
             return server, time.monotonic() - begun
 
         def tile_cost(server, dem):
-            """Processor seconds of a tile, of which every request builds one."""
+            """Processor seconds of a tile; every request builds it."""
             targets = [f"/{dem.name}/9/{x}/{y}.terrain?error={error}" for x in (0, 1) for y in (20, 21) for error in (3, 5, 9, 20, 40)]
             statuses = [fetch(server, target, timeout=60)[0] for target in targets]
             begun = server.cpu_seconds()
@@ -666,7 +666,7 @@ def row_46(binary, _, long):
 
 
 def row_47(_, test_binary, long):
-    """Both errors that a tile's head states, by brute force on its bytes. Cases whose data is missing are skipped and told."""
+    """Checks both errors in a tile's headers by brute force on its bytes. Cases without data are skipped and reported."""
     told, kept = [], True
     for name, states in (("stated", "Terrain-Max-Error"), ("certified", "Terrain-Certified-Error")):
         cases = run_tests(binary_of(test_binary, f"tiles/{name}_error_test"), "*", long)

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Tries what docs/reliability.md promises about clients, and prints one line a row.
+"""Tests what docs/reliability.md promises about clients, and prints one line a row.
 
     tests/reliability/run.py [--binary FILE] [--tests FILE] [--long] [ROW ...]      ROW: 8, 9 ...; default: all
 
-Exit status 1 if a row is not kept. The machine should be quiet: rows with times in them are measured here and now.
+Exit status 1 if a row is not kept. The machine should have no other load, because some rows measure times.
 """
 import argparse
 import os
@@ -27,13 +27,13 @@ def main():
     arguments = parser.parse_args()
     known = {int(name[4:]): row for name, row in vars(rows).items() if name.startswith("row_")}
     caches = tempfile.TemporaryDirectory()
-    os.environ["XDG_CACHE_HOME"] = caches.name  # of all servers, not the home of whoever runs this
+    os.environ["XDG_CACHE_HOME"] = caches.name  # for all servers, instead of the user's home
     failed = []
     for number in sorted(arguments.rows or known):
         begun = time.monotonic()
         try:
             kept, figures = known[number](arguments.binary, arguments.tests, arguments.long)
-        except Exception:  # a row that cannot be tried is not kept
+        except Exception:  # a row that cannot be tested is not kept
             kept, figures = False, traceback.format_exc().strip().splitlines()[-1]
             traceback.print_exc()
         if not kept:

@@ -1,4 +1,4 @@
-"""The real binary on a free port, what the system tells about its process, and sockets that speak to it."""
+"""Starts the real binary on a free port, reads data about its process from the system, and talks to it over sockets."""
 import os
 import pathlib
 import re
@@ -26,7 +26,7 @@ class Server:
         self.port = int(re.search(r":(\d+)/", line)[1])
         self.pid = self.process.pid
         while prefix and (children := pathlib.Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text().split()):
-            self.pid = int(children[0])  # what the prefix starts may start another
+            self.pid = int(children[0])  # the prefix may start another process
 
     def __enter__(self):
         return self
@@ -56,10 +56,10 @@ class Server:
 
 
 class MemoryGroup:
-    """A cgroup with so many bytes, where the system lets one be made; `prefix` starts a command in it."""
+    """A cgroup with a memory limit, if the system allows one; `prefix` starts a command in it."""
 
     def __init__(self, limit):
-        one = pathlib.Path("/sys/fs/cgroup/memory")  # version 1, else 2
+        one = pathlib.Path("/sys/fs/cgroup/memory")  # cgroup version 1, else 2
         self.folder = (one if one.is_dir() else one.parent) / f"terrace-{os.getpid()}"
         self.prefix, self.words = (), "in no cgroup (none could be made)"
         try:
@@ -71,7 +71,7 @@ class MemoryGroup:
         self.words = f"in a cgroup of {limit >> 20} MB"
 
     def usage_mb(self):
-        """What the group holds in MB: all of it, memory of processes, pages of files. Nothing where there is no group."""
+        """Memory of the group in MB: in all, of processes, and pages of files. Nothing without a group."""
         if not self.prefix:
             return {}
         one = (self.folder / "memory.usage_in_bytes").exists()
@@ -93,7 +93,7 @@ def get(target, fields=""):
 
 
 def read_reply(connection, pending=b""):
-    """(status, fields, body, rest), or None where the connection ended before a whole reply; OSError as it comes."""
+    """(status, fields, body, rest), or None if the connection ended before a complete reply. Raises OSError."""
     while b"\r\n\r\n" not in pending:
         piece = connection.recv(65536)
         if not piece:
@@ -113,7 +113,7 @@ def read_reply(connection, pending=b""):
 
 
 def fetch(server, target, fields="", timeout=10):
-    """One request on a connection of its own: (status, fields, body), or None."""
+    """One request on a new connection: (status, fields, body), or None."""
     with server.connect(timeout) as connection:
         connection.sendall(get(target, fields + "Connection: close\r\n"))
         reply = read_reply(connection)
@@ -126,7 +126,7 @@ def percentile(values, share):
 
 
 def wait_until(condition, seconds):
-    """How long it took, or None."""
+    """Seconds until the condition was true, or None."""
     begun = time.monotonic()
     while time.monotonic() - begun < seconds:
         if condition():

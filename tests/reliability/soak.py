@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Row 33: mixed traffic for a while on a server in a small cgroup; every reply must be one that its request may get.
+"""Row 33: mixed traffic on a server in a small cgroup. Every request has a list of allowed replies.
 
     tests/reliability/soak.py [--binary FILE] [--seconds N] [--clients N] [--samples FILE]
 
---samples writes what was measured every few seconds as JSON, for tools/plot_soak.py.
+--samples writes the measurements, one every few seconds, as JSON for tools/plot_soak.py.
 """
 import argparse
 import collections
@@ -31,11 +31,11 @@ MESH = {200}
 
 @dataclasses.dataclass(frozen=True)
 class Ask:
-    """One request and the only answers that it may get."""
+    """One request and its allowed replies."""
     kind: str
     message: bytes
     expected: frozenset
-    head: bool = False  # the reply has no body, whatever its length says
+    head: bool = False  # the reply has no body, whatever its Content-Length
     closes: bool = False  # the server ends the connection after the reply
 
 
@@ -44,7 +44,7 @@ def ask(kind, target, expected, fields="", **more):
 
 
 class Client:
-    """Draws requests as one client would send them; keeps the ETags that it was told."""
+    """Draws random requests of one client, and keeps the ETags of its replies."""
 
     def __init__(self, seed):
         self.random, self.etags = random.Random(seed), {}
@@ -69,7 +69,7 @@ class Client:
         return ask("hot tile", self.hot_target(), {200}, self.random.choice(CODINGS))
 
     def known(self):
-        """Of a tile that it has already: the same bytes have the same ETag, also after the tile was dropped and built again."""
+        """Requests a tile that the client has: the same bytes have the same ETag, also if the tile left the cache and was built again."""
         target = self.hot_target()
         if target in self.etags:
             return ask("tile it has", target, {304}, f"If-None-Match: {self.etags[target]}\r\n")
@@ -123,7 +123,7 @@ class Client:
 
 
 class Pauses:
-    """When all of this was stopped from outside (a debugger, a suspended machine): what waited meanwhile says nothing."""
+    """Detects when the whole test was stopped from outside (a debugger, a suspended machine). Waits during that time do not count."""
 
     def __init__(self, end):
         self.last, self.seconds = 0.0, 0.0  # when the last one ended; all together
@@ -140,7 +140,7 @@ class Pauses:
             seen = now
 
     def since(self, moment):
-        time.sleep(0.5)  # so that the watch has looked
+        time.sleep(0.5)  # gives the watching thread time to look
         return self.last >= moment
 
 
@@ -162,7 +162,7 @@ class Tally:
 
 
 def converse(server, client, tally, leaves, end):
-    """Requests on one connection until the server ends it or the client has had enough; `leaves`: in mid-reply, by a reset."""
+    """Sends requests on one connection until the server closes it or the client stops; with `leaves` the client resets it during a reply."""
     with server.connect(60) as connection:
         for _ in range(200):
             if time.monotonic() > end:
@@ -192,7 +192,7 @@ def converse(server, client, tally, leaves, end):
 
 
 def soak(binary, seconds, clients=6, period=None):
-    """(samples, tally, words about the cgroup): a sample is seconds since the start, then MB."""
+    """(samples, tally, text about the cgroup); a sample has the seconds since the start, then MB."""
     period = period or min(5, seconds / 60)
     flags = [part for flag, size in CACHES.items() for part in (flag, f"{size}MiB")]
     samples, group = [], MemoryGroup(CGROUP_BYTES)
@@ -206,7 +206,7 @@ def soak(binary, seconds, clients=6, period=None):
             while time.monotonic() < end:
                 try:
                     converse(server, client, tally, seed % 2 == 1, end)
-                except OSError as error:  # no connection, or one that was closed before a request had gone
+                except OSError as error:  # no connection, or it was closed before a request was sent
                     with tally.lock:
                         tally.unexpected[f"{type(error).__name__} of a connection"] += 1
                     time.sleep(0.1)

@@ -1,5 +1,4 @@
-// What becomes of a request when one of the allocations on its way fails: the nth, for every n. A program of its own,
-// as it replaces operator new.
+// Requests in which the nth allocation fails, for every n. A separate program, because it replaces operator new.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -12,7 +11,7 @@
 namespace {
 
 std::atomic<long> left_until_failure{-1};  // below 0: none fails
-thread_local bool is_test_thread = false;  // its allocations are not the server's
+thread_local bool is_test_thread = false;  // allocations of this thread never fail
 
 void* Allocate(std::size_t size, std::size_t alignment) {
   if (!is_test_thread && left_until_failure.load(std::memory_order_relaxed) >= 0 &&
@@ -49,7 +48,7 @@ class FailingAllocations : public ServerFixture {
  protected:
   void SetUp() override { is_test_thread = true; }
 
-  // Fails the nth allocation of the server while it answers `request`, for every n until none is left to fail.
+  // Fails the nth allocation of the server while it answers `request`, for every n up to the number of allocations.
   void TryAll(const std::string& request, std::set<int> allowed, ServerOptions options = {}) {
     Start(std::move(options));
     RawClient warm(port());

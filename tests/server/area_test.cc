@@ -1,4 +1,4 @@
-// Meshes of areas over HTTP: headers, refusals, load; what is planned and built is a function that the tests steer.
+// Meshes of areas over HTTP: headers, refusals, load. Tests replace the functions that plan and build.
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -15,7 +15,7 @@ constexpr const char* kArea = "/maui/mesh?bbox=-157,20,-156,21&error=5";
 
 class AreaTest : public ServerFixture {
  protected:
-  // Plans every area but those of less than a metre, and builds what tells its own error.
+  // Plans every area with an error of at least a metre, and builds a text with its error.
   void StartAreas(ServerOptions options = {}) {
     area_mesher_.plan = [](std::uint32_t, const tiler::AreaRequest& area) -> Result<tiler::AreaPlan> {
       if (area.error_m < 1) return MakeError(ErrorCode::kInvalidArgument, "ask for 1 m or more");

@@ -1,4 +1,4 @@
-// Connections as clients treat them: half closed, begun and left, more than there may be.
+// Connections that clients half close, abandon, or open in too large a number.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -13,7 +13,8 @@ using namespace std::chrono_literals;
 
 class Connections : public ServerFixture {};
 
-// RFC 9293, section 3.6: who has closed one direction may still receive. The build outlasts every look at the client.
+// RFC 9293, section 3.6: a client that has closed one direction may still receive. The build takes longer than the
+// server's checks of the client.
 TEST_F(Connections, AClientThatEndsItsSendingGetsItsTile) {
   build_ms_ = 900;
   Start();
@@ -56,7 +57,7 @@ TEST_F(Connections, ARequestThatIsServedKeepsItsPlace) {
   EXPECT_EQ(reply->status, 200);
 }
 
-// Whoever sends its requests' bodies byte by byte, or asks for more than all others, does not keep others out.
+// A client that sends bodies byte by byte, or requests more than all others, does not block the others.
 TEST_F(Connections, NewcomersTakeThePlacesOfUnfinishedBodiesAndOfBusyFloods) {
   build_ms_ = 3000;
   ServerOptions options;

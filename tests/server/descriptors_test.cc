@@ -1,4 +1,4 @@
-// The budget of file descriptors: whatever the limit, the parts never come to more than it.
+// The budget of file descriptors: for every limit, the sum of the parts is at most the limit.
 #include "server/descriptors.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,8 @@
 namespace terrace::server {
 namespace {
 
-// Counted anew, with every part at its most: each thread that uses a source has it and its overviews open.
+// Computes the sum independently, with every part at its maximum: each thread that uses a source has it and its
+// overviews open.
 std::size_t MostOf(const DescriptorDemand& demand, const DescriptorBudget& budget, std::size_t in_use) {
   const std::size_t threads = demand.worker_threads + 2;
   const std::size_t of_loops = 3 * demand.io_threads, of_listening = 2, of_signals = 2, of_proj = 1, passing = 1;

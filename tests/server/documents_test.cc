@@ -1,5 +1,4 @@
-// Documents with parameters in them: where they are made, and that they are what they were when all were made
-// beforehand.
+// Documents with parameters: on which thread they are made, and that they are equal to documents made in advance.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -18,7 +17,7 @@ using namespace std::chrono_literals;
 
 class DocumentsTest : public ServerFixture {
  protected:
-  // Builds wait until the gate is open, longer than anybody waits for them.
+  // Builds block until the test opens the gate.
   DocumentsTest() {
     builder_ = [this](const tiler::TileRequest&, const std::stop_token&) -> Result<tiler::EncodedTile> {
       ++builds_;
@@ -91,8 +90,8 @@ TEST_F(DocumentsTest, AreMadeOnWorkersAndKept) {
   Open(true);
 }
 
-// They tell the heights of up to 5,461 tiles, each of them a question to the source's tables: no work for a thread that
-// talks to clients, however short the reply.
+// They contain the heights of up to 5,461 tiles, and each needs the source's tables: too much work for an io thread,
+// although the reply is short.
 TEST_F(DocumentsTest, SubtreesAreMadeOnWorkersAndKept) {
   DatasetView tall;
   tall.name = "tall";

@@ -76,14 +76,15 @@ TEST_F(Drain, CancelsWhatDoesNotFinishInTime) {
   EXPECT_LT(std::chrono::steady_clock::now() - begun, 4s);
 }
 
-// Until /readyz says so, on a connection of its own.
+// Waits until /readyz says so, on separate connections.
 void WaitUntilDraining(std::uint16_t port) {
   EXPECT_TRUE(Eventually([&] { return Fetch(port, "/readyz").body == "draining\n"; }));
 }
 
 TEST_F(Drain, AnswersAnotherRequestOnIdleConnectionsAndTheFirstOfNewOnes) {
   ServerOptions options;
-  options.config.drain_timeout = options.drain_grace = 60s;  // no more is needed: each connection ends with its reply
+  options.config.drain_timeout = options.drain_grace =
+      60s;  // is not used up, because each connection ends with its reply
   Start(options);
   RawClient idle(port()), unused(port());
   idle.Send(Get("/livez"));

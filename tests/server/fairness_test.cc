@@ -16,12 +16,12 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Clients are told apart by what a proxy says of them.
+// A proxy's header identifies the clients.
 std::string From(const std::string& client) { return "X-Forwarded-For: " + client + "\r\n"; }
 
 class Fairness : public ServerFixture {
  protected:
-  // Workers stop in every piece of work until they are let go. Work is noted in the order in which it begins.
+  // Workers block in every job until the test releases them. The test records jobs in the order in which they start.
   void StartHeld(ServerOptions options = {}) {
     builder_ = [this](const tiler::TileRequest& request, std::stop_token stop) -> Result<tiler::EncodedTile> {
       Begin(geo::ToString(request.key), stop);
@@ -50,7 +50,7 @@ class Fairness : public ServerFixture {
   }
   void TearDown() override {
     LetAllGo();
-    clients_.clear();  // who does not read its reply keeps the server waiting
+    clients_.clear();  // a client that does not read its reply would delay the server's stop
     ServerFixture::TearDown();
   }
 
@@ -84,12 +84,12 @@ class Fairness : public ServerFixture {
   bool Waiting(long jobs) {
     return Eventually([&] { return Gauge("terrace_queue_length") == jobs; });
   }
-  // A job leaves the queue before it says that it has begun.
+  // A job leaves the queue before it records its start.
   bool HaveBegun(std::size_t jobs) {
     return Eventually([&] { return Begun().size() == jobs; });
   }
-  // The two workers are held, and `asked` is what the polite client's request is called when it begins: it must be the
-  // next after one of them.
+  // Both workers are blocked. `asked` is the recorded name of the polite client's request, which must start as soon as
+  // one of them is free.
   void ExpectNext(RawClient& polite, const std::string& asked) {
     ASSERT_TRUE(HaveBegun(2));
     LetOneGo();
@@ -210,7 +210,7 @@ TEST_F(Fairness, LongListsOfPointsLeaveAWorkerForTiles) {
 
 class Uploads : public Fairness {
  protected:
-  // Of the largest size that is taken, most of it blanks.
+  // A body of the largest accepted size, mostly blanks.
   static std::string Large(const std::string& fields) {
     std::string body = R"({"locations": "1,7"})";
     body.resize(600'000, ' ');

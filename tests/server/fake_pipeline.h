@@ -1,4 +1,4 @@
-// A pipeline whose answers are functions that tests steer.
+// A pipeline whose functions tests replace.
 #pragma once
 
 #include <functional>

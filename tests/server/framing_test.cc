@@ -1,4 +1,4 @@
-// Messages that two readers could cut differently, and messages that are too large, too slow or too many.
+// Messages that two parsers could delimit differently, and messages that are too large, too slow or too many.
 #include <gtest/gtest.h>
 
 #include <thread>
@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 
 class Framing : public ServerFixture {
  protected:
-  // Sends `message` and then a good request; the first must be answered with `status`, the second not at all.
+  // Sends `message` and then a valid request. The reply to the first must be `status`, and the second must get none.
   void ExpectOneAnswer(const std::string& message, int status) {
     RawClient client(port());
     client.Send(message + Get("/livez"));
@@ -52,7 +52,8 @@ TEST_F(Framing, AmbiguousMessagesGetOneAnswer) {
       ++cases;
     }
   }
-  // The one URL that takes a body. Each of these has a reading by which the next request is a part of the body.
+  // Only this URL accepts a body. Each of these fields can be interpreted so that the next request is a part of the
+  // body.
   for (const char* field :
        {"Transfer-Encoding: chunked\r\n", "Transfer-Encoding: chunked\r\nContent-Length: 5\r\n",
         "Content-Length: 5\r\nTransfer-Encoding: chunked\r\n", "Transfer-Encoding: gzip\r\nContent-Length: 5\r\n",

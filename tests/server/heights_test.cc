@@ -1,4 +1,4 @@
-// Heights over HTTP: bodies, deadlines, load; what the answer says is a function that the tests steer.
+// Heights over HTTP: bodies, deadlines, load. Tests replace the function that computes heights.
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,5 @@
-// What RFC 9110, 9112 and 3986 ask of a server of HTTP/1.1, case by case, on raw sockets. Row 8 of docs/reliability.md.
+// The requirements of RFC 9110, 9112 and 3986 for a server of HTTP/1.1, case by case, on raw sockets. Row 8 of
+// docs/reliability.md.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -233,13 +234,13 @@ class HttpRules : public ServerFixture {
     EXPECT_EQ(next->body, "ok\n");
   }
 
-  // What every reply has.
+  // Checks that hold for every reply.
   static void CheckReply(const Reply& reply) {
     static const std::regex date("[A-Z][a-z]{2}, [0-9]{2} [A-Z][a-z]{2} [0-9]{4} [0-9]{2}:[0-9]{2}:[0-9]{2} GMT");
     EXPECT_TRUE(std::regex_match(reply.Field("date"), date)) << reply.Field("date");
     const bool has_length = reply.fields.contains("content-length");
     EXPECT_EQ(has_length, reply.status != 204 && reply.status != 304);
-    // An HTTP/1.1 reply that says nothing keeps the connection.
+    // An HTTP/1.1 reply without a Connection field keeps the connection open.
     EXPECT_TRUE(!reply.fields.contains("connection") || reply.Field("connection") == "close" ||
                 reply.Field("connection") == "keep-alive");
     EXPECT_EQ(reply.fields.contains("allow"), reply.status == 405 || reply.status == 204);

@@ -1,4 +1,4 @@
-// What one client may take: transfers, rates, connections, datasets.
+// Limits for one client: transfers, rates, connections, datasets.
 #include <gtest/gtest.h>
 #include <malloc.h>
 
@@ -19,7 +19,7 @@ constexpr const char* kOahu = "oahu-only-token-1";
 
 class Limits : public ServerFixture {
  protected:
-  // Tiles of a megabyte, each its own.
+  // Makes distinct tiles of a megabyte.
   void MakeTilesLarge(std::size_t bytes = std::size_t{1} << 20) {
     builder_ = [bytes](const tiler::TileRequest& request, std::stop_token) -> Result<tiler::EncodedTile> {
       tiler::EncodedTile tile;
@@ -55,7 +55,7 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
     readers.push_back(std::make_unique<RawClient>(port(), 4096));
     readers.back()->Send(Get(Tile(i)));
   }
-  // What is held counts, not what tiles need while they are made: all are built, and on their way or waiting for room.
+  // Replies count, not the memory for building them: all tiles are built, and being sent or waiting for memory.
   const auto under_way = [&] {
     return std::stol(Metric("terrace_http_transfers_waiting")) +
            std::stol(Metric("terrace_http_transfer_bytes")) / (1 << 20);
@@ -74,7 +74,7 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
   if (!test_support::kSanitized) {
     EXPECT_LT(grown, kMost);
   }
-  // They have had their time: another client that comes now is served.
+  // The slow clients are late now, so a new client is served.
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain", "X-Forwarded-For: 192.0.2.1\r\n").status, 200);
 }
 
@@ -89,7 +89,7 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
     readers.back()->Send(Get(Tile(i)));
   }
   ASSERT_TRUE(Eventually([&] { return std::stol(Metric("terrace_http_transfers_waiting")) > 20; }));
-  // In any order: each waits for those that have room before it.
+  // In any order: each reply waits for those that got memory before it.
   std::vector<std::thread> threads;
   std::atomic<int> whole{0};
   for (auto& reader : readers) {
@@ -104,9 +104,10 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   EXPECT_EQ(Metric("terrace_http_transfers_cut_total"), "0");
 }
 
-// It is larger than all the room, and so beside it. Who does not take it does not keep others from theirs.
+// The reply is larger than the whole budget, so it does not count in it. A client that does not read it does not block
+// others.
 TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
-  MakeTilesLarge(std::size_t{16} << 20);  // the kernel takes some of it
+  MakeTilesLarge(std::size_t{16} << 20);  // the kernel buffers some of it
   ServerOptions options;
   options.config.transfer_bytes = std::size_t{2} << 20;
   options.config.trusted_proxies = {"127.0.0.1"};

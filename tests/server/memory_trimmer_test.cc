@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// 64 MiB in pieces that the allocator does not map one by one; every other one is free again.
+// 64 MiB in blocks that are too small to be mapped one by one. Every other block is freed again.
 struct Holes {
   Holes() {
     std::vector<std::unique_ptr<char[]>> freed;
@@ -32,7 +32,7 @@ struct Holes {
   std::vector<std::unique_ptr<char[]>> kept;
 };
 
-// So much that a trim is worth it.
+// Uses enough processor time for a trim.
 void Compute() {
   const std::clock_t begun = std::clock();
   while (std::clock() - begun < CLOCKS_PER_SEC / 100) {
@@ -52,7 +52,7 @@ TEST(MemoryTrimmer, GivesHolesBack) {
 }
 
 TEST(MemoryTrimmer, EndsAtOnce) {
-  const MemoryTrimmer trimmer(10ms);  // or this test does not end
+  const MemoryTrimmer trimmer(10ms);  // otherwise this test does not end
 }
 
 }  // namespace

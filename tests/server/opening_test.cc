@@ -1,4 +1,4 @@
-// A server that listens before it has anything to serve, and one on a socket that somebody else holds.
+// A server that listens before its datasets are open, and a server on a socket that another process holds.
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A client that sends exactly the bytes it is given and reads replies as they come, for tests.
+// A client for tests that sends exactly the given bytes and reads replies as they come.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ struct Reply {
   std::map<std::string, std::string> fields;  // names in lower case
   std::string body;
 
-  // Empty when there is no such field.
+  // Empty if there is no such field.
   std::string Field(const std::string& name) const;
 };
 
@@ -30,19 +30,19 @@ class RawClient {
   // False: the server has closed the connection.
   bool Send(std::string_view bytes);
 
-  // The next reply; `head` for replies without a body whatever their length says. Nothing: the connection ended before
-  // a reply began, or ten seconds passed. A reply that is cut short has status -1.
+  // The next reply. `head`: replies have no body, whatever their Content-Length. Nothing: the connection ended before a
+  // reply began, or ten seconds passed. A truncated reply has status -1.
   std::optional<Reply> Read(bool head = false);
 
-  // True when the server closes within ten seconds without sending anything more.
+  // True if the server closes within ten seconds without sending more bytes.
   bool Ended();
 
-  // As many bytes as are there, at most `most`; 0 when the connection has ended.
+  // The bytes that have arrived, at most `most`; 0 if the connection has ended.
   std::size_t TakeSome(std::size_t most);
 
   void CloseOwnDirection();
   void Close();
-  void Reset();  // the kernel tells the server at once
+  void Reset();  // the kernel informs the server immediately
 
  private:
   bool Fill();
@@ -54,7 +54,7 @@ class RawClient {
 // "GET {target} HTTP/1.1" with a Host and the extra fields ("Name: value\r\n").
 std::string Get(std::string_view target, std::string_view fields = "");
 
-// One request on a connection of its own.
+// One request on a new connection.
 Reply Fetch(std::uint16_t port, std::string_view target, std::string_view fields = "");
 
 }  // namespace terrace::server

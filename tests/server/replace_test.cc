@@ -1,4 +1,4 @@
-// What is served is replaced while clients ask.
+// Datasets are replaced during requests.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -151,9 +151,9 @@ TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
   Start(CatalogOf(1, FindsItsSourceChanged()));
   EXPECT_EQ(Fetch(server_->port(), "/readyz").body, "ready\n");
   server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
-  std::this_thread::sleep_for(1600ms);  // it does not pass
+  std::this_thread::sleep_for(1600ms);  // the error persists
   server_->SetTroubles({{"maui", "/secret/maui.tif is still gone"}});
-  std::thread reopening([&] {  // whoever waited would meet this
+  std::thread reopening([&] {  // a waiting request would see this
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(1500ms);
     EXPECT_TRUE(server_->Replace(CatalogOf(2, Says("new")), options_.config));

@@ -1,5 +1,4 @@
-// One secret in every spelling of a request that a client may come to: it is in no log, no metric and no reply that a
-// cache may share.
+// One secret in many spellings of requests: it is in no log, no metric, and no reply that a shared cache may store.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
@@ -31,7 +30,7 @@ bool Holds(std::string text) {
   return text.find(secret) != std::string::npos;
 }
 
-// With the secret for each "$".
+// Replaces each "$" by the secret.
 std::string FieldsWith(std::string text) {
   for (std::size_t at = 0; (at = text.find('$', at)) != std::string::npos;) text.replace(at, 1, kSecret);
   return text;
@@ -41,7 +40,7 @@ std::string Line(const std::string& target, const std::string& fields = "") {
   return FieldsWith("GET " + target + " HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n");
 }
 
-// What follows a path.
+// Texts after a path.
 constexpr const char* kSpellings[] = {"?token=$",
                                       "?token=$&token=$",
                                       "?token=$&token=x",
@@ -85,7 +84,7 @@ constexpr const char* kSpellings[] = {"?token=$",
                                       "?v=1&TOKEN=$",
                                       "?locations=1,2&Token=$"};
 
-// A path with the secret behind it, and in the header.
+// Requests with the secret after the path, and in the header.
 std::vector<std::string> Requests(const std::string& path) {
   std::vector<std::string> requests;
   for (const std::string spelling : kSpellings) requests.push_back(Line(path + spelling));
@@ -162,7 +161,7 @@ class Secrets : public ServerFixture {
     Start(options);
   }
 
-  // Every reply is for its client alone, or tells nothing.
+  // Every reply must be private, or contain nothing about the request.
   void Ask(const std::string& request) {
     RawClient client(port());
     client.Send(request);
@@ -171,7 +170,7 @@ class Secrets : public ServerFixture {
     ASSERT_TRUE(reply) << request;
     EXPECT_GT(reply->status, 0) << request;
     const std::string cached = reply->Field("cache-control");
-    // A part of a path is nothing that anybody takes for a token; there is no such URL.
+    // A part of a path is never used as a token, and there is no such URL.
     const bool is_part_of_path = request.find(std::string("/") + kSecret + ' ') != std::string::npos;
     EXPECT_TRUE(cached.starts_with("private") || is_part_of_path) << request << reply->status << ' ' << cached;
     if (reply->status >= 400) {
@@ -212,7 +211,7 @@ TEST_F(Secrets, AreInNoLogAndNoSharedReplyHoweverTheyAreSpelled) {
     for (const std::string& request : Requests(path)) Ask(request);
   }
   for (const std::string& request : OtherForms("/open/layer.json")) Ask(request);
-  // In the place of a name, in a path of a known shape.
+  // The secret in place of a name, in paths of known URLs.
   for (const char* target : {"/$/layer.json", "/$/0/0/0.terrain", "/$/heights?locations=1,1", "/viewer/$", "/$"}) {
     EXPECT_GE(Fetch(port(), FieldsWith(target)).status, 400) << target;
     ++asked_;
@@ -250,7 +249,7 @@ TEST_F(Secrets, EncodedNamesAreRefused) {
   }
 }
 
-// What has no secret in it stays with those who share it.
+// Replies without a secret stay in shared caches.
 TEST_F(Secrets, PlainRepliesStayPublic) {
   StartWith(config::AccessLogForm::kOff, /*with_tokens=*/true);
   const std::string tile = "/open/0/0/0.terrain", version = "v=" + tiler::VersionText(0);

@@ -39,7 +39,7 @@ void ServerFixture::Start(ServerOptions options) {
 void ServerFixture::Listen(ServerOptions options) {
   options.config.listen.port = 0;
   options.config.io_threads = 2;
-  options.metrics_age = std::chrono::milliseconds(0);  // tests look for what they have just done
+  options.metrics_age = std::chrono::milliseconds(0);  // tests read metrics of their latest request
   if (options.config.worker_threads == 0) options.config.worker_threads = 2;
   auto server = Server::Start(nullptr, options);
   ASSERT_TRUE(server) << server.error().message;

@@ -1,4 +1,4 @@
-// A real server on a free port with one made-up dataset, "maui", levels 0 to 3, and a builder that tests steer.
+// A real server on a free port with one fake dataset, "maui", levels 0 to 3, and a builder that tests replace.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ namespace terrace::server {
 class ServerFixture : public testing::Test {
  protected:
   ServerFixture();
-  // Stops the server, whose workers may still be using what a derived fixture has made.
+  // Stops the server, because its workers may still use members of a derived fixture.
   void TearDown() override { server_.reset(); }
 
   // Call once, after the knobs are set.
@@ -30,7 +30,7 @@ class ServerFixture : public testing::Test {
   CatalogPtr MakeCatalog() const;
   std::uint16_t port() const { return server_->port(); }
 
-  // What the default builder makes of a request: readable, and different wherever the request differs.
+  // The tile of the default builder: readable, and different for different requests.
   static std::string BodyOf(const tiler::TileRequest& request);
 
   PointReader read_points_;     // default: none
@@ -45,10 +45,10 @@ class ServerFixture : public testing::Test {
 // Of "maui", as it stands in URLs.
 inline constexpr const char* kMauiVersion = "0a1b2c3d4e5f";
 
-// One that is seen without a token.
+// A dataset that is visible without a token.
 config::DatasetConfig PublicDataset(std::string name);
 
-// Sleeps until `done` or ten seconds have passed; then false.
+// Sleeps until `done`. Returns false if ten seconds pass before.
 bool Eventually(const std::function<bool()>& done);
 
 }  // namespace terrace::server

@@ -38,7 +38,8 @@ TEST_F(ServerTest, ServesATileWithEverythingClientsRead) {
   EXPECT_EQ(Fetch(port(), "/maui/1/2/1.terrain").Field("server-timing"), "cache;desc=hit");
 }
 
-// A URL with the version of a dataset never means other bytes; what is asked for with another one is not kept.
+// A URL with the version of a dataset always has the same bytes. Replies to requests with another version are not
+// cached.
 TEST_F(ServerTest, TellsHowLongRepliesMayBeKept) {
   more_datasets_.emplace_back().name = "oahu";
   more_datasets_.back().available = {{{0, 0, 1, 0}}};
@@ -254,7 +255,7 @@ TEST_F(ServerTest, ServesProbesMetricsDatasetsAndAPage) {
   EXPECT_EQ(Fetch(port(), "/readyz").body, "ready\n");
   EXPECT_NE(Fetch(port(), "/datasets").body.find("\"maui\""), std::string::npos);
   EXPECT_NE(Fetch(port(), "/").body.find("/maui/layer.json"), std::string::npos);
-  // On one connection: a reply is counted after its last byte, but before the connection's next request is read.
+  // Uses one connection: a reply is counted after its last byte, but before the next request of the connection is read.
   RawClient client(port());
   client.Send(Get("/maui/0/0/0.terrain") + Get("/maui/0/0/0.terrain") + Get("/metrics"));
   ASSERT_TRUE(client.Read());
@@ -379,7 +380,7 @@ TEST_F(ServerTest, GivesUpAtTheDeadline) {
 
 class AbandonedBuild : public ServerFixture {
  protected:
-  // Asks for a tile that never gets ready, leaves as told, and waits for the build to be stopped.
+  // Requests a tile that is never finished, disconnects by `leave`, and waits until the build is stopped.
   void ExpectStopWhen(void (*leave)(RawClient&)) {
     std::latch begun(1);
     std::promise<void> stopped;

@@ -1,4 +1,4 @@
-// A call as the router makes it of a target, without tokens.
+// A call for a target, as the router makes it, without tokens.
 #pragma once
 
 #include <string>
@@ -10,7 +10,7 @@
 namespace terrace::server {
 
 struct TestContext {
-  // The target names a URL of the server.
+  // Precondition: the target is a URL of the server.
   explicit TestContext(const std::string& target, Request r = {}) : request(std::move(r)) {
     context.request = &request;
     context.route = Routes().Match(target).value();

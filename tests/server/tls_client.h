@@ -1,4 +1,4 @@
-// A client of HTTPS that believes any certificate and tells which one it saw, for tests.
+// An HTTPS client for tests that accepts any certificate and reports it.
 #pragma once
 
 #include <cstdint>
@@ -12,13 +12,13 @@ struct TlsReply {
   std::string version;   // "TLSv1.3"
   std::string protocol;  // by ALPN
   std::string subject;   // common name of the certificate
-  std::string bytes;     // everything that came until the server closed, which `request` should ask for
+  std::string bytes;     // everything until the server closed; `request` must ask for that
 };
 
-// `highest`: TLS version as OpenSSL numbers them; 0: the newest. `ciphers` of TLS 1.2; empty: OpenSSL's own.
+// `highest`: OpenSSL's number of the TLS version; 0: the newest. `ciphers`: those of TLS 1.2; empty: OpenSSL's default.
 TlsReply FetchTls(std::uint16_t port, const std::string& request, int highest = 0, const std::string& ciphers = "");
 
-// Sends the request and closes properly, with TLS's own goodbye, once `until` has returned.
+// Sends the request, and closes with TLS's close_notify when `until` has returned.
 void LeaveTls(std::uint16_t port, const std::string& request, const std::function<void()>& until);
 
 // Writes a self-signed certificate for `name` and its key, PEM both.

@@ -1,4 +1,4 @@
-// HTTPS: what is spoken, what is refused, and certificates that change.
+// HTTPS: supported and refused versions, and certificates that change.
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
 #include <unistd.h>

@@ -7,7 +7,7 @@
 
 namespace terrace::test_support {
 
-// Sanitizers keep freed memory and shadow it: resident memory says nothing there.
+// Sanitizers keep freed memory and have shadow memory, so resident memory means nothing there.
 #if defined(__has_feature)
 inline constexpr bool kSanitized = __has_feature(address_sanitizer) || __has_feature(thread_sanitizer);
 #else

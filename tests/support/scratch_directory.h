@@ -1,4 +1,4 @@
-// A directory of its own for a test, removed with everything in it.
+// A separate directory for a test. The destructor removes it with its content.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace terrace::test_support {
 class ScratchDirectory {
  public:
   ScratchDirectory() {
-    // In memory where there is such a file system: what is tested here syncs often.
+    // In memory if there is such a file system, because the tested code syncs often.
     const bool has_memory = access("/dev/shm", W_OK) == 0;
     const std::filesystem::path parent = has_memory ? "/dev/shm" : testing::TempDir();
     std::string name = (parent / "terrace-XXXXXX").string();

@@ -1,4 +1,4 @@
-// Where the source tree is, for tests that read its files.
+// The path of the source tree, for tests that read its files.
 #pragma once
 
 #include <filesystem>

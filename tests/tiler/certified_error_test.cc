@@ -1,6 +1,6 @@
-// The certified error against the truth: every full-resolution sample of the sources, along its plumb line, against the
-// triangles that an independent decoder finds in the bytes. TERRACE_LONG_TESTS=1: 10,000 tiles and more instead of
-// hundreds.
+// Compares the certified error with the true error: every full-resolution sample of the sources, along its plumb line,
+// against the triangles that an independent decoder finds in the bytes. TERRACE_LONG_TESTS=1: 10,000 tiles and more
+// instead of hundreds.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace {
 
 bool IsLong() { return std::getenv("TERRACE_LONG_TESTS") != nullptr; }
 
-// Of all datasets that this process tried.
+// Totals of all datasets that this process tested.
 struct All {
   int tiles = 0, above = 0;
   std::vector<double> ratios;
@@ -61,13 +61,14 @@ std::optional<TilePipeline> Open(const CertifiedSource& source) {
   return std::optional<TilePipeline>(std::in_place, std::move(datasets));
 }
 
-// Tiles around random samples, of all levels alike but for those whose tiles have too many samples.
+// Tiles around random samples, the same number for all levels except those whose tiles have too many samples.
 class RandomTiles {
  public:
   RandomTiles(const dem::DemSource& source, const SampleIndex& samples)
       : source_(source), samples_(samples), tries_(static_cast<std::size_t>(source.max_level() + 1)) {}
 
-  // Of the next level that is still wanted. `deep_and_fine`: of the two deepest ones, with the smallest error.
+  // A tile of the next level that needs more tiles. `deep_and_fine`: of the two deepest levels, with the smallest
+  // error.
   TileRequest Next(bool deep_and_fine) {
     TileRequest request;
     do {
@@ -87,7 +88,7 @@ class RandomTiles {
 
  private:
   bool IsWanted(const geo::TileKey& key) {
-    constexpr int kManySamples = 100'000, kOfMany = 2;  // tiles of a level, whose samples take seconds
+    constexpr int kManySamples = 100'000, kOfMany = 2;  // at most two tiles of a level whose samples take seconds
     int& tries = tries_[static_cast<std::size_t>(key.level)];
     if (tries < kOfMany) return ++tries > 0;
     const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));

@@ -15,7 +15,7 @@ namespace {
 
 using Source = std::optional<CertifiedSource>;
 
-// Paths of real rasters; nothing where one of them is missing.
+// Paths of real rasters; nothing if one of them is missing.
 std::optional<std::vector<std::string>> Find(const std::vector<std::string>& names, std::string& missing) {
   std::vector<std::string> paths;
   for (const std::string& name : names) {
@@ -29,12 +29,13 @@ std::optional<std::vector<std::string>> Find(const std::vector<std::string>& nam
   return paths;
 }
 
-// Pixels of a raster as a file of its own.
+// A window of a raster, written as a separate file.
 struct Window {
   int column, row, columns, rows;
 };
 
-// `off`: by so many pixels its corner is moved to the east and to the south, and by so much more its far corner.
+// `off`: pixels by which its corner is moved to the east and to the south; the opposite corner is moved by as much
+// again.
 struct Move {
   double column = 0, row = 0, grow = 0;
 };
@@ -75,7 +76,7 @@ void Append(std::vector<Sample>& samples, const std::vector<Sample>& more) {
   samples.insert(samples.end(), more.begin(), more.end());
 }
 
-// Above EGM96, as the heights served are then above the ellipsoid.
+// Converts the samples from EGM96, because served heights are above the ellipsoid.
 void CountFromEgm96(CertifiedSource& source) {
   source.options.source.vertical = "egm96";
   const Sample& some = source.samples.front();
@@ -96,7 +97,7 @@ CertifiedCase Alone(const std::string& name, bool above_egm96 = false) {
           }};
 }
 
-// Samples of the first files count everywhere, those of the last one beside them.
+// Samples of the first files count everywhere, those of the last one outside the first ones.
 void AddOver(CertifiedSource& source, const std::string& base) {
   std::vector<Sample> shown = SamplesOf(base);
   for (const dem::DemFile& file : source.files) {
@@ -117,7 +118,7 @@ CertifiedCase Over(const std::string& name, const std::string& base) {
           }};
 }
 
-// Four pieces of a raster, cut in the middle, each moved off its place.
+// Four pieces of a raster, cut in the middle, each displaced.
 CertifiedCase MovedPieces(const std::string& name, int columns, int rows) {
   return {
       "moved pieces of " + name, [name, columns, rows](const dem::TempDir& dir, std::string& missing) -> Source {
@@ -138,7 +139,7 @@ CertifiedCase MovedPieces(const std::string& name, int columns, int rows) {
       }};
 }
 
-// The corners of four tiles of one degree around the place where they meet.
+// The corners of four tiles of one degree around their common corner.
 constexpr int kSide = 641;
 constexpr std::array<std::pair<const char*, std::array<int, 2>>, 4> kCorners = {{
     {"srtm1_N21W158_maui_nw_molokai.tif", {3601 - kSide, 3601 - kSide}},
@@ -157,7 +158,7 @@ Source MauiOverBase(const dem::TempDir& dir, std::string& missing, bool overview
   const auto base = Find({"etopo5_global_10min.tif"}, missing);
   if (!base) return std::nullopt;
   AddOver(source, base->front());
-  // Of 641 samples, which no factor divides.
+  // Pieces have 641 samples a side, which no factor divides.
   for (const dem::DemFile& file : source.files) {
     if (overviews && file.rank == 0) AddOverviews(file.path);
   }

@@ -12,7 +12,7 @@ namespace {
 
 using Source = std::optional<CertifiedSource>;
 
-// More raster grids than are asked about whole windows, each on a grid of its own.
+// More raster grids than the limit for querying whole windows, each on a different grid.
 Source ManySmallGrids(const dem::TempDir& dir, std::string&) {
   CertifiedSource source;
   for (int k = 0; k < 16; ++k) {
@@ -30,7 +30,7 @@ Source ManySmallGrids(const dem::TempDir& dir, std::string&) {
   return source;
 }
 
-// Samples of all rasters lie at nodes of level 12, those of the base at every 16th: what a feather blends can be read
+// Samples of all rasters are at nodes of level 12, those of the base at every 16th, so blended heights can be read
 // sample by sample.
 constexpr int kLevel = 12, kPieces = 512, kBase = 16, kRim = 512;  // nodes
 constexpr double kStep = 180.0 / 4096 / 256;
@@ -41,7 +41,7 @@ double Ground(double column, double row) {
 }
 bool IsHole(int column, int row) { return std::hypot(column - 300, row - 420) < 90; }
 
-// Its first sample lies at a column east and a row south of the pieces' first.
+// Its first sample is `column` east and `row` south of the first sample of the pieces.
 std::string WriteAtNodes(const dem::TempDir& dir, const std::string& name, int column, int row, int size, int spacing,
                          std::function<double(int, int)> value) {
   dem::RasterSpec spec;
@@ -55,7 +55,7 @@ std::string WriteAtNodes(const dem::TempDir& dir, const std::string& name, int c
   return dem::WriteRaster(dir, spec, name);
 }
 
-// Heights as they are served at the full resolution, at the samples that show or are blended.
+// Served heights at full resolution, at the samples that are visible or blended.
 std::vector<Sample> BlendedSamples(const dem::DemSource& source) {
   std::vector<Sample> samples;
   const geo::Lattice lattice = source.LatticeOf(kLevel);
@@ -66,7 +66,7 @@ std::vector<Sample> BlendedSamples(const dem::DemSource& source) {
   EXPECT_TRUE(heights.has_value());
   for (int y = kBase; y < window.rows - kBase; ++y) {
     for (int x = 0; x < window.columns - kBase; ++x) {
-      const int column = x - kRim, row = kPieces + kRim - y;  // of the pieces' samples, from the north
+      const int column = x - kRim, row = kPieces + kRim - y;  // in samples of the pieces, from the north
       const bool is_piece = column >= 0 && column < 2 * kPieces && row >= 0 && row < kPieces && !IsHole(column, row);
       if (!is_piece && (column % kBase != 0 || row % kBase != 0)) continue;
       samples.push_back({lattice.Longitude(window.column + x), lattice.Latitude(window.row + y),
@@ -77,7 +77,7 @@ std::vector<Sample> BlendedSamples(const dem::DemSource& source) {
   return samples;
 }
 
-// Two pieces side by side with a hole, over a base that lies beyond them on all sides.
+// Two adjacent pieces with a hole, over a base that is larger on all sides.
 CertifiedCase Feathered(double feather, const std::string& vertical) {
   const auto make = [feather, vertical](const dem::TempDir& dir, std::string&) -> Source {
     CertifiedSource source;
@@ -87,7 +87,7 @@ CertifiedCase Feathered(double feather, const std::string& vertical) {
           {WriteAtNodes(dir, "piece" + std::to_string(piece) + ".tif", left, 0, kPieces, 1,
                         [left](int c, int r) { return IsHole(left + c, r) ? -9999 : Ground(left + c, r); })});
     }
-    // Of another survey: 25 m off, and it knows no hills.
+    // The base is 25 m off and has no hills.
     source.files.push_back({WriteAtNodes(dir, "base.tif", -kRim, -kRim, (2 * kPieces + 2 * kRim) / kBase, kBase,
                                          [](int c, int r) {
                                            return 25 + 900 +
@@ -96,22 +96,23 @@ CertifiedCase Feathered(double feather, const std::string& vertical) {
                                          }),
                             1});
     source.options.feather = feather;
-    if (feather == 0) source.options.max_void_gap = 0;  // what is filled is no sample, and blended with none
+    if (feather == 0) source.options.max_void_gap = 0;  // filled nodes would be neither samples nor blended
     source.options.source.vertical = vertical;
     const auto opened = dem::DemSource::Open(source.files, source.options);
     EXPECT_TRUE(opened.has_value());
     if (opened) source.samples = BlendedSamples(**opened);
     return source;
   };
-  // Most of these tiles lie in a feather, where the bound of each raster is computed on its own: the wider, the looser.
+  // Most of these tiles are in a feather, where the bound of each raster is computed separately: a wider feather has a
+  // looser bound.
   return {fmt::format("feather {:.0f} m, {}", feather, vertical), make,
           feather == 0     ? 3.0
           : feather < 1000 ? 8.0
                            : 40.0};
 }
 
-// Slopes of 80 m a pixel along columns and of 40 along rows, up and down: even between creases that are far apart, so
-// that nothing but the places of samples makes an error there.
+// Slopes of 80 m a pixel along columns and of 40 along rows, up and down. They are planes between distant creases, so
+// that only the positions of samples cause errors there.
 double Zigzag(int at, int period) { return std::abs((at % period + period) % period - period / 2); }
 double Steep(int column, int row) { return 500 + 80 * Zigzag(column + 50, 180) + 40 * Zigzag(row + 30, 180); }
 
@@ -142,7 +143,7 @@ CertifiedCase Pieces(const std::string& name, const dem::RasterSpec& grid, std::
   return {name, [=](const dem::TempDir& dir, std::string&) { return WritePieces(dir, grid, pieces); }, 3, true};
 }
 
-// Of rasters that meet themselves at the antimeridian, the samples about it.
+// Samples around the antimeridian of rasters that close there.
 CertifiedCase AtTheSeam(const std::string& name, const dem::RasterSpec& grid, std::vector<Piece> pieces) {
   const auto make = [=](const dem::TempDir& dir, std::string&) -> Source {
     CertifiedSource source = WritePieces(dir, grid, pieces);
@@ -172,7 +173,7 @@ std::vector<CertifiedCase> NearlyAlignedCases() {
                                    {0, 256, 320, 256, -.0099, .0099},
                                    {320, 256, 320, 256, .0099, .0099}};
   cases.push_back(Pieces("nearly aligned, degrees", seconds, four));
-  // Their blocks of averages do not begin together.
+  // The blocks of their averages are not aligned.
   cases.push_back(Pieces("nearly aligned, odd sides", seconds,
                          {{0, 0, 301, 239}, {301, 0, 299, 239, .0099, .0099}, {0, 239, 301, 241, -.0099, -.0099}}));
   cases.push_back(

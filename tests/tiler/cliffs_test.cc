@@ -1,5 +1,5 @@
-// Tiles of a cliff that is far higher than their error, by every rule of meshing and in every form: how far the bytes
-// are off that clients get. Positions are rounded, and a vertex that is moved along the cliff misses its own sample.
+// Measures decoded tiles of a cliff that is far higher than their error, for every criterion and format. Positions are
+// rounded, and a vertex that is moved along the cliff has a wrong height at its own sample.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -40,8 +40,8 @@ TilePipeline MakePipeline(const std::string& path, tin::Criterion criterion, boo
   return TilePipeline(std::move(datasets));
 }
 
-// Metres: what a sample loses at most if vertices are `columns` and `rows` cells beside their samples and triangles are
-// no steeper than the ground between the samples around it.
+// The largest error of a sample in metres if vertices are `columns` and `rows` cells away from their samples and
+// triangles are no steeper than the ground between the samples around it.
 double LossAt(const dem::TileHeights& heights, int i, int j, double columns, double rows) {
   const int cells = heights.lattice.cells;
   double east = 0, north = 0;
@@ -63,7 +63,8 @@ double LargestLoss(const dem::TileHeights& heights, double columns, double rows)
   return largest;
 }
 
-// visit(pipeline, request, heights) for every rule, two errors and the tiles of two levels that the cliff crosses.
+// Calls visit(pipeline, request, heights) for every criterion, two errors, and the tiles of two levels that the cliff
+// crosses.
 template <typename Visit>
 void ForEachTile(const Visit& visit) {
   const dem::TempDir dir;
@@ -92,7 +93,7 @@ void ForEachTile(const Visit& visit) {
 }
 
 TEST(Cliffs, CostNoMoreThanTheRoundingOfPositions) {
-  constexpr double kHeightStep_m = kCliff_m / 16384;  // the coarsest that edges need; heights are rounded by half of it
+  constexpr double kHeightStep_m = kCliff_m / 16384;  // the coarsest step of edges; rounding takes half of it
   int tiles = 0, above = 0;
   ForEachTile([&](const TilePipeline& pipeline, const TileRequest& request, const dem::TileHeights& heights) {
     const int cells = heights.lattice.cells;
@@ -115,8 +116,8 @@ TEST(Cliffs, CostNoMoreThanTheRoundingOfPositions) {
   EXPECT_GT(above, 100) << "nothing that only finer positions could mend: too low a cliff";
 }
 
-// Draco's grid is a 128th of a metre wide, that of 16 bits a 32nd of the error. On an edge it comes on top of what the
-// edge's simplification loses.
+// The step of Draco's grid is a 128th of a metre, that of 16 bits a 32nd of the error. On an edge it adds to the error
+// of the edge's simplification.
 TEST(Cliffs, CostGlbTilesNoMoreThanTheirGrid) {
   int tiles = 0;
   ForEachTile([&](const TilePipeline& pipeline, TileRequest request, const dem::TileHeights& heights) {
@@ -135,7 +136,7 @@ TEST(Cliffs, CostGlbTilesNoMoreThanTheirGrid) {
       const auto glb = proto::DecodeGlb(encoded->bytes);
       ASSERT_TRUE(glb.has_value());
       const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
-      // Without the rim, where skirts hang.
+      // Leaves out the rim, which has skirts.
       EXPECT_LE(proto::LargestFlatError(lattice, glb->positions, glb->triangles, 1).least,
                 encoded->max_error_m * 1.0001 + 0.001);
     }

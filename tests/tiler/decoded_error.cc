@@ -14,7 +14,7 @@ namespace {
 constexpr std::int64_t kMost = 32767;  // u and v at the eastern and the northern edge
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// In units that make both positions and samples whole: 1 / (32767 * cells) of the tile.
+// In units in which both positions and samples are integers: 1 / (32767 * cells) of the tile.
 struct Point {
   std::int64_t x, y;
 };

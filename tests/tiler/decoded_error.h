@@ -1,4 +1,4 @@
-// How far a decoded tile is off, by code that has nothing in common with the encoder's own measure.
+// The error of a decoded tile, computed independently of the encoder's measurement.
 #pragma once
 
 #include <vector>
@@ -8,8 +8,8 @@
 
 namespace terrace::tiler {
 
-// Metres, of every lattice sample of the tile, by rows from the south, against the surface interpolated in longitude
-// and latitude; infinite where no triangle covers a sample, and all of them if a triangle is not counter-clockwise.
+// The error of every lattice sample in metres, by rows from the south, against the surface interpolated in longitude
+// and latitude. Infinite if no triangle covers the sample; all are infinite if a triangle is not counter-clockwise.
 std::vector<double> DecodedErrors(const proto::DecodedTile& tile, const dem::TileHeights& heights);
 
 // The largest of them.

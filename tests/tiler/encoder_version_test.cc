@@ -1,4 +1,4 @@
-// Clients and CDNs keep bytes by the version in their URL: other bytes need another version.
+// Clients and CDNs cache bytes by the version in the URL, so different bytes need a different version.
 #include "tiler/encoder_version.h"
 
 #include <fmt/format.h>
@@ -14,8 +14,8 @@
 namespace terrace::tiler {
 namespace {
 
-// What the sample datasets gave. Where bytes change on purpose: raise kEncoderVersion, and write down here what the
-// test says.
+// Recorded results for the sample datasets. If bytes change on purpose, raise kEncoderVersion and copy the values that
+// the test prints.
 constexpr int kRecordedVersion = 1;
 constexpr const char* kRecordedWith =
     "encoder 1, GDAL 3.6.2, PROJ 9.1.1, Draco 1.5.5, meshoptimizer 180, libjpeg 62, libwebp 10204, libdeflate 1.14, "
@@ -23,7 +23,7 @@ constexpr const char* kRecordedWith =
 constexpr const char* kRecordedBytes = "\"7dfdcd8e738fcf96658c5b04b5ec7354\"";
 constexpr const char* kRecordedFingerprints = "8b7add135baad482 78be5df43144e3b3 ";
 
-// Of one tile near the middle of the data on some levels of both samples, in every form.
+// One tile near the middle of the data at some levels of both samples, in every format.
 std::string TilesText(const TilePipeline& pipeline) {
   std::string text;
   const auto add = [&](const Result<EncodedTile>& tile) {
@@ -91,7 +91,7 @@ TEST(EncoderVersion, IsRaisedWithTheBytes) {
   EXPECT_EQ(bytes, kRecordedBytes) << "other bytes need another version: raise kEncoderVersion";
 }
 
-// Else every deployment would throw away what its CDN has.
+// Otherwise every deployment would invalidate its CDN.
 TEST(EncoderVersion, FingerprintsOfUnchangedSourcesStay) {
   std::string text;
   for (const Dataset& dataset : SamplePipeline().datasets()) {

@@ -15,7 +15,7 @@ Dataset OpenDataset(const std::string& name, const std::string& path) {
   dataset.name = name;
   EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
   if (source) dataset.source = *std::move(source);
-  if (dataset.source) dataset.generation = dataset.source->fingerprint();  // pipelines cache by it
+  if (dataset.source) dataset.generation = dataset.source->fingerprint();  // pipelines use it as the cache key
   return dataset;
 }
 

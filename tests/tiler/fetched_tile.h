@@ -13,7 +13,7 @@
 
 namespace terrace::tiler {
 
-// A dataset by plain rules. A failed expectation and no source where the raster cannot be opened.
+// A dataset with default options. If the raster cannot be opened, an expectation fails and there is no source.
 Dataset OpenDataset(const std::string& name, const std::string& path);
 
 // config/samples/NAME.tif
@@ -27,10 +27,11 @@ struct FetchedTile {
   EncodedTile encoded;
 };
 
-// With normals, whatever the request says. An empty tile and a failed expectation where there is none.
+// Always with normals. If there is no tile, an expectation fails and the result is empty.
 FetchedTile FetchTile(const TilePipeline& pipeline, TileRequest request);
 
-// What neighbours share: position along the edge, decoded height and the normal's two bytes of every vertex on it.
+// The data that neighbours share: for every vertex of an edge the position along it, decoded height and two bytes of
+// the normal.
 using Edge = std::vector<std::tuple<int, double, int, int>>;
 
 // The vertices with u (vertical) or v equal to `fixed`, 0 or 32767, from the south or the west.

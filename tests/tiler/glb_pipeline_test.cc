@@ -1,4 +1,4 @@
-// GLB tiles of the shipped samples as clients get them: errors, edges and skirts on decoded bytes.
+// GLB tiles of the sample data as clients get them: errors, edges and skirts of decoded bytes.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -53,7 +53,7 @@ proto::DecodedGlb Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
   return glb.value_or(proto::DecodedGlb{});
 }
 
-// The points on which the skirts' feet stand.
+// The points of the skirts' feet.
 std::set<Corner> Feet(const proto::DecodedGlb& glb) {
   std::set<Corner> feet;
   for (const auto& [from, to] : proto::OpenSidesOf(glb).sides) feet.insert(from);
@@ -74,11 +74,11 @@ TEST(GlbPipeline, NeighboursShareTheirEdges) {
     for (const int step : {-8, 0, 10}) {
       for (int level = 1; level <= Source(dataset).max_level(); level += 3) {
         geo::TileKey key = MiddleTile(dataset, level);
-        // Of the world: across the antimeridian.
+        // For the global dataset, across the antimeridian.
         if (dataset == 0) key.x = geo::TileColumns(level) - 1;
         const geo::TileKey east = geo::Neighbour(key, 1, 0);
         if (!Source(dataset).IsAvailable(east)) continue;
-        // Points of an eastern edge lie in the plane of its meridian.
+        // Points of an eastern edge are in the plane of its meridian.
         const geo::Lattice lattice = Source(dataset).LatticeOf(level);
         const double longitude = lattice.Longitude(lattice.FirstColumn(east));
         const geo::Vec3 meridian = geo::SurfaceNormal(longitude, 0), across{-meridian.y, meridian.x, 0};
@@ -92,8 +92,8 @@ TEST(GlbPipeline, NeighboursShareTheirEdges) {
   }
 }
 
-// The two triangles of every step along the rim and the surface between them share positions, so what feet share the
-// rims share; here the rims themselves, at one tile.
+// Skirts have the positions of the rim, so if neighbours share feet they share rims. This test checks the rims of one
+// tile.
 TEST(GlbPipeline, SkirtsHangAsDeepAsTheySay) {
   const geo::TileKey key = MiddleTile(1, 11);
   const proto::DecodedGlb glb = Fetch(1, key, 0);
@@ -103,7 +103,7 @@ TEST(GlbPipeline, SkirtsHangAsDeepAsTheySay) {
   for (const Corner& foot : Feet(glb)) {
     const geo::Vec3 p{foot[0], foot[1], foot[2]};
     const double longitude = geo::ToDegrees(std::atan2(p.y, p.x));
-    // Within a hundredth of a degree of the geodetic latitude: straight enough for a few hundred metres.
+    // Within a hundredth of a degree of the geodetic latitude, which is exact enough over a few hundred metres.
     const double latitude = geo::ToDegrees(std::atan2(p.z, (1 - geo::kEccentricitySquared) * std::hypot(p.x, p.y)));
     const geo::Vec3 top = p + geo::SurfaceNormal(longitude, latitude) * depth;
     const bool found = std::any_of(points.begin(), points.end(), [&](const Corner& q) {
@@ -134,7 +134,7 @@ std::optional<double> HeightOn(const proto::DecodedGlb& glb, const std::array<st
                   ac = glb.positions[triangle[2]] - a;
   const geo::Vec3 h = geo::Cross(up, ac);
   const double determinant = geo::Dot(ab, h);
-  if (determinant >= 0) return std::nullopt;  // its back, or a skirt edge-on
+  if (determinant >= 0) return std::nullopt;  // the back of a triangle, or a skirt seen from its edge
   const geo::Vec3 s = base - a;
   const double u = geo::Dot(s, h) / determinant;
   const geo::Vec3 q = geo::Cross(s, ab);
@@ -143,7 +143,7 @@ std::optional<double> HeightOn(const proto::DecodedGlb& glb, const std::array<st
   return geo::Dot(ac, q) / determinant;
 }
 
-// An independent measure of what is drawn.
+// Measures the drawn surface independently.
 TEST(GlbPipeline, DrawsTheTerrainWithinTheStatedError) {
   const struct {
     std::uint32_t dataset;

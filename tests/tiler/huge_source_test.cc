@@ -1,5 +1,5 @@
-// A source of 100,000 x 100,000 samples without overviews: prepared in bounded memory, in pieces if need be, and then
-// any tile of any level from few bytes. Times are printed, never judged.
+// A source of 100,000 x 100,000 samples without overviews is prepared in bounded memory, also with interruptions.
+// Afterwards any tile of any level reads few bytes. The test prints times but does not check them.
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 #include <ogr_spatialref.h>
@@ -30,7 +30,7 @@ constexpr int kSide = 100'000, kPatch = 1024;
 
 bool IsLong() { return std::getenv("TERRACE_LONG_TESTS") != nullptr; }
 
-// Deflated, tiled, and sparse: patches of terrain far apart, and voids between them.
+// A deflated, tiled and sparse file: distant patches of terrain with voids between them.
 void WriteSource(const std::string& path) {
   GDALAllRegister();
   const char* const options[] = {"TILED=YES", "SPARSE_OK=TRUE", "COMPRESS=DEFLATE", "ZLEVEL=1", "BIGTIFF=YES", nullptr};
@@ -90,7 +90,7 @@ TEST(HugeSource, IsPreparedOnceAndServedFromFewBytes) {
       std::filesystem::temp_directory_path() / ("terrace_huge_" + std::to_string(::getpid()));
   std::filesystem::create_directories(dir);
   const std::string path = (dir / "huge.tif").string(), cache = (dir / "cache").string();
-  // Children do what must not count as this process's memory.
+  // Work in child processes does not count in this process's memory.
   const auto in_child = [](const auto& work) {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -148,7 +148,7 @@ TEST(HugeSource, IsPreparedOnceAndServedFromFewBytes) {
       const geo::TileRange& range = source.Available(level)[0];
       request.key = {level, range.start_x + static_cast<std::int64_t>(random()) % (range.end_x - range.start_x + 1),
                      range.start_y + static_cast<std::int64_t>(random()) % (range.end_y - range.start_y + 1)};
-      // Half of them in the corner where the first patch is.
+      // Half of the tiles are in the corner with the first patch.
       if (i % 2 == 0) request.key = {level, range.start_x, range.end_y};
       request.error_step = 4 * i - 8;
       before = MegabytesRead();

@@ -1,5 +1,6 @@
-// The same tiles on processors with and without fused multiply-add: the C library picks its functions by the processor,
-// and GLIBC_TUNABLES takes them away. Where there is another C library, or none to pick, this compares equal programs.
+// Tiles must be the same on processors with and without fused multiply-add. The C library selects its functions by the
+// processor, and GLIBC_TUNABLES disables some. With another C library, or without a selection, this compares equal
+// programs.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -17,8 +18,8 @@
 namespace terrace::tiler {
 namespace {
 
-// A seventh of a metre per pixel, around the western edge of a tile of level 21. The sine of its longitude is so near
-// to the middle between two numbers that both kinds of processors rounded it differently.
+// A seventh of a metre per pixel, around the western edge of a tile of level 21. The sine of its longitude is so close
+// to the middle between two numbers that the two kinds of processors round it differently.
 std::string WriteGround(const dem::TempDir& dir) {
   constexpr double kPixel = 0.005 / 3600, kEdge = 722781 * 180.0 / (1 << 21) - 180, kNorth = 34;
   dem::RasterSpec spec{.width = 240, .height = 240};
@@ -27,8 +28,8 @@ std::string WriteGround(const dem::TempDir& dir) {
   return dem::WriteRaster(dir, spec);
 }
 
-// The positions of a projected raster come from PROJ, and with the last bits of the C library. Heights at them are
-// rounded to 2^-10 m, which hides those but where a height is next to the middle between two.
+// PROJ computes the positions of a projected raster, and their last bits depend on the C library. Heights there are
+// rounded to 2^-10 m, which removes the difference unless a height is close to the middle between two steps.
 std::string WriteProjectedGround(const dem::TempDir& dir) {
   dem::RasterSpec spec{.width = 400, .height = 400, .crs = "EPSG:32632"};
   spec.geo_transform = {400'000, 30, 0, 5'160'000, 0, -30};
@@ -36,7 +37,7 @@ std::string WriteProjectedGround(const dem::TempDir& dir) {
   return dem::WriteRaster(dir, spec, "projected.tif");
 }
 
-// Of every tile, or some of a level with many: what identifies its bytes, and its errors as headers state them.
+// Prints a hash of the bytes and the errors in the headers, for every tile, or for some of a level with many tiles.
 void PrintTiles(const TilePipeline& pipeline) {
   for (std::uint32_t dataset = 0; dataset < pipeline.datasets().size(); ++dataset) {
     const dem::DemSource& source = *pipeline.datasets()[dataset].source;
@@ -59,7 +60,7 @@ void PrintTiles(const TilePipeline& pipeline) {
   }
 }
 
-// Run by the test below.
+// The test below runs this in other processes.
 TEST(Processor, PrintsTiles) {
   if (std::getenv("TERRACE_PRINT_TILES") == nullptr) return;
   const dem::TempDir dir;

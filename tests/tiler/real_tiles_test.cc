@@ -1,5 +1,5 @@
-// Blocks of neighbouring tiles of real elevation models: edges that match vertex by vertex and errors that hold, by
-// every rule of meshing.
+// Blocks of neighbouring tiles of real elevation models: edges match vertex by vertex and errors hold, for every
+// criterion.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,12 +25,12 @@
 namespace terrace::tiler {
 namespace {
 
-// Finest first: the others are replayed.
+// The finest first, so that the others are replayed.
 constexpr std::array kSteps = {20, 12, 6, 0};
 constexpr int kSide = 3;  // tiles, of a block
 
 struct Dem {
-  const char* file;  // of the test data; the samples' etopo5, across the antimeridian, where there is none
+  const char* file;  // of the test data; null: the sample etopo5, across the antimeridian
 };
 constexpr Dem kDems[] = {{"srtm3_S33W071_andes.tif"},      {"srtm3_N46E008_swiss_alps.tif"},
                          {"lidar_slovenia_1m_nodata.tif"}, {"bigtujunga_30m_utm11.tif"},
@@ -47,7 +47,7 @@ class RealTiles : public testing::TestWithParam<Dem> {
     return OpenDataset("real", *test_support::TestDataPath(GetParam().file));
   }
 
-  // The south-western tile of a block in the middle of the source.
+  // The south-western tile of a block at the centre of the source.
   static geo::TileKey FirstTile(const dem::DemSource& source, int level) {
     if (GetParam().file == nullptr) return {level, geo::TileColumns(level) - 2, geo::TileRows(level) / 2 - 1};
     const dem::GeoBounds& bounds = source.info().bounds;
@@ -57,7 +57,7 @@ class RealTiles : public testing::TestWithParam<Dem> {
   }
 };
 
-// Tiles away from the source are not served: nothing at their place.
+// Tiles outside the source are not served, and are empty here.
 std::map<int, Block> FetchBlocks(const TilePipeline& pipeline, const geo::TileKey& first) {
   std::map<int, Block> blocks;
   for (int x = 0; x < kSide; ++x) {
@@ -112,7 +112,7 @@ BlockHeights ReadHeights(const dem::DemSource& source, const geo::TileKey& first
   return heights;
 }
 
-// What the header says is within the ladder error, and true.
+// The stated error is at most the ladder error, and true.
 void ExpectErrors(const Block& block, const BlockHeights& heights, double error_m) {
   for (std::size_t x = 0; x < kSide; ++x) {
     for (std::size_t y = 0; y < kSide; ++y) {

@@ -52,7 +52,7 @@ class Raster {
     return has_nodata_ ? sample != nodata_ : sample != -32768;
   }
 
-  // Of the centres of a row's pixels, in degrees.
+  // Positions of the centres of a row's pixels, in degrees.
   void PlacesOf(int row, std::vector<double>& x, std::vector<double>& y) const {
     x.resize(static_cast<std::size_t>(width_)), y.resize(x.size());
     for (std::size_t column = 0; column < x.size(); ++column) {
@@ -63,7 +63,7 @@ class Raster {
     if (to_degrees_) to_degrees_->Transform(width_, x.data(), y.data());
   }
 
-  // The pixel at a place, outside the raster where there is none.
+  // The pixel at a position, which may be outside the raster.
   std::array<double, 2> PixelAt(double longitude, double latitude) const {
     double x = longitude, y = latitude;
     if (from_degrees_ && from_degrees_->Transform(1, &x, &y) == 0) return {-1, -1};
@@ -78,7 +78,7 @@ class Raster {
 
  private:
   GDALDatasetUniquePtr dataset_;
-  std::unique_ptr<OGRCoordinateTransformation> to_degrees_, from_degrees_;  // null: they are degrees
+  std::unique_ptr<OGRCoordinateTransformation> to_degrees_, from_degrees_;  // null: the raster is in degrees
   std::vector<float> heights_;
   std::array<double, 6> transform_{}, inverse_{};  // pixels to the reference system, and back
   int width_ = 0, height_ = 0;

@@ -1,4 +1,4 @@
-// What the sources of a dataset measured, and where: read and placed by GDAL alone, without the engine's help.
+// Samples of the sources of a dataset and their positions, read by GDAL without the engine.
 #pragma once
 
 #include <cstddef>
@@ -7,25 +7,27 @@
 
 namespace terrace::tiler {
 
-// Degrees, and metres of whatever the source counts from.
+// Degrees, and metres in the source's datum.
 struct Sample {
   double longitude, latitude, height;
 };
 
-// All valid samples of a raster, with their places on the globe.
+// All valid samples of a raster, with their positions on the globe.
 std::vector<Sample> SamplesOf(const std::string& path);
 
-// Those at places where a raster has no sample near by: no pixel, or a void that is wider than what is filled.
+// The samples at positions without a near sample of a raster: outside it, or in a void wider than those that are
+// filled.
 std::vector<Sample> Outside(const std::vector<Sample>& samples, const std::string& path);
 
-// Samples by where they are.
+// An index of samples by position.
 class SampleIndex {
  public:
   explicit SampleIndex(std::vector<Sample> samples);
 
   const std::vector<Sample>& all() const { return samples_; }
 
-  // Calls visit(sample) for those in a box of degrees, its rim included. Precondition: between -180 and 180.
+  // Calls visit(sample) for the samples in a box in degrees, including its rim. Precondition: the box is between -180
+  // and 180.
   template <typename Visit>
   void ForEach(double west, double south, double east, double north, const Visit& visit) const {
     for (std::size_t y = BinOf(south - south_, height_); y <= BinOf(north - south_, height_); ++y) {

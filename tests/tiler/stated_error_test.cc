@@ -1,5 +1,6 @@
-// Terrain-Max-Error against the truth: the tile's bytes decoded by an independent decoder, every sample's plumb line
-// against every triangle. TERRACE_LONG_TESTS=1: 300 tiles of each elevation model instead of 4.
+// Compares Terrain-Max-Error with the true error: an independent decoder reads the bytes of the tile, and every
+// sample's plumb line is intersected with every triangle. TERRACE_LONG_TESTS=1: 300 tiles of each elevation model
+// instead of 4.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -31,7 +31,7 @@ std::vector<proto::DecodedExtension> ExtensionsOf(std::uint32_t dataset, geo::Ti
   return FetchTile(Earth(), request).mesh.extensions;
 }
 
-// Of the tile at level 5, 5.625 degrees wide, that holds a position.
+// The tile of level 5, 5.625 degrees wide, that contains a position.
 geo::TileKey TileAt(double longitude, double latitude) {
   return {5, static_cast<std::int64_t>((longitude + 180) / 5.625), static_cast<std::int64_t>((latitude + 90) / 5.625)};
 }

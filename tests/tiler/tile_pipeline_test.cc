@@ -1,4 +1,5 @@
-// The whole worker path on the shipped samples: promises 1 and 2 of the contract, measured on decoded bytes.
+// The whole path of a worker on the sample data: the promises of the README about errors and cracks, measured on
+// decoded bytes.
 #include "tiler/tile_pipeline.h"
 
 #include <gtest/gtest.h>
@@ -67,7 +68,7 @@ TEST(TilePipeline, ReachesTheLadderError) {
     for (const int step : {-8, 0, 8}) {
       for (int level = 0; level <= SamplePipeline().datasets()[dataset].source->max_level(); ++level) {
         const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
-        // Of heights that are rounded to 2^-10 m: the ground may be half of that further off.
+        // Heights are rounded to 2^-10 m, so the error may be half of that larger.
         EXPECT_LE(tile.encoded.max_error_m + 0x1p-11, geo::LadderError(level, step))
             << dataset << " level " << level << " step " << step;
       }
@@ -85,7 +86,7 @@ TEST(TilePipeline, GivesTheSameBytesOnEveryThread) {
   for (std::thread& thread : threads) thread.join();
 }
 
-// Neighbours of every error match and keep it by any rules.
+// For every criterion, neighbours at every error match and keep the error.
 TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
   for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
     for (const bool compact : {false, true}) {
@@ -106,7 +107,7 @@ TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
           if (plain.encoded.vertices > 500) {
             EXPECT_LT(tile->vertices, plain.encoded.vertices) << level << " step " << step;
           }
-          // Edges do not know how the inside is meshed.
+          // Edges do not depend on how the inside is meshed.
           const FetchedTile fetched = FetchTile(pipeline, request);
           for (const bool vertical : {true, false}) {
             EXPECT_EQ(EdgeOf(fetched, vertical, 0), EdgeOf(plain, vertical, 0));
@@ -118,7 +119,7 @@ TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
   }
 }
 
-// The cached refinement serves coarser errors, is continued for finer ones, and never shows in the bytes.
+// The cached refinement serves coarser errors, is continued for finer ones, and does not change bytes.
 TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   const auto open = [](std::size_t cache_bytes) {
     std::vector<Dataset> datasets;
@@ -139,7 +140,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
         ASSERT_EQ(tile->bytes, expected->bytes) << dataset << "/" << geo::ToString(request.key) << " step " << step;
         ASSERT_EQ(tile->max_error_m, expected->max_error_m);
       }
-      // Everything was made from one read.
+      // All of these are made from one read.
       request.coding = Coding::kGzip;
       request.normals = true;
       EXPECT_EQ(cached->Build(request, {})->times.read.count(), 0);
@@ -149,7 +150,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   EXPECT_GT(cached->refinements().entries, 5u);
 }
 
-// A raster of level 5's own lattice: cliffs in tile 32/16, flat ground east of it.
+// A raster on the lattice of level 5: cliffs in tile 32/16, flat ground east of it.
 std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) {
   constexpr double kStep = 5.625 / 256;
   constexpr int kColumns = 516, kRows = 260;
@@ -175,7 +176,7 @@ std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) 
   return source ? *std::move(source) : nullptr;
 }
 
-// The seeds on an edge are those of the error that was asked for, however coarse the inside has to be.
+// The seeds on an edge are those of the requested error, even if the inside must be coarser.
 TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
   const test_support::ScratchDirectory scratch;
   std::vector<Dataset> datasets(1);
@@ -191,7 +192,7 @@ TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
     const auto tile = pipeline.Build(request, {});
     ASSERT_TRUE(tile.has_value()) << tile.error().message;
     if (k == 0) {
-      EXPECT_GT(tile->max_error_m, geo::LadderError(5, 24));  // else this tests nothing
+      EXPECT_GT(tile->max_error_m, geo::LadderError(5, 24));  // otherwise this tests nothing
     }
     edges[k] = EdgeOf({*proto::DecodeQuantizedMesh(tile->bytes), *tile}, true, k == 0 ? 32767 : 0);
   }

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kMost = 32767;  // u and v at the eastern and the northern edge
 
-// The plumb line of a place, and where it meets the ellipsoid.
+// The direction of the plumb line at a position, and its foot on the ellipsoid.
 geo::Vec3 UpAt(double longitude, double latitude) {
   const double x = longitude * std::numbers::pi / 180, y = latitude * std::numbers::pi / 180;
   return {std::cos(y) * std::cos(x), std::cos(y) * std::sin(x), std::sin(y)};
@@ -19,7 +19,7 @@ geo::Vec3 FootAt(const geo::Vec3& up) {
   return {across * up.x, across * up.y, across * (1 - geo::kEccentricitySquared) * up.z};
 }
 
-// Degrees, of the place whose plumb line passes through a point.
+// Geodetic latitude of a point in degrees.
 double LatitudeOf(const geo::Vec3& point) {
   const double radius = std::hypot(point.x, point.y);
   double latitude = std::atan2(point.z, radius * (1 - geo::kEccentricitySquared));
@@ -62,9 +62,9 @@ void TileSurface::AddTriangle(const std::array<std::uint32_t, 3>& corners) {
   triangles_.push_back(triangle);
 }
 
-// Between the meridians of the corners, as a wedge is convex; chords bulge towards the pole.
+// A triangle is between the meridians of its corners, because a wedge is convex. Chords bulge towards the pole.
 void TileSurface::FindExtent(Triangle& triangle) const {
-  // Small ones far from the poles bulge by less than this, and need no closer look.
+  // Small triangles far from the poles bulge by less than this and need no exact test.
   constexpr double kSmall = 20'000, kRadius = 6'356'000, kFromPole = 10;  // metres, degrees
   const double middle = south_ + side_ * mesh_.v[triangle.k[0]] / kMost;
   const bool is_small = triangle.longest < kSmall && std::abs(middle) < 90 - kFromPole;
@@ -109,8 +109,8 @@ double TileSurface::ErrorAt(const Sample& sample) const {
       const double sampled = (w0 * HeightOf(k[0]) + w1 * HeightOf(k[1]) + w2 * HeightOf(k[2])) / sum;
       error = std::max(error, std::abs(sampled - sample.height));
     }
-    // foot + height * up lies in the plane. A triangle that stands upright tells no height, and one of two corners at a
-    // pole is a line.
+    // foot + height * up is in the plane. A vertical triangle has no height, and one with two corners at a pole is a
+    // line.
     const double across = geo::Dot(up, triangle.normal);
     if (geo::Length(triangle.normal) <= 1e-6 * triangle.longest) continue;
     if (std::abs(across) <= 1e-5 * geo::Length(triangle.normal)) continue;

@@ -1,4 +1,4 @@
-// What a tile's bytes say of the ground, beside what the sources measured there: compared without the engine's help.
+// Compares the surface in a tile's bytes with the samples of the sources, without the engine.
 #pragma once
 
 #include <array>
@@ -12,17 +12,17 @@
 
 namespace terrace::tiler {
 
-// The triangles of a tile by where they are. Precondition: the mesh outlives it.
+// An index of the triangles of a tile by position. Precondition: the mesh outlives it.
 class TileSurface {
  public:
   TileSurface(const proto::DecodedTile& mesh, const geo::TileKey& key);
 
-  // Metres that the surface is off at a sample, by what clients sample, the height interpolated in longitude and
-  // latitude, and by what they draw, the flat triangles where the sample's plumb line meets them; negative where the
-  // sample lies outside the tile.
+  // The error of the surface at a sample in metres, the larger of two: of the height interpolated in longitude and
+  // latitude, which clients sample, and of the flat triangles on the sample's plumb line, which they draw. Negative if
+  // the sample is outside the tile.
   double ErrorAt(const Sample& sample) const;
 
-  // Of samples in the tile; negative: there is none.
+  // The largest error of the samples in the tile; negative: there is none.
   double LargestError(const SampleIndex& samples) const;
 
  private:
@@ -30,7 +30,7 @@ class TileSurface {
     std::array<std::size_t, 3> k{};  // counter-clockwise
     geo::Vec3 normal;                // of the flat triangle, as long as twice its area
     double longest = 0;              // of its sides, metres
-    // Steps of u and v: of all plumb lines that may pass through it.
+    // Bounds in steps of u and v of all plumb lines that may meet the triangle.
     double west = 0, south = 0, east = 0, north = 0;
   };
 

@@ -1,4 +1,4 @@
-// Textures of GLB tiles from an image to what a client decodes.
+// Textures of GLB tiles, from the image to the client's decoder.
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
@@ -68,7 +68,7 @@ proto::DecodedGlb Fetch(const TileRequest& request) {
   return tile ? proto::DecodeGlb(tile->bytes).value_or(proto::DecodedGlb{}) : proto::DecodedGlb{};
 }
 
-// Red, green, blue in the middle of a picture, by GDAL.
+// Red, green and blue at the centre of an image, read by GDAL.
 std::vector<int> MiddleColor(std::string bytes, int side) {
   const std::string name = "/vsimem/tile_texture_test";
   VSIFCloseL(VSIFileFromMemBuffer(name.c_str(), reinterpret_cast<GByte*>(bytes.data()), bytes.size(), FALSE));

@@ -6,9 +6,10 @@
 
 namespace terrace::tiler {
 
-// Normals on an edge come from the edge's own samples, which the neighbour shares. At the rim of the data they ignore
-// the cliff that the tile's few triangles span, and shading is wrong. If that holds for half of the vertices, this
-// inserts as many vertices on a grid of lattice nodes; their normals follow the triangles
+// Normals on an edge come from the edge's own samples, which the neighbour shares. At the rim of the data they do not
+// show the cliff that the tile's few triangles span, and shading is wrong. If at least half of the vertices lie on
+// edges and at least half of the normals do not fit the triangles, this function inserts about as many vertices as the
+// edges have, on a grid of lattice nodes inside. Their normals follow the triangles
 // (docs/decisions/0003-normals-inside-follow-the-mesh.md). Edges do not change.
 tin::TinMesh WithInnerVertices(const proto::LatticeView& lattice, tin::TinMesh mesh);
 

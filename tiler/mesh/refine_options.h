@@ -1,6 +1,6 @@
-// Options of a tile's refinement, such that the tile keeps any error and its edges match its neighbours. They depend on
-// the level, the tile's own border samples, and the height ranges of the neighbours. They do not depend on the error: a
-// refinement serves every error (engine/tin/refinement.h).
+// Options of a tile's refinement. With them the tile keeps every error bound, and its edges match those of its
+// neighbours. They depend on the level, the tile's own border samples, and the height ranges of the neighbours. They do
+// not depend on the error: a refinement serves every error (engine/tin/refinement.h).
 #pragma once
 
 #include "engine/tin/greedy.h"

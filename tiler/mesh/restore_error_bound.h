@@ -16,8 +16,8 @@ using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
 // Inserts samples inside the mesh until all keep the bound of `measure`. Returns the measurement of the final mesh. The
 // largest error exceeds the bound only
-// - at vertices whose rounded positions lie beside their samples and whose neighbours are all vertices: by the height
-//   differences between these samples over the offset of the positions;
+// - at vertices whose rounded positions are not those of their samples, if all neighbouring samples are vertices: by
+//   the change of the ground over that offset;
 // - by the format's rounding of heights;
 // - on the tile's edges, which do not change;
 // - if the mesh would need more than `max_vertices`.

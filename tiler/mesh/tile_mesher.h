@@ -31,8 +31,8 @@ struct MeshedTile {
 
 struct ReplayedMesh {
   tin::TinMesh mesh;
-  double error_m =
-      0;  // bound that holds inside the tile; larger than requested if the format's vertex limit was reached
+  // The bound that holds inside the tile. Larger than requested if the format's vertex limit was reached.
+  double error_m = 0;
 };
 
 // The error value of a stopped build.

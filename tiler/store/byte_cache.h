@@ -15,7 +15,7 @@
 //      Ghosts have no value; the others have one.
 //   2. The charge of a segment is the sum of its entries' charges. Probation and protection together are at most the
 //      shard's budget; protection is at most its share of that. Ghosts are not charged: there is at most one for every
-//      two entries, whose overhead has room for it.
+//      two entries, and kEntryOverheadBytes includes half of one.
 //   3. The generation of every entry's key is one of those that are retained, once Retain was called.
 #pragma once
 

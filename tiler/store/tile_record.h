@@ -1,7 +1,7 @@
 // Serialization for stores that outlive the process: keys, encoded tiles, refined tiles.
 //
 // A key holds everything that its value depends on within one build of the program: the dataset's generation, which
-// identifies the dataset, and the request. Seal detects damage, not forgery: trust the store.
+// identifies the dataset, and the request. The checksum detects damage, not forgery: trust the store.
 #pragma once
 
 #include <optional>

@@ -22,6 +22,7 @@ struct SampleBox {
   bool empty() const { return west > east || north > south; }
   std::int64_t columns() const { return east - west + 1; }
   std::int64_t rows() const { return south - north + 1; }
+  // The smallest box that contains both.
   SampleBox Around(const SampleBox& other) const {
     if (empty()) return other;
     if (other.empty()) return *this;

@@ -41,7 +41,7 @@ class GridStatistics {
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;
-  std::vector<StatisticsPages::Tables> tables_;  // of near_, where they are few; else empty
+  std::vector<StatisticsPages::Tables> tables_;  // of near_, if they are few; else empty
   Position misplacement_{0, 0};
 };
 

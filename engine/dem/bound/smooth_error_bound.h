@@ -19,7 +19,7 @@ class SmoothErrorBound {
   SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridStatistics& tables,
                    const GeoidErrorBound& geoid, bool blends);
 
-  // Makes Over faster for boxes of cell rows `south` to `north`. Results do not depend on it.
+  // Makes BoundOver faster for boxes of cell rows `south` to `north`. Results do not depend on it.
   void PrepareRows(int south, int north);
 
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:

@@ -31,11 +31,12 @@ class SourceErrorBound {
   // Whether the raster grids added so far hide all others.
   bool is_covered() const;
 
-  // Metres. Infinite only if a source's overviews hide samples of unknown height.
+  // Metres. Infinite only if an overview of a source is void around samples that have a height.
   double bound() const { return bound_ + kRounding; }
 
  private:
-  // Of heights at nodes and of what they are blended from, to 2^-10 m, with room for the arithmetic.
+  // The rounding of heights at nodes and of the heights they are blended from, to 2^-10 m, with a margin for the
+  // arithmetic.
   static constexpr double kRounding = 0x1p-10;
 
   const geo::Lattice lattice_;

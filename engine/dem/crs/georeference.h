@@ -39,7 +39,7 @@ class Georeference {
   static constexpr double kOffsetTolerance = 0.01;
   static constexpr double kFarthestPixel = 1LL << 40;  // rasters farther apart count as on different grids
 
-  // Returns false if OffsetOf returns nothing for any offset of the two rasters.
+  // Returns false if the rasters cannot lie on one pixel grid, whatever their offset: OffsetOf then returns nothing.
   bool MayAlign(const Georeference& other) const;
   // Returns the outer corner of the first pixel of `other`, in pixels of this raster. Precondition: both have the same
   // CRS.

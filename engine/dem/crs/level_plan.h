@@ -28,9 +28,9 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 // Returns the number of samples per axis that are averaged into one: the nearest power of two, at least 1.
 int AveragingFactor(double samples_per_cell);
 
-// Returns the lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source has this spacing. They are at
-// least as fine as the source; from the level above `max_level`, the deepest one served, at least twice as fine; and
-// have at most 257 nodes per side.
+// Returns the lattices of levels 0 .. geo::kMaxLevel for a dataset whose finest source has this spacing. As far as 257
+// nodes per side allow, they are at least as fine as the source, and from level max_level - 1 on at least twice as
+// fine. `max_level`: the deepest level served.
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level);
 
 // Returns the first depth of Web Mercator whose pixels are at least as fine as the source at its centre, 1 ..

@@ -93,7 +93,7 @@ class Undulations {
   Footprint area_;
   std::optional<UndulationRanges> ranges_;  // of a grid
   // For other geoids: bounds over equal boxes of the area, row by row from the south-western box. At clamps its results
-  // to them, so they hold even if the geoid exceeds them between the evaluated positions.
+  // to these bounds, so that they hold for At even if the geoid exceeds them between the evaluated positions.
   int columns_ = 0, rows_ = 0;
   std::vector<HeightRange> boxes_;
   HeightRange whole_;

@@ -34,7 +34,7 @@ Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int ba
 // Some may not exist.
 std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 
-// Whether GDAL reads files with this extension as rasters or beside them.
+// Whether one of the files that GDAL lists for the dataset has a name with this ending, such as ".ovr".
 bool HasFileEndingWith(GDALDataset& dataset, std::string_view ending);
 
 // Fails if the raster is too large for one mesh.

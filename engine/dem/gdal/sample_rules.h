@@ -19,8 +19,8 @@ inline constexpr double kMaxAbsHeight = 99998.0;
 
 struct SampleRules {
   std::optional<double> nodata;  // in raw values
-  bool compare_as_float =
-      false;  // for Float32 bands, whose nodata value may be stated with more digits than samples have
+  // For Float32 bands, whose nodata value may be stated with more digits than samples have.
+  bool compare_as_float = false;
   std::vector<double> extra_nodata;                         // further raw values that are voids: configured or detected
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
   // Samples within this distance of a void, along either axis, are voids too, because resampling mixed them with nodata

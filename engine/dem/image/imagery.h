@@ -1,5 +1,5 @@
-// A georeferenced image of the ground, from which the textures of tiles are cut.
-// Immutable after Open and thread-safe. No GDAL type appears in this header.
+// A georeferenced image of the ground, from which the textures of tiles are made. Immutable after Open and thread-safe.
+// No GDAL type appears in this header.
 #pragma once
 
 #include <array>

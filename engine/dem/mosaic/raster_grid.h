@@ -58,8 +58,8 @@ struct GridTrace {
 struct GridOptions {
   int max_void_gap = 0;  // samples: narrower voids are filled
   HoleFill voids = HoleFill::kSmooth;
-  double feather_m =
-      0;  // width in metres of the blend into the raster grids below, inwards from edges and voids; 0: no blend
+  // Width in metres of the blend into the raster grids below, inwards from edges and voids; 0: no blend.
+  double feather_m = 0;
 };
 
 // Heights of a window's nodes in metres, one per node. Raster grids fill them in turn.
@@ -170,7 +170,7 @@ class RasterGrid {
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
   Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
-  // Small voids filled in. `measured`: becomes what was there before, unless it is null.
+  // A window with small voids filled. `measured`: becomes the window before filling, unless it is null.
   struct Bridged {
     std::vector<float> heights;
     std::uint64_t voids = 0;  // before
@@ -200,6 +200,7 @@ class RasterGrid {
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Feather width in metres, at most 256 samples by `factor`.
   double Feather(int factor) const;
+  // For calls that read no sample: checks that the file is unchanged if the raster grid has a single member.
   Result<void> CheckUnread() const;
 
   struct Counts {

@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// What must be known of a raster to read it. Immutable after Open.
+// The properties of a raster that are needed to read it. Immutable after Open.
 struct RasterLayout {
   // `crs_unit`: as for SampleRules::Of.
   static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);
@@ -74,7 +74,7 @@ class GridAxis {
 // up to f pixels at the end of the axis.
 class OverviewAxis {
  public:
-  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns).
+  // `pixels`: of the file; the grid may leave out some at the end (RasterLayout::columns). `is_own`: HasOwnOverviews.
   OverviewAxis(const GridAxis& blocks, int pixels, int samples, bool is_own)
       : blocks_(blocks), pixels_(pixels), samples_(samples), is_own_(is_own) {}
 

@@ -100,7 +100,7 @@ class Preparer {
     return true;
   }
 
-  // The folder tells the first failure in the log.
+  // The folder logs the first failure.
   void GiveUpCache(const Error& error) {
     LogSource(SourceLog::Level::kDebug, path_, "what is learnt of it is not kept: {}", error.message);
     const std::size_t at = error.message.starts_with(cache_file_) ? error.message.find(": ", cache_file_.size()) : 0;

@@ -371,7 +371,7 @@ BlockRange RasterSource::RangeIn(double west, double north, double east, double 
   return tables()->table.Query(west, north, east, south);
 }
 
-// Until the raster is opened anew it is read at its full resolution.
+// Until the raster is reopened, it is read at full resolution.
 void RasterSource::LoseCache(const Error& error) const {
   if (has_lost_cache_.exchange(true)) return;
   if (error.code == ErrorCode::kNotFound) {

@@ -28,7 +28,7 @@ std::unique_ptr<MemoryAverages> MemoryAverages::Make(const RasterLayout& layout,
     levels.insert(levels.begin(), Level{factor, std::move(grid)});
   }
   if (levels.empty() || !budget->Take(bytes)) return nullptr;
-  // Owns the bytes before it asks for them: there may be none.
+  // Owns the bytes before it allocates memory, because the allocation may fail.
   std::unique_ptr<MemoryAverages> averages(new MemoryAverages(std::move(budget), std::move(levels), bytes));
   for (Level& level : averages->levels_) {
     level.grid.heights.assign(static_cast<std::size_t>(level.grid.columns * level.grid.rows), SampleRules::kVoid);

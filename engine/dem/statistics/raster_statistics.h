@@ -36,11 +36,11 @@ class CoarseAverages {
  public:
   using Grid = AveragesGrid;
 
-  // Grids of voids, in the shape that a raster's have.
+  // Grids of voids with the sizes for a raster.
   static CoarseAverages ShapedFor(const RasterLayout& layout);
 
   bool Has(int factor) const;
-  // What ReadGrid gives. Precondition: Has(factor).
+  // The result of ReadGrid. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
 
   std::vector<Grid> grids;  // of factor kLargestDirect, twice that, ..

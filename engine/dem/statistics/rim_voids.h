@@ -55,7 +55,7 @@ class RimVoids {
 
     friend bool operator==(const Span&, const Span&) = default;
   };
-  // Rows from this one to that of the next band, which all have the spans up to those of the next band.
+  // All rows from this one up to the next band have the same spans, which end where those of the next band begin.
   struct Band {
     std::int32_t row;
     std::uint32_t first_span;

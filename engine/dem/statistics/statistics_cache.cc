@@ -263,7 +263,7 @@ void StatisticsCacheWriter::KeepWholeChunks(const std::function<void(const Chunk
   }
 }
 
-// Whole or not, it takes room that is missing.
+// Complete or not, the file takes space that is missing.
 void StatisticsCacheWriter::Remove() {
   ::unlink((path_ + ".partial").c_str());
   folder_->Release(std::exchange(reserved_, 0));

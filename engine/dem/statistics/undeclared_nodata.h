@@ -63,16 +63,16 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 // Reads the whole band twice more. `coast_step_m`: ZeroEdges::CoastStep of its spacing.
 //
 // - -32768, -32767, -9999, 9999, 32767 and 65535 are nodata values if they stand alone: at most a quarter as many
-// samples
-//   lie within 1,000 m of the value as are equal to it.
+//   samples lie within 1,000 m of the value as are equal to it.
 // - Heights below -500 m or above 9,000 m are mixtures of heights and a nodata value if all of them lie within 3
-// samples
-//   of a void, though at most a quarter of all samples do, and at least half of them differ from a neighbour by more
-//   than 1,000 m (or the coast step). No land is lower or higher, and none is so steep. A sea floor has such heights
-//   elsewhere too; there the bound is -12,000 m. If they are an eighth of the samples near voids or more, as after
-//   resampling, all voids grow by 2 samples.
-// - Zeros are voids where they are a collar; voids then grow by one sample, if at most a quarter of all lie near voids.
-// The limits of a quarter keep the samples beside scattered voids, and sparse data between voids.
+//   samples of a void, though at most a quarter of all samples do, and at least half of them differ from a neighbour by
+//   more than 1,000 m (or the coast step). No land is lower or higher, and none is so steep. A sea floor has such
+//   heights elsewhere too; there the bound is -12,000 m. If they are an eighth of the samples near voids or more, as
+//   after resampling, all voids grow by 2 samples.
+// - Zeros are voids if they are a collar; voids then grow by one sample, if at most a quarter of all samples are near
+//   voids.
+//
+// Because of the limits of a quarter, samples beside scattered voids and sparse data between voids remain heights.
 Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules, bool has_collar, double coast_step_m,
                                  const std::stop_token& stop = {});
 

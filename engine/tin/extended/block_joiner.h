@@ -34,10 +34,10 @@ class BlockJoiner {
   std::size_t added_ = 0;
   TinMesh mesh_;
 
-  // Ids of the vertices that later blocks share. By x: the far borders (y) of the row of blocks below, replaced from
-  // x = 0 on by those of the row at work. By y: the far border (x) of the block before.
+  // Ids of the vertices that later blocks share. By x: the last row of samples of the row of blocks before; the current
+  // row of blocks replaces it from x = 0 on. By y: the last column of samples of the block before.
   std::vector<std::uint32_t> ids_by_x_, ids_by_y_;
-  std::vector<std::uint32_t> ids_;  // of the block at work
+  std::vector<std::uint32_t> ids_;  // of the current block
 };
 
 }  // namespace terrace::tin

@@ -13,7 +13,7 @@ namespace terrace::tin {
 struct ExtendedError {
   MeshError height;               // of the heights alone, over every valid sample
   double max_combined = 0;        // metres, the formula of extended_field.h over the same samples
-  double color_rms = 0;           // root mean square over the known colours of valid samples and r, g, b; range 0 to 1
+  double color_rms = 0;           // root mean square over r, g, b of the color_samples; range 0 to 1
   std::size_t color_samples = 0;  // valid samples with a known colour
 };
 

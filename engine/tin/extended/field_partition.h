@@ -29,13 +29,14 @@ struct FieldBlock {
 // Where a field is cut. Immutable: safe to read from many threads at once.
 class FieldPartition {
  public:
-  // Cuts into blocks of about equal size, block_cells samples a side within a third. A shorter side is not cut.
-  // Precondition: sides of 2 to HeightField::kMaxSide, block_cells >= 1.
+  // Cuts into blocks of about equal size. Their sides differ from block_cells by at most a quarter. A side of the field
+  // that is shorter than 1.5 block_cells is not cut. Precondition: sides of 2 to HeightField::kMaxSide, block_cells >=
+  // 1.
   FieldPartition(int width, int height, int block_cells);
 
-  // The smallest blocks, from about 257 samples a side up, with few enough vertices on their borders for a mesh to
-  // max_error_m. The whole field is one block if no cut has few enough, if the mesh will be small, or if heights and
-  // mesh fit the processor's cache uncut. Reads only the samples along the cuts.
+  // Chooses the smallest blocks, of at least about 257 samples a side, whose shared borders have only a small part of
+  // the estimated vertices of a mesh to max_error_m. The whole field is one block if no cut satisfies this, if the mesh
+  // will be small, or if heights and mesh fit the processor's cache uncut. Reads only the samples along the cuts.
   static FieldPartition For(const HeightField& field, double max_error_m);
 
   // Blocks lie row by row, along x first.

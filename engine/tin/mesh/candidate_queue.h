@@ -55,7 +55,7 @@ class CandidateQueue {
     if (slots > errors_.size()) Grow(slots);
   }
 
-  // The slot whose candidate precedes all others; kNoSlot when there is no candidate at all.
+  // The slot whose candidate precedes all others; kNoSlot if there is no candidate.
   std::uint32_t Winner();
   // The slot whose turn is likely to come after `ahead` others; kNoSlot if unknown.
   std::uint32_t Upcoming(std::size_t ahead) const {

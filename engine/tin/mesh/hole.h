@@ -25,7 +25,7 @@ class Hole {
   // same count at 1, 5 and 20 m.
   static constexpr std::size_t kMaxSides = 32;
 
-  // `height` is the vertex's sample, NaN where that is void. Then the corners, counter-clockwise, at most kMaxSides.
+  // `height` is the vertex's sample, NaN if it is void. Then add the corners, counter-clockwise, at most kMaxSides.
   void Begin(SamplePosition vertex, double height) {
     vertex_ = vertex;
     height_ = height;

@@ -13,8 +13,8 @@ struct InsertionRecord {
   static constexpr Index kNever = static_cast<Index>(-1);
   static constexpr Index kOpen = static_cast<Index>(Index{1} << (8 * sizeof(Index) - 1));
 
-  std::vector<Index>
-      sizes;  // by insertion: number of triangles made; with kOpen added if the ring is open and has one vertex more
+  // By insertion: the number of triangles made; with kOpen added if the ring is open and has one vertex more.
+  std::vector<Index> sizes;
   std::vector<Index> rings;    // the rings, one after the other; vertex 4 + i is that of insertion i
   std::vector<Index> removed;  // by triangle, those of the field's corners first: the insertion that removed it
 

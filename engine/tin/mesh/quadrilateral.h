@@ -23,8 +23,9 @@ struct Quadrilateral {
 };
 
 // The squared quality of each way, times a common factor. Larger is better. The quality is the geometric mean of area
-// over diameter of the two triangles, the root of the paper's SHAPE_QUALITY (section 4.3). Scape's diameter is the
-// longer side of the bounding box. This one adds a quarter of the shorter side, which is within 12 % of the diagonal.
+// over diameter of the two triangles, the root of the paper's SHAPE_QUALITY (section 4.3). The diameter in Scape, the
+// paper's program, is the longer side of the bounding box. This one adds a quarter of the shorter side, which is within
+// 12 % of the diagonal.
 struct ShapeQuality {
   double uv = 0;
   double pw = 0;

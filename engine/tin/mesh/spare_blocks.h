@@ -22,6 +22,7 @@ void* TakeBlock(std::size_t bytes);
 // Returns a block of the new size with the first `used` bytes of `block`: `block` itself, grown, or a new block that
 // replaces it.
 void* GrowBlock(void* block, std::size_t used, std::size_t bytes);
+// Gives a block to this thread, which keeps up to kMaxSpareBytes for its next calls of TakeBlock.
 void GiveBlock(void* block) noexcept;
 // Like GiveBlock, but returns the memory to the system at once.
 void ReleaseBlock(void* block) noexcept;

@@ -222,8 +222,8 @@ Star& Triangulation::Outline(const Vertex& vertex, TriangleId triangle, Absorbs&
 }
 
 //        w                   w              The outline is walked counter-clockwise with a stack: either the triangle
-//       / \                 / \             beyond the edge (u, v) is absorbed and its two other edges are looked
-//      /   \               /   \            across in its place, or the edge stays.
+//       / \                 / \             beyond the edge (u, v) is absorbed and its two other edges are tested
+//      /   \               /   \            next, or the edge stays.
 //     u-----v     ->      u     v
 //        .                   .
 //        p                   p

@@ -124,7 +124,7 @@ struct StarPlanes {
     hn::Store(hn::Add(hn::Add(of_x, of_y), most_plane), kFloats, largest);
     hn::Store(of_magnitude, kFloats, magnitude);
 
-    const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMaxExtent + 1)));  // as of_d is
+    const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMaxExtent + 1)));  // then of_d is exact
     // Pick's theorem: a triangle of doubled area 1 has no samples but its corners.
     const auto has_samples = hn::Or(hn::Ne(of_d, All(kFloats, 1)), hn::Not(is_exact));
     const auto is_tame = hn::And(hn::Lt(of_magnitude, All(kFloats, kMaxMagnitude)), is_exact);

@@ -1,9 +1,9 @@
 // The worst sample of each triangle of a star: the inner loop of greedy insertion.
 //
 // The samples of a triangle are those inside it and on its edges that may still become vertices. Corners, voids and
-// samples on the field's border are not among them; the border has a rule of its own (border.h). Let p be the
-// triangle's last corner, u and v the other two relative to p, D twice its area, A = v_y dz_u - u_y dz_v and B = u_x
-// dz_v - v_x dz_u. The distance of a sample is
+// samples on the field's border are excluded; the border has its own rule (border.h). Let p be the triangle's last
+// corner, u and v the other two relative to p, D twice its area, A = v_y dz_u - u_y dz_v and B = u_x dz_v - v_x dz_u.
+// The distance of a sample is
 //   |D (h - z_p) - (A (x - x_p) + B (y - y_p))| / D
 // in double in exactly this form, without steps and fused operations. Single precision and integers are used where they
 // give the same result. The result is bit-equal on every processor, whatever its vectors; Highway chooses the widest at

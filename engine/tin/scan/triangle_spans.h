@@ -75,8 +75,7 @@ double SquaredDistances(const HeightField& field, const std::array<Corner, 3>& c
 // whether there are no valid samples. Corners in any order, not on one line. Safe to call from many threads at once.
 bool SamplesAreWithin(const HeightField& field, const std::array<Corner, 3>& corners, double bound);
 
-// Number of the first sample of the star's triangle i that a scan looks at (triangle_scan.h); kNoSample if
-// there is none.
+// Number of the first sample that a scan of the star's triangle i reads (triangle_scan.h); kNoSample if there is none.
 std::uint32_t FirstSample(const HeightField& field, const Star& star, std::size_t i);
 
 }  // namespace terrace::tin

@@ -251,7 +251,7 @@ void AddInfo(CLI::App& app, int& exit_code) {
   command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them")->required();
   command->add_flag("--json", arguments->json, "Prints one JSON array instead of text");
   command->add_flag("--mosaic", arguments->mosaic,
-                    "Describes all DEMs as one dataset; where they overlap, the first that has a height counts");
+                    "Describes all DEMs as one dataset; where they overlap, the first that has a height is used");
   std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
   about_heights.erase(
       std::remove_if(about_heights.begin(), about_heights.end(),

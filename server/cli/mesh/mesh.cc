@@ -297,13 +297,13 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command
       ->add_option("--coordinates", arguments->coordinates,
                    "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS; "
-                   "by default crs where it has one")
+                   "by default crs if the raster has one")
       ->check(OneOf({"pixel", "crs"}))
       ->type_name("pixel|crs");
   command
       ->add_option("--criterion", arguments->criterion,
-                   "How triangles are joined: delaunay, or data-dependent: fewer vertices for the same error, thinner "
-                   "triangles, about twice the time to mesh")
+                   "How triangles are connected: delaunay, or data-dependent (fewer vertices for the same error, "
+                   "thinner triangles, about twice the time to mesh)")
       ->check(OneOf({"delaunay", kDataDependent}))
       ->type_name("NAME")
       ->capture_default_str();
@@ -316,7 +316,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command
       ->add_option(
           "--qthresh", arguments->qthresh,
-          "With data-dependent: how much the shape of triangles counts beside their fit: 0 is the fit alone, 1 the "
+          "With data-dependent: weight of the shape of triangles against their fit: 0 uses the fit alone, 1 the "
           "shape wherever it differs; by default 0.5")
       ->check(NumberFrom(0, 1, "a number from 0 to 1"))
       ->type_name("SHARE");

@@ -192,11 +192,10 @@ void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
           ->type_name("IMAGE")
           ->group(kGroup);
   command
-      .add_option(
-          "--color-weight", arguments.weight,
-          "How much colours count beside heights, 0 to 1. The error of a sample is (1 - W) dz + W M/3 (dr + dg + "
-          "db): dz metres of height, dr, dg, db shares of the range of colours, M the range of the heights. So "
-          "--max-error E keeps heights within E / (1 - W); with W = 0 triangles follow heights alone")
+      .add_option("--color-weight", arguments.weight,
+                  "Weight of colours against heights, 0 to 1. The error of a sample is (1 - W) dz + W M/3 (dr + dg + "
+                  "db): dz metres of height, dr, dg, db shares of the range of colours, M the range of the heights. So "
+                  "--max-error E keeps heights within E / (1 - W); with W = 0 triangles follow heights alone")
       ->check(CLI::Validator(is_weight, ""))
       ->type_name("W")
       ->capture_default_str()

@@ -420,10 +420,10 @@ void AddServe(CLI::App& app, int& exit_code) {
       "  terrace serve baked/alps\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
       "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. An\n"
-      "archive that 'terrace bake' wrote is served as it is. Options of\n"
-      "the command line override those of the configuration. One line on stdout tells the URL when the\n"
-      "server is ready; the log goes to stderr. SIGTERM and SIGINT end the server after open requests are\n"
-      "answered, a second signal at once.");
+      "archive of 'terrace bake' becomes the dataset that was baked. Options of\n"
+      "the command line override those of the configuration. The server prints one line with its\n"
+      "URL on stdout when it is ready; the log goes to stderr. SIGTERM or SIGINT ends the server after open\n"
+      "requests are answered; a second signal ends it at once.");
   command->add_option("DEM", arguments->dems,
                       "Rasters that GDAL can read, folders of them, or archives; each is one dataset");
   command->add_option("--config", arguments->config_file, "Configuration in JSON; docs/configuration.md describes it")

@@ -1,4 +1,4 @@
-// Which tiles several rasters have together.
+// The available tiles of several rasters together.
 #include <gtest/gtest.h>
 
 #include <algorithm>

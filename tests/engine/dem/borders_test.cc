@@ -1,4 +1,4 @@
-// The same global node has the same bits in every tile.
+// A global node has the same bits in every tile.
 #include <bit>
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// The folder of statistics files: its bound, whose files go, who shares it, and what takes its place where it fails.
+// The folder of statistics files: its bound, which files are removed, sharing, and the fallback if it fails.
 #include "engine/dem/statistics/cache_folder.h"
 
 #include <gdal_priv.h>
@@ -46,7 +46,7 @@ std::unique_ptr<RasterSource> OpenIn(const std::string& path, const RasterCache&
   return source ? *std::move(source) : nullptr;
 }
 
-// The bits of ReadGrid, whose oracle is the file itself.
+// Expects the bits of ReadGrid, which is tested against the file itself.
 void ExpectAveragesOf(const std::string& path, const RasterSource& source) {
   const auto dataset = OpenRaster(path);
   ASSERT_TRUE(dataset);
@@ -64,7 +64,7 @@ void ExpectAveragesOf(const std::string& path, const RasterSource& source) {
   }
 }
 
-// Bytes of all files, whoever wrote them.
+// Bytes of all files, including those of other programs.
 std::uint64_t BytesIn(const std::string& folder) {
   std::uint64_t bytes = 0;
   for (const auto& entry : fs::directory_iterator(folder)) bytes += entry.is_regular_file() ? entry.file_size() : 0;
@@ -80,7 +80,7 @@ std::string ContentOf(const std::string& path) {
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
-// The log while it lives.
+// Records the log during its lifetime.
 class LogText {
  public:
   LogText() : before_(spdlog::default_logger()) {
@@ -149,7 +149,7 @@ TEST(CacheFolder, LeavesAloneWhatItDidNotWrite) {
     UsedAgo((fs::path(folder) / name).string(), std::chrono::hours(1000));
   }
   fs::create_symlink(dir.File("cache/notes.txt"), folder + "/b.tif-0123456789abcdef.statistics");
-  // Of terrace, and of no use to anybody any more.
+  // Files of terrace that are no longer used.
   const std::vector<std::string> old = {"/c.tif-0123456789abcdef.statistics",
                                         "/c.tif-1123456789abcdef.statistics.partial"};
   for (const std::string& name : old) {
@@ -244,7 +244,7 @@ TEST(CacheFolder, AFileInItsPlaceIsToldOnceAndAveragesAreInMemory) {
   EXPECT_NE(cache.folder->trouble(), "") << "the other two go without";
 }
 
-// Root may write everywhere, so the test goes on as nobody, in all threads of the process.
+// Root may write everywhere, so the test changes the user of all threads of the process to nobody.
 class AsNobody {
  public:
   AsNobody() {
@@ -283,7 +283,7 @@ TEST(CacheFolder, AFolderThatMayNotBeWrittenToIsReadAllTheSame) {
   fs::permissions(folder, fs::perms::owner_all);
 }
 
-// A limit on the size of files stands for a disk that fills up in the middle of one.
+// A limit on the size of files simulates a disk that fills up in the middle of a file.
 void ExpectFullDiskCostsNoAverage(const std::string& path, const std::string& folder) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -308,7 +308,7 @@ TEST(CacheFolder, AFullDiskInMidFileCostsNoAverage) {
   ExpectFullDiskCostsNoAverage(WriteRaster(dir, Hills(2100, 1100)), dir.File("cache"));
 }
 
-// Averages of the chunks that it has read are in the file that is given up.
+// The abandoned file has the averages of the chunks that the run has read.
 TEST(CacheFolder, AFullDiskAfterAnInterruptedRunCostsNoAverage) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, Hills(2100, 1100)), folder = dir.File("cache");
@@ -407,7 +407,7 @@ TEST(KeptFactors, WhatOverviewsLackIsKeptBitForBit) {
     RasterSpec spec = Hills(2301, 1203);
     spec.overviews = overviews;
     const auto value = spec.value;
-    // A chunk of nothing but voids among them. Samples of the overview of an odd width lie across its edge.
+    // One chunk has only voids. Because of the odd width, samples of the overview cross its edge.
     spec.value = [value](int c, int r) { return c >= 1024 && c < 2048 ? -9999 : value(c, r); };
     const std::string path = WriteRaster(dir, spec);
     const auto in_folder = OpenIn(path, CacheIn(dir.File("cache")));

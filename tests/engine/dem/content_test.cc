@@ -1,5 +1,5 @@
-// What identifies a dataset's content: every copy of its files has the same, and nothing that decides heights may
-// differ unseen.
+// The hash of a dataset's content: it is equal for every copy of the files, and differs if anything differs that
+// determines heights.
 #include <gdal_priv.h>
 #include <sched.h>
 #include <sys/wait.h>
@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// More than one chunk each way, above nodata and with a hole.
+// More than one chunk in both directions, with a hole.
 RasterSpec Ground() {
   RasterSpec spec;
   spec.width = 1100;
@@ -41,7 +41,7 @@ RasterSpec WithChange(RasterSpec spec, int column, int row, double value) {
   return spec;
 }
 
-// Of another inode and time.
+// Copies the file, with another inode and time.
 std::string CopyOf(const std::string& path, const TempDir& to) {
   const fs::path copy = to.path() / fs::path(path).filename();
   fs::copy_file(path, copy);
@@ -81,7 +81,7 @@ TEST(Content, EverySampleCounts) {
     EXPECT_NE(Fingerprint(WriteRaster(dir, WithChange(Ground(), column, row, 501.5), name)), expected) << column;
   }
   EXPECT_NE(Fingerprint(WriteRaster(dir, WithChange(Ground(), 305, 200, 500), "void.tif")), expected);
-  // As many samples, of the same values, at other places.
+  // The same values at exchanged positions.
   RasterSpec swapped = WithChange(WithChange(Ground(), 5, 5, Ground().value(1050, 5)), 1050, 5, Ground().value(5, 5));
   EXPECT_NE(Fingerprint(WriteRaster(dir, swapped, "swapped.tif")), expected);
 }
@@ -210,14 +210,14 @@ TEST(Content, MasksAndImagesCountByTheirBytesAndPlaces) {
   EXPECT_NE(image(changed), image(path));
 }
 
-// A sparse file: its zeros take no room.
+// A sparse file, whose zeros take no disk space.
 std::string WriteSparse(const TempDir& dir, const std::string& name, std::uintmax_t bytes) {
   std::ofstream(dir.File(name), std::ios::binary) << "begin";
   fs::resize_file(dir.File(name), bytes);
   return dir.File(name);
 }
 
-// In another process, which does not tell this one what it knows.
+// Hashes in another process, so that this one has nothing in memory.
 void HashElsewhere(const std::string& path, const std::string& cache) {
   const pid_t child = ::fork();
   if (child == 0) ::_exit(HashFiles(StampedFiles({path}), {cache, {}}) ? 0 : 1);
@@ -226,7 +226,7 @@ void HashElsewhere(const std::string& path, const std::string& cache) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-// By this process so far.
+// Bytes that this process has read.
 std::uint64_t BytesRead() {
   std::ifstream io("/proc/self/io");
   std::string name;

@@ -1,5 +1,5 @@
-// Files that were cut, flipped and overwritten are refused or read, each in a process of its own: none crashes, hangs
-// or takes memory without bound.
+// Truncated, flipped and overwritten files are rejected or read, each in a separate process. None crashes, hangs or
+// takes unbounded memory.
 #include <gdal_priv.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -17,9 +17,9 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kFiles = test_support::kSanitized ? 60 : 500;  // under a sanitizer a process takes long to begin
+constexpr int kFiles = test_support::kSanitized ? 60 : 500;  // processes start slowly under a sanitizer
 constexpr unsigned kSeconds = 20;                            // the target is 5 on an idle machine
-// Beyond the parent's own: sanitizers keep the memory that earlier tests have freed.
+// In addition to the parent's memory, because sanitizers keep memory that earlier tests have freed.
 constexpr long kMaxKib = 512 << 10;
 
 std::string ReadFile(const std::string& path) {
@@ -37,7 +37,7 @@ std::string Damaged(std::string bytes, std::mt19937& random) {
     case 0:
       bytes.resize(below(bytes.size()));
       break;
-    case 1:  // numbers in the header become large
+    case 1:  // makes numbers in the header large
       for (int i = 0; i < 3; ++i) bytes[below(head)] = static_cast<char>(0xff);
       break;
     case 2:
@@ -111,7 +111,7 @@ TEST(DamagedFiles, CrashHangAndSwellNothing) {
   RecordProperty("files", kFiles);
 }
 
-// Its overviews and its mask, which lie at the end of the file, as much as its samples.
+// The overviews and the mask at the end of the file may be damaged as well as the samples.
 TEST(DamagedFiles, WhatBelongsToAGeoTiffMayBeCutToo) {
   const TempDir dir;
   RasterSpec spec{.width = 600, .height = 400, .type = "Byte", .geo_transform = {8, .001, 0, 47, 0, -.001}};
@@ -144,7 +144,7 @@ TEST(DamagedFiles, WhatBelongsToAGeoTiffMayBeCutToo) {
   }
 }
 
-// Libraries read the last strip of samples that are not compressed by the rows that it has, whatever size it states.
+// For uncompressed samples libraries read the rows of the last strip, whatever its stated size.
 TEST(DamagedFiles, AStripMayStateMoreThanItHas) {
   const TempDir dir;
   RasterSpec spec{.width = 600, .height = 200, .type = "Int16", .geo_transform = {8, .001, 0, 47, 0, -.001}};
@@ -168,7 +168,7 @@ TEST(DamagedFiles, AStripMayStateMoreThanItHas) {
   EXPECT_EQ((*source)->info().heights.max, 798);
 }
 
-// Before a sample is read: a tile far from where the file ends would not tell.
+// Opening must report it, because reading a tile far from the end of the file would not.
 TEST(DamagedFiles, AGeoTiffThatIsCutShortIsToldWhenItIsOpened) {
   const TempDir dir;
   RasterSpec spec{.width = 300, .height = 200, .geo_transform = {8, .001, 0, 47, 0, -.001}};

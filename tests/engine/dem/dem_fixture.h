@@ -1,4 +1,4 @@
-// Rasters for the tests: real ones from the folder TERRACE_TEST_DATA, small ones written on the spot.
+// Rasters for the tests: real ones from the folder TERRACE_TEST_DATA, and small synthetic ones.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// A folder that goes with the object.
+// A temporary folder; the destructor removes it.
 class TempDir {
  public:
   TempDir();
@@ -39,7 +39,7 @@ struct RasterSpec {
   std::string unit = {};
   double scale = 1, offset = 0;
   std::vector<int> overviews = {};
-  // Raw value of column and row.
+  // Raw value by column and row.
   std::function<double(int, int)> value = [](int, int) { return 0.0; };
 };
 
@@ -49,24 +49,24 @@ RasterSpec FlatSquare(double west, double north, int side, double pixel, double 
 // Writes a GeoTIFF and returns its path.
 std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::string& name = "dem.tif");
 
-// A file of the test data folder; nothing, and a loud note, when it is not there.
+// A file of the test data folder; nothing and a message if it is missing.
 std::optional<std::string> TestDataFile(const std::string& name);
 
-// Opens or fails the test; null then.
+// Opens the source. On failure the test fails and the result is null.
 std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options = {});
 std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
 
-// Of the available ranges of a level what touches the source's bounds: others only make four children of a tile's. All
-// of them where the bounds cross the antimeridian.
+// The available ranges of a level that touch the source's bounds; the others exist only because a tile has four
+// children. All of them if the bounds cross the antimeridian.
 std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level);
 
-// Statistics in files of this folder, without a bound, and no averages in memory.
+// A cache with statistics in this folder without a bound, and no averages in memory.
 RasterCache CacheIn(const std::string& folder);
 
-// Tiles across these, at most about `count`.
+// About `count` tiles, distributed over the available ones.
 std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
 
-// One real raster of every CRS kind, by file name.
+// File names of one real raster for every kind of CRS.
 std::vector<std::string> RealRasters();
 
 }  // namespace terrace::dem

@@ -1,4 +1,4 @@
-// What Open finds out, and what Read promises on real rasters.
+// Results of Open, and promises of Read on real rasters.
 #include "engine/dem/dem_source.h"
 
 #include <cmath>
@@ -55,7 +55,7 @@ TEST(DemSource, LatticesOfTheTwoDeepestLevelsAreTwiceAsFineAsTheSource) {
   EXPECT_EQ(deeper->LatticeOf(16).cells, 32);  // 0.31", though nothing was added
 }
 
-// Whichever of its sources a tile shows, and however the depths of the two fall.
+// For each of two sources and for all combinations of their depths.
 TEST(DemSource, EverySourceOfAMosaicHasALatticeTwiceAsFineAtItsOwnDeepestLevel) {
   const TempDir dir;
   constexpr double kFine = 0.65 / 3600;  // nodes are 0.62" apart where nothing is added
@@ -195,7 +195,7 @@ TEST(DemSource, LeavesFilesWithoutAHeightOutOfAFolder) {
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->info().sources.size(), 1u);
   EXPECT_EQ((*source)->info().sources.front().path, good);
-  for (const bool in_folder : {false, true}) {  // named, or all that there is
+  for (const bool in_folder : {false, true}) {  // named files, or all files of the folder
     const auto alone = DemSource::Open({{none, 0, in_folder}});
     ASSERT_FALSE(alone);
     EXPECT_NE(alone.error().message.find("none.tif: has no valid sample"), std::string::npos);
@@ -203,7 +203,7 @@ TEST(DemSource, LeavesFilesWithoutAHeightOutOfAFolder) {
   EXPECT_FALSE(DemSource::Open({{good, 0, false}, {none, 1, false}}));
 }
 
-// It cannot be told in a line of a log or of a configuration.
+// Such a name does not fit into one line of a log or of a configuration.
 TEST(DemSource, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
   const TempDir dir;
   const std::string good = WriteRaster(dir, {}, "good.tif"), other = WriteRaster(dir, {}, "plain.tif");
@@ -222,7 +222,7 @@ TEST(DemSource, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
       << named.error().message;
 }
 
-// What holds colours is served all the same, but said to.
+// A raster with colours is served, with a warning.
 TEST(DemSource, TellsPicturesFromHeights) {
   TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
   TERRACE_REQUIRE_DATA(palette, "bluemarble_1920x960.tif");

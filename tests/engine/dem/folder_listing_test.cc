@@ -1,4 +1,4 @@
-// Opening a file does not list its folder: of thousands of files in one folder that would be most of the work.
+// Opening a file does not list its folder, which would be most of the work for thousands of files in one folder.
 #include <gdal_priv.h>
 
 #include <atomic>
@@ -13,7 +13,7 @@
 namespace terrace::dem {
 namespace {
 
-// A driver that GDAL asks about files that no other driver knows. It counts the files whose folder GDAL listed for it.
+// A driver that GDAL tries for files that no other driver recognizes. It counts the files whose folder GDAL has listed.
 class ListingProbe {
  public:
   ListingProbe() {

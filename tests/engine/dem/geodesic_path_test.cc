@@ -5,7 +5,7 @@
 namespace terrace::dem {
 namespace {
 
-// One degree of the equator is a circle's arc; of a meridian, tables of the WGS 84 ellipsoid say.
+// One degree of the equator is an arc of a circle; the length on a meridian is from tables of the WGS 84 ellipsoid.
 TEST(GeodesicPath, HasTheLengthOfTheEllipsoid) {
   EXPECT_NEAR(GeodesicPath({{10, 0}, {11, 0}}).length_m(), 111'319.4908, .001);
   EXPECT_NEAR(GeodesicPath({{10, 0}, {10, 1}}).length_m(), 110'574.3886, .001);
@@ -19,7 +19,7 @@ TEST(GeodesicPath, DividesAlongTheShortestLine) {
   EXPECT_EQ(points[0].position.longitude, 0);
   EXPECT_EQ(points[2].position.longitude, 60);
   EXPECT_NEAR(points[1].position.longitude, 30, 1e-6);
-  EXPECT_GT(points[1].position.latitude, 53);  // bends to the pole
+  EXPECT_GT(points[1].position.latitude, 53);  // curves towards the pole
   EXPECT_NEAR(points[1].distance_m * 2, points[2].distance_m, .002);
 }
 
@@ -39,7 +39,7 @@ TEST(GeodesicPath, WalksInStepsAndEndsAtTheEnd) {
   EXPECT_EQ(points[3].position.longitude, 11);  // past the corner
   EXPECT_GT(points[3].position.latitude, .3);
   EXPECT_EQ(points.back().position.latitude, 1);
-  // A step as long as the path, or longer: both ends.
+  // A step as long as the path, or longer, gives both ends.
   EXPECT_EQ(path.Walk(path.length_m()).size(), 2u);
   EXPECT_EQ(path.Walk(1e9).size(), 2u);
 }

@@ -1,4 +1,5 @@
-// How far tiles above a geoid are from their source's samples: the bound is one, wherever the geoid bends.
+// The distance of tiles from samples of a source above a geoid never exceeds the bound, whatever the curvature of the
+// geoid.
 #include "engine/dem/bound/geoid_error_bound.h"
 
 #include <gtest/gtest.h>
@@ -35,8 +36,8 @@ double LargestError(const TileHeights& tile, const geo::TileKey& key, const Rast
   return largest;
 }
 
-// Level ground of 1000 m above a geoid of steps of half a second, with a summit of 30 m on a node that nodes of
-// lattices may miss.
+// Level ground of 1000 m above a geoid with steps of half a second. A summit of 30 m is at a grid node that lattice
+// nodes may miss.
 TEST(GeoidErrorBound, HoldsASummitBetweenNodes) {
   const TempDir dir;
   const std::string grid = WriteGtx(
@@ -46,7 +47,7 @@ TEST(GeoidErrorBound, HoldsASummitBetweenNodes) {
        }});
   const auto geoid = Geoid::OfGrid(grid, {7.05, 45.05});
   ASSERT_TRUE(geoid) << geoid.error().message;
-  // A sample lies on the summit.
+  // A sample is on the summit.
   RasterSpec raster{.width = 300, .height = 300};
   raster.geo_transform = {7 + (401 - 2 * 150 - 1) * kArcSecond / 2,  kArcSecond, 0,
                           45 + (397 + 2 * 150 + 1) * kArcSecond / 2, 0,          -kArcSecond};
@@ -97,8 +98,8 @@ TEST(GeoidErrorBound, IsNeverBelowTheTruthAndLittleAboveItOnEgm96) {
       ASSERT_TRUE(tile);
       const double error = LargestError(*tile, key, raster, **geoid);
       EXPECT_GE(tile->source_error_m, error) << geo::ToString(key);
-      // Between samples a bilinear geoid may be further off than at them. Steps of level 0 are three of its grid's:
-      // there the lowest and the highest node around count.
+      // Between samples the error of a bilinear geoid may be larger than at samples. Steps of level 0 are three steps
+      // of its grid, so the lowest and the highest node around count there.
       EXPECT_LE(tile->source_error_m, 3 * error + (level == 0 ? 30 : 6)) << geo::ToString(key);
     }
   }

@@ -1,4 +1,4 @@
-// Grids of undulations, written on the spot.
+// Writes synthetic grids of undulations.
 #pragma once
 
 #include <functional>

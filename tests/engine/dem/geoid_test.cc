@@ -25,7 +25,7 @@ constexpr Place kPlaces[] = {
     {"Port Moresby", {147.1803, -9.4438}},
 };
 
-// The height of the geoid there as PROJ's own program tells it.
+// The undulation there by PROJ's cs2cs.
 std::optional<double> Cs2cs(const std::string& from, Position place) {
   const std::string command = fmt::format("echo '{:.10f} {:.10f} 0' | PROJ_NETWORK=OFF cs2cs -f %.6f {} EPSG:4979 2>&1",
                                           place.y, place.x, from);
@@ -48,7 +48,7 @@ TEST(AreaOfUse, LongitudesATurnApartAreOnePlace) {
   }
 }
 
-// A text that no other test uses: the first who asks for it decides what is found.
+// No other test uses this text, because the first query for a text determines the operation.
 TEST(Geoid, IsFoundForACentreBeyondTheAntimeridian) {
   const auto beyond = Geoid::OfCrs("EPSG:4326+5773", {190, 20});
   ASSERT_TRUE(beyond) << beyond.error().message;

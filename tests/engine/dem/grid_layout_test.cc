@@ -1,4 +1,4 @@
-// Which rasters make one raster grid: many at once give what trying all pairs gives, and compare few pairs.
+// Grouping many rasters into raster grids gives the same result as comparing all pairs, but compares few pairs.
 #include "engine/dem/mosaic/grid_layout.h"
 
 #include <gdal_priv.h>
@@ -33,7 +33,7 @@ Georeference PlaceOf(const RasterSpec& spec) {
   return *std::move(where);
 }
 
-// Every raster is tried on every grid, and every member beside every other one.
+// The oracle: compares every raster with every grid, and every member with every other one.
 class Pairs {
  public:
   static std::vector<GridLayout> LayOut(const std::vector<PlacedRaster>& rasters) {
@@ -139,15 +139,15 @@ class Pairs {
   }
 };
 
-// Rasters whose pixels nearly or exactly agree, apart or on each other, in degrees around the Earth and in metres; as
-// they come from files: some with fewer digits, some on grids of their own.
+// Random rasters whose pixels nearly or exactly agree, separate or overlapping, in degrees around the Earth and in
+// metres, and as in real files: some with fewer digits, some on other grids.
 class Layouts {
  public:
   explicit Layouts(unsigned seed) : random_(seed) {}
 
   std::vector<PlacedRaster> Next() {
     places_.clear();
-    const bool degrees = Pick(10) > 0;  // a projection takes PROJ a while
+    const bool degrees = Pick(10) > 0;  // projections are slow
     const int count = 2 + Pick(degrees ? 50 : 12);
     const double pixel = degrees ? 360.0 / (60 + 60 * Pick(4) + (Pick(4) == 0 ? 1 : 0)) : 10.0 * (1 + Pick(3));
     const int across = degrees ? static_cast<int>(std::lround(360 / pixel)) : 200;
@@ -173,7 +173,7 @@ class Layouts {
 
  private:
   int Pick(int count) { return static_cast<int>(random_() % static_cast<unsigned>(count)); }
-  // Of a pixel: none, within the tolerance, about at it, or anything.
+  // An offset in pixels: none, within the tolerance, close to it, or arbitrary.
   double Off() {
     switch (Pick(16)) {
       case 0:
@@ -218,13 +218,13 @@ TEST(GridLayout, ManyRastersMakeTheGridsThatAllPairsMake) {
       around += found[k].members.size() > 1 && found[k].width == std::lround(period);
     }
   }
-  // What the layouts are for.
+  // Checks that the layouts test what they are for.
   EXPECT_GT(joined, 40);
   EXPECT_GT(apart, 150);
   EXPECT_GT(around, 4);
 }
 
-// Cells of one degree that touch, and as many of the same pixel size of which each lies on a grid of its own.
+// Cells of one degree that touch, and as many of the same pixel size that are each on a different grid.
 TEST(GridLayout, RastersAreComparedWithFewOthers) {
   const auto pairs_per_raster = [](int across) {
     std::vector<Georeference> places;

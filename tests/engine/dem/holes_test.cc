@@ -1,4 +1,4 @@
-// Large voids: holes are smoothed over, collars show the floor.
+// Large voids: holes are filled with a smooth surface, collars show the floor.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -40,7 +40,7 @@ VoidAt Box(int column, int row, int columns, int rows) {
   return [=](int c, int r) { return c >= column && c < column + columns && r >= row && r < row + rows; };
 }
 
-// Where a node of a tile lies among the samples' centres.
+// The position of a tile's node in samples.
 struct Place {
   double x, y;
 
@@ -55,7 +55,7 @@ Place PlaceOf(const TileHeights& tile, const geo::TileKey& key, int i, int j) {
 }
 GeoPosition DegreesOf(double x, double y) { return {10 + (x + 0.5) * kPixel, 20 - (y + 0.5) * kPixel}; }
 
-// The deepest level whose tiles are as large as some hundred samples.
+// The deepest level whose tiles have some hundred samples a side.
 constexpr int kLevel = 11;
 
 // Calls visit(tile, i, j, place) for all nodes of a level's tiles.
@@ -90,7 +90,7 @@ TEST(Holes, OfAPlaneGoOnWithThePlane) {
         EXPECT_GE(height, lowest);
         EXPECT_LE(height, highest);
       }
-      if (!at.IsIn(4, 4 + step, kSide - 5 - step, kSide - 5)) return;  // averages at the rim stand for less
+      if (!at.IsIn(4, 4 + step, kSide - 5 - step, kSide - 5)) return;  // averages at the rim cover fewer samples
       if (level >= kLevel) farthest = std::max(farthest, std::abs(height - Plane(at.x, at.y)));
       steep_x = std::max(steep_x, std::abs(tile.At(i + 1, j) - height));
       steep_y = std::max(steep_y, std::abs(tile.At(i, j + 1) - height));
@@ -103,7 +103,7 @@ TEST(Holes, OfAPlaneGoOnWithThePlane) {
   }
 }
 
-// The highest and the lowest of harmonic heights lie at the edge.
+// Harmonic heights have their extremes at the edge.
 TEST(Holes, StayBetweenTheHeightsBesideThem) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Raster(300, 280, Rough, Box(90, 80, 110, 100))), {.floor = kFloor});
@@ -128,7 +128,7 @@ TEST(Holes, StayBetweenTheHeightsBesideThem) {
 
 TEST(Holes, AreNoneWhereAVoidTouchesTheRim) {
   const TempDir dir;
-  for (const int channel : {0, 1}) {  // samples wide, from the void to the raster's edge
+  for (const int channel : {0, 1}) {  // width in samples, from the void to the raster's edge
     SCOPED_TRACE(channel);
     const VoidAt is_void = [&](int c, int r) {
       return Box(100, 100, 200, 200)(c, r) || (r == 150 && c >= 300 && c < 400 + channel - 1);
@@ -171,7 +171,7 @@ TEST(Holes, ShowTheFloorWhereTheOwnerWantsThat) {
 
 bool IsSame(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
 
-// Windows of other places and sizes read other parts of the raster: the same heights must come out.
+// Windows at other positions and of other sizes read other parts of the raster, but must give the same heights.
 void ExpectNoTileMatters(const DemSource& source, int level, const geo::TileKey& key) {
   const auto tile = source.Read(key);
   ASSERT_TRUE(tile);
@@ -202,7 +202,7 @@ void ExpectNoTileMatters(const DemSource& source, int level, const geo::TileKey&
 }
 
 TEST(Holes, AreTheSameInEveryTile) {
-  const VoidAt ragged = [](int c, int r) {  // a large one, one of half the size, and small ones
+  const VoidAt ragged = [](int c, int r) {  // a large void, one of half the size, and small ones
     const bool disc = std::hypot(c - 300, r - 240) < 190 + 20 * std::sin(c * 0.3) + 15 * std::cos(r * 0.4);
     return disc || Box(520, 300, 100, 90)(c, r) || (c * 7 + r * 13) % 401 == 0;
   };
@@ -219,7 +219,7 @@ TEST(Holes, AreTheSameInEveryTile) {
     const TempDir dir;
     const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = kFloor});
     ASSERT_NE(source, nullptr);
-    // Of the globe that on the seam counts as cut by the raster's first and last column, as the raster alone goes.
+    // In the statistics of the raster alone, its first and last column cut the hole on the seam of the globe.
     EXPECT_GT(source->info().sources[0].hole_samples, finest == 3 ? 900u : 10'000u);
     if (finest == 3) {
       const GeoPosition on_seam{-180, 15};
@@ -233,7 +233,7 @@ TEST(Holes, AreTheSameInEveryTile) {
   }
 }
 
-// A hole that two rasters share is one; where the second raster is missing it is a collar.
+// A hole that two rasters share is a hole. If the second raster is missing, it is a collar.
 TEST(Holes, GoAcrossRastersOfAGrid) {
   const VoidAt is_void = Box(200, 100, 150, 120);
   for (const int shared : {0, 1}) {
@@ -270,7 +270,7 @@ TEST(Holes, GoAcrossRastersOfAGrid) {
   }
 }
 
-// What is measured coarsely in a hole comes before what is measured around it; small voids are the fine source's.
+// A coarse source below has priority in a hole over the surface. Small voids are filled from the fine source.
 TEST(Holes, ShowASourceBelow) {
   const TempDir dir;
   const auto one_sample = Box(30, 30, 1, 1), large = Box(100, 100, 200, 200);
@@ -299,7 +299,7 @@ TEST(Holes, ShowASourceBelow) {
   });
 }
 
-// What a tile of the sources' own resolution has at a node, a point there has too.
+// A point has the height of the node there in a tile of the source's resolution.
 TEST(Holes, HaveTheSameHeightsAtPointsAsInTiles) {
   const TempDir dir;
   const VoidAt is_void = [](int c, int r) {
@@ -333,7 +333,7 @@ TEST(Holes, HaveTheSameHeightsAtPointsAsInTiles) {
   }
 }
 
-// A peak beside a hole shows in it, and a hole reaches far: the bound of a tile within it knows of both.
+// A peak beside a hole raises its surface, and a hole is large: the bound of a tile inside includes both.
 TEST(Holes, AreWithinTheRangeBound) {
   const TempDir dir;
   const HeightAt peaks = [](int c, int r) { return Rough(c, r) + (std::hypot(c - 95, r - 300) < 30 ? 4000 : 0); };
@@ -366,7 +366,7 @@ TEST(Holes, AreWithinTheRangeBound) {
   EXPECT_GT(tiles_of_collar, 0);
 }
 
-// Samples alone are certified: what is filled is none, and a plane's surface misses no sample.
+// The certified error refers to samples only. Filled nodes are not samples, and a plane fits all samples.
 TEST(Holes, OfAPlaneCostNoCertifiedError) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Raster(400, 400, Plane, Box(100, 100, 200, 200))), {.floor = kFloor});

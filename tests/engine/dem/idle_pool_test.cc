@@ -1,4 +1,4 @@
-// What pools keep for later, all together.
+// Idle objects of several pools, with a common limit.
 #include "engine/dem/common/idle_pool.h"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 namespace terrace::dem {
 namespace {
 
-// Counts those that are there.
+// Counts its instances.
 struct Thing {
   explicit Thing(int n) : number(n) { ++alive; }
   ~Thing() { --alive; }
@@ -21,7 +21,7 @@ struct Thing {
   static inline std::atomic<int> alive{0};
 };
 
-// As if it had been in use.
+// Puts things into the pool as if after use.
 void Keep(IdlePool<Thing>& pool, std::vector<int> numbers) {
   std::vector<IdlePool<Thing>::Handle> handles;
   for (const int number : numbers) {

@@ -116,7 +116,7 @@ TEST(Imagery, AveragesFinerPixelsWithAndWithoutOverviews) {
 TEST(Imagery, OverviewsOfOddSidesShowThePixelsWhereTheyAre) {
   const TempDir dir;
   ImageSpec spec = TileSpec(8);
-  spec.width = spec.height = 2041;  // ends within the tile
+  spec.width = spec.height = 2041;  // the image ends within the tile
   spec.overviews = {2, 4, 8};
   const auto level = [](int pixel) { return std::clamp(pixel - 1800, 0, 240); };
   spec.color = [&](int column, int row) { return Color{level(column), level(row), 7}; };
@@ -137,7 +137,7 @@ TEST(Imagery, InterpolatesCoarserPixelsAcrossTiles) {
   const auto west = ReadOrFail(*imagery, {9, 65 * 8 + 3, 32 * 8 + 4}, 256);
   const auto east = ReadOrFail(*imagery, {9, 65 * 8 + 4, 32 * 8 + 4}, 256);
   ASSERT_TRUE(west.has_value() && east.has_value());
-  // 8 pixels to one of the image's: the ramp goes on over the edge.
+  // 8 pixels for one of the image: the ramp continues across the edge.
   EXPECT_LE(At(*west, 9, 255)[0], At(*east, 9, 0)[0]);
   EXPECT_LE(At(*east, 9, 0)[0] - At(*west, 9, 255)[0], 1);
   for (int column = 1; column < 256; ++column) {

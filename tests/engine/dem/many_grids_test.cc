@@ -1,4 +1,4 @@
-// Mosaics of rasters far apart or all around the Earth: their bounds, and what shallow tiles take of many.
+// Mosaics of distant rasters or around the Earth: their bounds, and shallow tiles of many rasters.
 #include <cmath>
 #include <utility>
 
@@ -29,7 +29,7 @@ TEST(ManyGrids, BoundsReachAroundTheAntimeridian) {
   EXPECT_EQ(bounds({{-100, 120}, {100, 300}}), std::pair(-180.0, 180.0)) << "all around";
 }
 
-// Where pieces meet their corners differ by rounding.
+// Corners of adjacent pieces differ by rounding.
 TEST(ManyGrids, PiecesOfTheGlobeHaveItsBounds) {
   for (const int width : {90, 110, 130, 170, 230, 330, 410}) {
     const TempDir dir;
@@ -49,8 +49,8 @@ TEST(ManyGrids, PiecesOfTheGlobeHaveItsBounds) {
   }
 }
 
-// More raster grids than are asked about whole windows, far apart and across the antimeridian, each of one height: what
-// a shallow tile has of them is what they have at its nodes.
+// More raster grids than the limit for querying whole windows, far apart and across the antimeridian, each of one
+// height. A shallow tile must have their heights at its nodes.
 TEST(ManyGrids, ManySmallGridsLieWhereTheyDo) {
   const TempDir dir;
   std::vector<DemFile> files;
@@ -58,7 +58,7 @@ TEST(ManyGrids, ManySmallGridsLieWhereTheyDo) {
     RasterSpec spec;
     spec.width = 30 + k;
     spec.height = 20;
-    const double step = 0.1 + k * 0.003;  // no two on one grid
+    const double step = 0.1 + k * 0.003;  // all on different grids
     spec.geo_transform = {-181.7 + k * 15.01, step, 0, 60.0 - k * 4.9, 0, -step};
     spec.value = [k](int, int) { return 100.0 + k; };
     files.push_back({WriteRaster(dir, spec, "s" + std::to_string(k) + ".tif")});
@@ -98,8 +98,8 @@ TEST(ManyGrids, ManySmallGridsLieWhereTheyDo) {
   EXPECT_GT(found, 500);
 }
 
-// A raster of half the Earth over one of all of it, whose columns begin anew under the first or at its edge: what is
-// wanted of the second lies at both ends of a shallow tile, and nothing between.
+// A raster of half the Earth over one of the whole Earth whose columns start below the first or at its edge. A shallow
+// tile needs the second raster at both ends, and not between.
 TEST(ManyGrids, WhatIsWantedOfTheEarthMayLieAtBothEndsOfATile) {
   for (const double west : {-180.0, -90.0, -60.0, 20.0}) {
     const TempDir dir;

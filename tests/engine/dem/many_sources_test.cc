@@ -1,4 +1,4 @@
-// Thousands of sources: what is looked at for a tile, what stays in memory, and how they are opened.
+// Thousands of sources: which of them a tile examines, what stays in memory, and how they are opened.
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
 
@@ -62,7 +62,7 @@ GridTrace TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo
   return trace;
 }
 
-// What the tables of all members say of a box.
+// The range of a box from the tables of all members.
 BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, double east, double south) {
   BlockRange range;
   for (const GridMember& member : grid.members()) {
@@ -72,7 +72,8 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
   return range;
 }
 
-// Asks for a box around every position of a trace. How many members were looked at, of one box at most and for all.
+// Queries a box around every position of a trace. Returns how many members were examined: the maximum of a box, and in
+// all.
 std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
   const GridStatistics tables(grid, trace);
   std::size_t most = 0;
@@ -89,7 +90,7 @@ std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const Gri
   return {most, tables.members_visited()};
 }
 
-// Columns of a raster grid around the Earth begin anew at one meridian: a tile there has pixels at both ends.
+// Columns of a raster grid around the Earth start at one meridian, so a tile there has pixels at both ends.
 TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
   const TempDir dir;
   const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
@@ -105,7 +106,7 @@ TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
   }
 }
 
-// A shallow tile of many sources: the index tells which of them a box meets.
+// The index finds the sources that a box of a shallow tile meets.
 TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
   const TempDir dir;
   const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
@@ -115,7 +116,7 @@ TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
   EXPECT_LE(most, 4U);
 }
 
-// Nodes beyond a projected raster grid have no positions; they must not make the tile look at all sources.
+// Nodes outside a projection have no positions, and must not make the tile examine all sources.
 TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   const TempDir dir;
   const RasterGrid grid = MakeGrid(dir, {300'000, 100, 0, 5'000'000, 0, -100}, "EPSG:32632", 12, 12, 20);
@@ -125,7 +126,7 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   const geo::TileKey corner{11, static_cast<std::int64_t>((west + 0.02 + 180) / tile),
                             static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
   GridTrace trace = TraceOf(grid, lattice, corner);
-  // As nodes far from a raster grid and outside its projection have it.
+  // Positions of nodes far from a raster grid and outside its projection.
   std::vector<Position> nodes(trace.positions.nodes().begin(), trace.positions.nodes().end());
   std::fill_n(nodes.begin(), 40, kNowhere);
   trace.positions = NodePositions(trace.positions.window(), std::move(nodes));
@@ -134,11 +135,11 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   EXPECT_LE(most, 8U);
 }
 
-// kShift: of every other row of rasters to the east.
+// kShift: shift of every other row of rasters to the east.
 constexpr int kSide = 40, kAcross = 4, kShift = 13, kStride = kAcross * kSide + kShift;
 
-// Rasters of kSide x kSide samples, kAcross x kAcross of them without those of `missing`, beside each other or, with
-// `shared` rows and columns, over each other's edges.
+// kAcross x kAcross rasters of kSide x kSide samples without those in `missing`, adjacent or overlapping by `shared`
+// rows and columns.
 std::vector<GridMember> MakeMembers(const TempDir& dir, const std::vector<std::uint8_t>& missing, int shared,
                                     const std::vector<std::uint8_t>& voids) {
   std::vector<GridMember> members;
@@ -166,7 +167,7 @@ BoxIndex IndexOfMembers(const std::vector<GridMember>& members) {
   return BoxIndex(entries);
 }
 
-// Voids of all members that a flood from the places without a raster does not reach.
+// Voids of all members that a flood fill from positions without a raster does not reach.
 std::vector<std::uint8_t> HolesByFlood(const std::vector<GridMember>& members, const std::vector<std::uint8_t>& voids,
                                        int side) {
   std::vector<std::uint8_t> holes(voids.size());
@@ -225,7 +226,7 @@ TEST(ManySources, VoidsThatGoOnInANeighbourAreThoseThatAFloodFinds) {
   }
 }
 
-// What thousands of rasters cost that are mostly not stored: not as much as their rims have pixels.
+// The cost of thousands of sparse rasters must not be proportional to the pixels of their rims.
 TEST(ManySources, VoidsAreComparedAsOftenAsSomethingChangesAlongTheRims) {
   const TempDir dir;
   std::vector<std::uint8_t> voids(kStride * kStride, 1);
@@ -275,7 +276,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
   EXPECT_EQ(kept->ReadBlocks(64, {3, 4, 5, 6}, {}).value(), paged.ReadBlocks(64, {3, 4, 5, 6}, {}).value());
 }
 
-// A shallow tile takes a few averages of each of hundreds of sources; their samples would take a minute.
+// A shallow tile reads a few averages of each of hundreds of sources; reading their samples would take a minute.
 TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
   const TempDir dir, cache;
   const std::string path = WriteRaster(dir, Rough(1500)), small = WriteRaster(dir, Rough(500), "small.tif");
@@ -403,7 +404,7 @@ std::vector<DemFile> WriteFolder(const TempDir& dir, int count) {
   return files;
 }
 
-// Whatever ends first.
+// For any order in which they end.
 TEST(ManySources, TheFirstFaultIsToldAndWithAListenerAllInOrder) {
   const TempDir dir;
   std::vector<DemFile> files = WriteFolder(dir, 40);
@@ -444,7 +445,7 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
 
-// What opening them writes to the log.
+// The log of opening the files.
 std::string LogOf(const std::vector<DemFile>& files) {
   std::ostringstream text;
   const auto before = spdlog::default_logger();
@@ -462,8 +463,8 @@ TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
 }
 
-// The grid closes on whole columns. What is left of the turn lies between its last column and its first, where a bound
-// on the error must count it.
+// The grid closes on whole columns. The remainder of 360 degrees is between its last and its first column, and a bound
+// on the error must include it.
 TEST(OneSource, WhatIsLeftOfAFullTurnCountsAsMisplacement) {
   for (const double left : {0.0, -0.0095, 0.0095}) {  // columns
     const TempDir dir;

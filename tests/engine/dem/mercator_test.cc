@@ -12,7 +12,7 @@ struct Spot {
   std::int64_t column, row;
 };
 
-// The pixel that holds a position, by the textbook.
+// The pixel that contains a position, by the textbook formula.
 Spot PixelAt(int depth, double longitude, double latitude) {
   const double size = std::ldexp(256, depth), radians = latitude * std::numbers::pi / 180;
   const double y = (1 - std::asinh(std::tan(radians)) / std::numbers::pi) / 2;
@@ -70,7 +70,7 @@ TEST(Mercator, IsAsDeepAsTheSourceIsFine) {
   EXPECT_EQ(OpenOrFail(WriteRaster(dir, world, "world.tif"))->info().max_mercator_depth, 1);
 }
 
-// Whatever the window, a pixel has the same bits: two halves and the whole, on every kind of CRS.
+// A pixel has the same bits in every window: in two halves and in the whole, for every kind of CRS.
 TEST(Mercator, PixelsDoNotDependOnTheirTile) {
   for (const std::string& name : RealRasters()) {
     TERRACE_REQUIRE_DATA(path, name);

@@ -15,7 +15,7 @@
 namespace terrace::dem {
 namespace {
 
-// Rough, and the same for a pixel of the whole whichever piece holds it.
+// Rough terrain, a function of the pixel of the whole raster.
 double Terrain(int column, int row) {
   std::uint32_t hash = static_cast<std::uint32_t>(column) * 73856093u ^ static_cast<std::uint32_t>(row) * 19349663u;
   hash = (hash ^ hash >> 13) * 0x5bd1e995u;
@@ -25,12 +25,12 @@ double Terrain(int column, int row) {
 struct Cut {
   std::string name;
   RasterSpec whole;
-  std::vector<int> columns, rows;  // where pieces begin; the first is 0
+  std::vector<int> columns, rows;  // first columns and rows of pieces; the first is 0
   int shared = 0;                  // columns and rows that neighbours have in common
-  std::string first_crs = {};      // of the first piece, if it is another one than the whole's
+  std::string first_crs = {};      // of the first piece, if it differs from the whole's
 };
 
-// The whole, and its pieces as files of one rank.
+// Writes the pieces as files of one rank.
 std::vector<DemFile> WritePieces(const TempDir& dir, const Cut& cut) {
   std::vector<DemFile> files;
   const auto end = [](const std::vector<int>& starts, std::size_t i, int size, int shared) {
@@ -64,7 +64,7 @@ RasterSpec Seconds(int width, int height) {
 }
 
 std::vector<Cut> Cuts() {
-  const auto holes = [](int c, int r) {  // small ones, one of them on the joint, and a large one
+  const auto holes = [](int c, int r) {  // small holes, one of them on the joint, and a large one
     const bool small = (c - 300) * (c - 300) + (r - 200) * (r - 200) < 90 || (c * 7 + r * 13) % 101 == 0;
     return small || (c > 320 && c < 520 && r > 30 && r < 150) ? -9999.0 : Terrain(c, r);
   };
@@ -72,7 +72,7 @@ std::vector<Cut> Cuts() {
   cuts.push_back({"nodes", Seconds(601, 481), {0, 304}, {0, 240}, 1});
   cuts.push_back({"pixels", Seconds(600, 480), {0, 304}, {0, 240}, 0});
   cuts.push_back({"odd", Seconds(600, 480), {0, 301}, {0, 239}, 0});
-  cuts.push_back({"unit", Seconds(600, 480), {0, 304}, {0, 240}, 0});  // which one file states, and no datum
+  cuts.push_back({"unit", Seconds(600, 480), {0, 304}, {0, 240}, 0});  // one file states the unit, and none a datum
   cuts.back().first_crs =
       R"(COMPD_CS["WGS 84 + unknown",GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563,)"
       R"(AUTHORITY["EPSG","7030"]],AUTHORITY["EPSG","6326"]],PRIMEM["Greenwich",0,AUTHORITY["EPSG","8901"]],)"
@@ -94,8 +94,8 @@ std::vector<Cut> Cuts() {
   return cuts;
 }
 
-// Averages of blocks that no cut runs through are equal to the bit; where one does, sums are taken in another order,
-// and at voids block by block.
+// Averages of blocks that are not cut are equal to the bit. In blocks that are cut, sums have another order, and voids
+// are handled block by block.
 void ExpectEqual(std::span<const float> whole, std::span<const float> pieces, bool exact, double tolerance,
                  const std::string& what) {
   ASSERT_EQ(whole.size(), pieces.size());
@@ -123,7 +123,7 @@ TEST(Mosaic, PiecesOfARasterAreThatRaster) {
     for (int level = 0; level <= whole->max_level(); ++level) {
       EXPECT_EQ(pieces->Available(level), whole->Available(level)) << level;
       ASSERT_EQ(pieces->LatticeOf(level).cells, whole->LatticeOf(level).cells);
-      // Finer than 16 samples a cell: the alignment of most cuts above.
+      // Up to 16 samples a cell, which is the alignment of most cuts above.
       const bool exact = cut.name == "odd" ? !has_voids : level >= whole->max_level() - 6;
       for (const geo::TileKey& key : SomeTiles(*whole, level, 6)) {
         const auto a = whole->Read(key), b = pieces->Read(key);
@@ -179,7 +179,7 @@ float HeightAt(const DemSource& source, double longitude, double latitude) {
   return height ? height->front() : -1e9f;
 }
 
-// Height of the node nearest to a place, as tiles of the level have it.
+// Height of the node nearest to a position, in tiles of the level.
 float NodeAt(const DemSource& source, int level, double longitude, double latitude) {
   const geo::Lattice lattice = source.LatticeOf(level);
   const NodeWindow window{std::llround((longitude + 180) / lattice.StepDegrees()),
@@ -227,10 +227,10 @@ TEST(Mosaic, OfOneRankTheFinerSourceWinsThenTheName) {
   const std::string coarse = WriteRaster(dir, FlatSquare(0, 10, 10, 1, 1), "a.tif");
   const std::string fine = WriteRaster(dir, FlatSquare(3, 7, 40, 0.1, 2), "b.tif");
   const std::string beside =
-      WriteRaster(dir, FlatSquare(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: a raster grid apart
+      WriteRaster(dir, FlatSquare(3.05, 7, 40, 0.1, 3), "c.tif");  // half a pixel off: another raster grid
   const auto source = OpenOrFail({{coarse}, {beside}, {fine}});
   EXPECT_EQ(HeightAt(*source, 5, 5), 2);
-  EXPECT_EQ(HeightAt(*source, 7.03, 5), 3);  // of `beside` alone
+  EXPECT_EQ(HeightAt(*source, 7.03, 5), 3);  // only `beside` covers it
   EXPECT_EQ(HeightAt(*source, 1, 1), 1);
 }
 
@@ -265,7 +265,7 @@ TEST(Mosaic, HeightsLieWithinTheBoundOfTheirTile) {
     SCOPED_TRACE(cut.name);
     const TempDir dir;
     std::vector<DemFile> files = WritePieces(dir, cut);
-    files.pop_back();  // one corner shows what lies below
+    files.pop_back();  // one corner shows the source below
     files.push_back({WriteRaster(dir, FlatSquare(-180, 90, 18, 10, -500), "base.tif"), 1});
     const auto source = OpenOrFail(files);
     ASSERT_NE(source, nullptr);
@@ -367,7 +367,7 @@ TEST(Mosaic, FeatherLeadsFromOneSourceToTheNext) {
   for (double inside = 0.01; inside < 0.5; inside += 0.01) {  // towards the middle of the northern half
     const double height = NodeAt(*soft, level, 11, 50 - inside);
     EXPECT_LE(height, before + 0.01) << inside;
-    EXPECT_LT(before - height, 30) << inside;  // 200 m over 18 samples, not all at once
+    EXPECT_LT(before - height, 30) << inside;  // 200 m over 18 samples, without a step
     const double metres = inside * 111'200;
     EXPECT_NEAR(height, metres > 21'500 ? 100 : 300 - 200 * std::min(1.0, metres / 20'000), 25) << inside;
     before = height;

@@ -1,4 +1,5 @@
-// What is given back while there is no memory is let go. A program of its own, as it replaces operator new.
+// An object that is returned while there is no memory is destroyed. A separate program, because it replaces operator
+// new.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -11,7 +12,7 @@
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace {
-// The next allocation of this thread fails; only that one, as GDAL could not close a file otherwise.
+// The next allocation of this thread fails, and only this one, because otherwise GDAL could not close a file.
 thread_local bool fails_next = false;
 }  // namespace
 
@@ -33,7 +34,7 @@ TEST(NoMemory, LetsOperationsGo) {
   first.emplace(**geoid);
   second.emplace(**geoid);
   const double expected = second->At({8, 46});
-  first.reset();  // the pool has room for it, which the first one took
+  first.reset();  // the pool has memory for it, because the first one allocated it
   fails_next = true;
   second.reset();
   EXPECT_FALSE(fails_next) << "nothing was asked for";

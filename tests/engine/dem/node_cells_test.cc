@@ -1,5 +1,5 @@
-// Nodes whose positions are those of their columns and rows are read by lines of samples; what comes out is what each
-// node gives on its own.
+// If node positions are separable into columns and rows, nodes are read by lines of samples. The result must be equal
+// to reading each node separately.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -17,7 +17,7 @@
 namespace terrace::dem {
 namespace {
 
-// A raster, a window of nodes over it, and the nodes that are wanted.
+// A raster, a window of nodes over it, and the requested nodes.
 class Case {
  public:
   explicit Case(unsigned seed) : random_(seed) {
@@ -26,9 +26,9 @@ class Case {
     width_ = wraps_ ? 64 * (1 + Pick(4)) : 5 + Pick(200);
     height_ = 5 + Pick(200);
     nodes_ = {0, 0, 2 + Pick(40), 2 + Pick(40)};
-    const bool is_wide = wraps_ && Pick(3) == 0;  // half a turn, as a tile of level 0 and its halo
+    const bool is_wide = wraps_ && Pick(3) == 0;  // half of the Earth, like a tile of level 0 with its halo
     const double step = is_wide ? width_ / 2.0 / nodes_.columns : (0.2 + Pick(30) * 0.1) * factor_;
-    // Columns that another raster grid has filled, in half of the cases.
+    // In half of the cases another raster grid has filled some columns.
     const int hidden = Pick(nodes_.columns), hidden_end = Pick(2) == 0 ? hidden : hidden + Pick(nodes_.columns);
     const double west = Pick(width_ + 40) - 20, north = Pick(height_ + 40) - 20;
     for (int i = 0; i < nodes_.columns; ++i) x_.push_back(Placed(west + i * step));
@@ -56,7 +56,7 @@ class Case {
   bool is_any_wanted() const { return std::ranges::count(wanted_, std::uint8_t{1}) > 0; }
   const NodeWindow& nodes() const { return nodes_; }
 
-  // Heights that take all bits of a float, one in twelve void.
+  // Heights that use all bits of a float; one in twelve is void.
   std::vector<float> Samples(const GridWindow& window) {
     std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
     std::uniform_real_distribution<float> height(-500, 9000);
@@ -66,7 +66,7 @@ class Case {
 
  private:
   int Pick(int count) { return static_cast<int>(random_() % static_cast<unsigned>(count)); }
-  // As Georeference::ToPixels gives columns: inside the raster where it wraps.
+  // Like Georeference::ToPixels: columns are inside the raster if it wraps.
   double Placed(double x) const { return wraps_ ? x - std::floor(x / width_) * width_ : x; }
 
   std::mt19937 random_;
@@ -77,7 +77,7 @@ class Case {
   std::vector<std::uint8_t> wanted_;
 };
 
-// The cells of wanted nodes lie in the window, as far as their samples count.
+// The cells of requested nodes are in the window, as far as their samples count.
 void ExpectInside(const NodeCells& cells, const GridWindow& window, const Case& one) {
   const auto columns = static_cast<std::size_t>(one.nodes().columns);
   for (std::size_t n = 0; n < one.wanted().size(); ++n) {
@@ -145,7 +145,7 @@ TEST(NodeRows, AreBitForBitWhatEachNodeGives) {
         if (row[i] == 0) continue;
         const auto expected = Interpolate(samples, window, cells.At(i, j));
         const double height = heights[i - first];
-        if (std::isnan(height)) {  // one of its samples is void; what the others give is for Interpolate
+        if (std::isnan(height)) {  // one of its samples is void; Interpolate handles the others
           ++voids;
           continue;
         }
@@ -159,7 +159,7 @@ TEST(NodeRows, AreBitForBitWhatEachNodeGives) {
   EXPECT_GT(voids, 10'000);
 }
 
-// Between four samples the surface is bilinear; of voids it takes those that are there by their weights.
+// Between four samples the surface is bilinear. Beside voids it is the weighted mean of the valid samples.
 TEST(Interpolate, IsBilinearAndLeavesVoidsOut) {
   const GridWindow window{10, 20, 2, 2};
   const float none = std::numeric_limits<float>::quiet_NaN();

@@ -1,4 +1,4 @@
-// Every bad input is refused with a message that names the file and the remedy.
+// Every bad input is rejected with a message that names the file and the remedy.
 #include <gdal_priv.h>
 
 #include <fstream>

@@ -1,4 +1,4 @@
-// Overviews of rasters whose sides are no multiples of their factors: heights lie where the ground lies.
+// Overviews of rasters whose sides are not multiples of the factors: heights are at the right positions.
 #include <gdal_priv.h>
 
 #include <algorithm>
@@ -15,13 +15,13 @@ namespace terrace::dem {
 namespace {
 
 constexpr double kPixel = 1 / 120.0;
-// Metres of height to a pixel of the ramps, along either axis; and how far off heights may be: a 64th of a sample of
-// factor 16, as averages of averages of so few samples are a little off themselves.
+// Slope of the ramps in metres a pixel along both axes, and the permitted error: a 64th of a sample of factor 16,
+// because averages of averages of few samples have a small error.
 constexpr double kAcross = 4, kDown = 16, kSlack = 5;
 
 double Ramp(double column, double row) { return kAcross * column + kDown * row; }
 
-// Its first pixel is the ramp's at `west`; its first pixel's centre lies at 10 degrees and as many pixels east.
+// The first pixel is the ramp's at column `west`; its centre is `west` pixels east of 10 degrees.
 RasterSpec RampSpec(int width, int height, int west = 0) {
   RasterSpec spec{.width = width, .height = height, .overviews = {2, 4, 8, 16}};
   spec.geo_transform = {10 + (west - .5) * kPixel, kPixel, 0, 47 + .5 * kPixel, 0, -kPixel};
@@ -41,7 +41,7 @@ TEST(OverviewAxis, PutsBlocksBetweenTheSamplesAroundTheirCentres) {
     EXPECT_EQ(even.Around(block).index, block);
     EXPECT_EQ(even.Around(block).weight, 0);
   }
-  // Three samples of 3 pixels with centres 1.5, 4.5, 7.5 for blocks of 4 with centres 2, 6, 8.5.
+  // Three samples of 3 pixels each, with centres 1.5, 4.5 and 7.5, for blocks of 4 with centres 2, 6 and 8.5.
   const OverviewAxis odd(GridAxis(9, 4, false), 9, 3, false);
   EXPECT_EQ(odd.Around(0).index, 0);
   EXPECT_DOUBLE_EQ(odd.Around(0).weight, .5 / 3);
@@ -52,7 +52,7 @@ TEST(OverviewAxis, PutsBlocksBetweenTheSamplesAroundTheirCentres) {
   const OverviewAxis around(GridAxis(9, 4, true), 9, 3, false);  // the first sample again at 10.5
   EXPECT_EQ(around.Around(2).index, 2);
   EXPECT_DOUBLE_EQ(around.Around(2).weight, 1.0 / 3);
-  // Column 8 is column 0 again, which samples take for a further one: the first again at 9.5.
+  // Column 8 is column 0 again, but samples count it as a further column: the first again at 9.5.
   const OverviewAxis twice(GridAxis(8, 4, true), 9, 3, false);
   EXPECT_EQ(twice.Around(1).index, 1);
   EXPECT_DOUBLE_EQ(twice.Around(1).weight, .5);
@@ -61,7 +61,7 @@ TEST(OverviewAxis, PutsBlocksBetweenTheSamplesAroundTheirCentres) {
   EXPECT_EQ(own.Around(1).weight, 0);
 }
 
-// JPEG's own, which it makes of whole blocks; then GDAL's beside it.
+// First JPEG's own overviews of whole blocks, then GDAL's in a separate file.
 TEST(Overviews, OfAFormatStandForWholeBlocks) {
   const TempDir dir;
   RasterSpec spec{.width = 1001, .height = 300, .type = "Byte"};
@@ -107,7 +107,7 @@ TEST(Overviews, BlocksLieWhereTheyLieWithout) {
       for (std::int64_t r = 0; r < rows.count(); ++r) {
         for (std::int64_t c = 0; c < columns.count(); ++c) {
           const double truth = Ramp(columns.Center(c) - .5, rows.Center(r) - .5);
-          // The last block may lie beyond the last sample's centre, by less than half a sample.
+          // The centre of the last block may be beyond the last sample's, by less than half a sample.
           const double beyond_x = c + 1 == columns.count() && width % factor != 0 ? kAcross * factor / 2 : 0;
           const double beyond_y = r + 1 == rows.count() && height % factor != 0 ? kDown * factor / 2 : 0;
           ASSERT_NEAR((*read)[static_cast<std::size_t>(r * columns.count() + c)], truth, kSlack + beyond_x + beyond_y)
@@ -118,8 +118,8 @@ TEST(Overviews, BlocksLieWhereTheyLieWithout) {
   }
 }
 
-// Sides of a raster and of its overviews are free, and what is read of each is counted. Heights are columns of the
-// raster, as its overviews show them.
+// A raster and overviews of any size that count their reads. Heights are columns of the raster, at the resolution of
+// each overview.
 class CountingDataset : public GDALDataset {
  public:
   class Band : public GDALRasterBand {
@@ -162,7 +162,7 @@ class CountingDataset : public GDALDataset {
   Band& band() { return static_cast<Band&>(*GetRasterBand(1)); }
 };
 
-// A degree of SRTM as a cloud-optimized GeoTIFF has it, as gdaladdo does, and with an axis of each kind.
+// A degree of SRTM with the overview sizes of cloud-optimized GeoTIFFs, of gdaladdo, and with one axis of each.
 TEST(Overviews, OfSidesRoundedEitherWayAreReadInPlaceOfTheRaster) {
   GDALAllRegister();
   constexpr int kSide = 3601;
@@ -186,7 +186,7 @@ TEST(Overviews, OfSidesRoundedEitherWayAreReadInPlaceOfTheRaster) {
     EXPECT_EQ(dataset.band().overviews[0]->blocks_read + dataset.band().overviews[1]->blocks_read, 0);
     EXPECT_EQ(dataset.band().overviews[2]->blocks_read, 29 * 29);
     for (std::int64_t c = 0; c < blocks.count(); ++c) {
-      // Beyond the last sample's centre it counts on.
+      // Heights beyond the last sample's centre are extrapolated.
       const double last = kSide - 0.5 * kSide / sides[2].first;
       ASSERT_NEAR((*heights)[static_cast<std::size_t>(7 * blocks.count() + c)],
                   std::clamp(blocks.Center(c), kSide - last, last), 1e-3)
@@ -200,7 +200,7 @@ TEST(Overviews, OfOtherSidesAreLeftAlone) {
   EXPECT_TRUE(OverviewFactors(dataset.band()).empty());
 }
 
-// The largest distance of heights from the ramp, at nodes that lie this many pixels within its sides.
+// The largest distance of heights from the ramp, at nodes at least `margin` pixels inside.
 double LargestOff(const DemSource& source, int level, int width, int height, double margin) {
   const geo::Lattice lattice = source.LatticeOf(level);
   const double step = lattice.StepDegrees();
@@ -223,7 +223,7 @@ double LargestOff(const DemSource& source, int level, int width, int height, dou
   return worst;
 }
 
-// As GDAL writes them: heights lie where the ground lies.
+// Overviews written by GDAL: heights are at the right positions.
 TEST(Overviews, OfCloudOptimizedGeoTiffsShowTheGroundWhereItIs) {
   const TempDir dir;
   RasterSpec spec = RampSpec(1001, 777);
@@ -303,14 +303,15 @@ TEST(Overviews, OfAMosaicHaveNoStepAtTheJoint) {
   }
 }
 
-// 3,601 samples a side: most of a tile is as without overviews, within what other averages make of steep ground.
+// 3,601 samples a side: most of a tile is the same as without overviews, within the difference that other averages make
+// on steep ground.
 TEST(Overviews, OfRealGroundChangeLittle) {
   TERRACE_REQUIRE_DATA(path, "srtm1_N20W157_maui_se_haleakala.tif");
   const TempDir dir;
   const std::string copy = dir.File("copy.tif");
   std::filesystem::copy_file(path, copy);
   std::filesystem::permissions(copy, std::filesystem::perms::owner_write, std::filesystem::perm_options::add);
-  GDALAllRegister();  // nothing was opened yet where this test runs alone
+  GDALAllRegister();  // GDAL is not initialized yet if this test runs alone
   {
     const GDALDatasetUniquePtr dataset(GDALDataset::Open(copy.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
     ASSERT_NE(dataset, nullptr);

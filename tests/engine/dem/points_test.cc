@@ -96,7 +96,7 @@ TEST(Points, GoRoundTheEarth) {
   EXPECT_NEAR((*heights)[4], 179.75, .3);
 }
 
-// Corners are written with few digits: what is left between the last column and the first is no gap.
+// Corners are written with few digits, but the remainder between the last and the first column is not a gap.
 TEST(Points, LieNowhereBetweenTheEndsOfAGlobalRaster) {
   const TempDir dir;
   RasterSpec spec{.width = 360, .height = 180, .geo_transform = {-180, 359.9985 / 360, 0, 90, 0, -1}};
@@ -119,7 +119,7 @@ TEST(Points, LieNowhereBetweenTheEndsOfAGlobalRaster) {
   EXPECT_EQ((*on_slope)[4], (*on_slope)[5]) << "180 and -180 degrees";
 }
 
-// Eastings that go on beyond the antimeridian, or from the prime meridian all around.
+// Eastings that continue beyond the antimeridian, or go around the Earth from the prime meridian.
 TEST(Points, OfACylindricalProjectionLieOnBothSidesOfTheAntimeridian) {
   constexpr double kHalfTurn = 20'037'508.342789244;  // of EPSG:3857, metres
   const TempDir dir;
@@ -152,7 +152,7 @@ TEST(Points, OfACylindricalProjectionLieOnBothSidesOfTheAntimeridian) {
   }
 }
 
-// Of rotated rasters any corner may be the one beyond the antimeridian; a first row may lie beyond the pole.
+// In rotated rasters any corner may be beyond the antimeridian, and a first row may be beyond the pole.
 TEST(Points, BeyondTheAntimeridianAreFoundFromEveryCornerAndRow) {
   constexpr double kDegree = 20'037'508.342789244 / 180;  // of EPSG:4087, metres
   constexpr double kPixel = kDegree / 10;

@@ -1,5 +1,5 @@
-// Statistics of rasters and their cache: equal heights with and without, resumed, shared, and never believed when
-// damaged.
+// Statistics of rasters and their cache: equal heights with and without it, continued after interruptions, shared, and
+// rejected if damaged.
 #include "engine/dem/sources/prepare.h"
 
 #include <gdal_priv.h>
@@ -29,7 +29,7 @@ double Terrain(int column, int row) {
          ((column * 7919 + row * 104729) % 97) * .37;
 }
 
-// Without overviews and larger than what is read whole: sparse, with a few patches of terrain and voids in them.
+// A raster without overviews that is too large to be read whole: sparse, with a few patches of terrain that have voids.
 std::string WriteLargeRaster(const TempDir& dir, const std::string& name = "large.tif") {
   GDALAllRegister();
   const std::string path = dir.File(name);
@@ -123,7 +123,7 @@ TEST(Prepare, TilesAreTheSameWithAndWithoutACache) {
   }
 }
 
-// Every sample against the surface between averages, by reading both anew.
+// Compares every sample with the surface between averages, by reading both separately.
 void ExpectErrorsHold(const std::string& path) {
   const auto source = OpenWithCache(path, {});
   const auto dataset = OpenRaster(path);
@@ -187,7 +187,7 @@ TEST(Prepare, ErrorsOfAveragesHoldForEverySample) {
   ExpectErrorsHold(WriteRaster(dir, globe, "odd_globe.tif"));
 }
 
-// A child opens the raster and is killed after this share; true if it died by that.
+// A child process opens the raster and is killed after this fraction; returns whether the kill ended it.
 bool KilledAfter(const std::string& path, const std::string& cache, double share) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -277,7 +277,7 @@ TEST(Prepare, RastersWhoseOverviewsMisleadAreLookedAtOnce) {
   const TempDir dir;
   RasterSpec spec{.width = 300, .height = 200, .type = "Int16", .geo_transform = {8, .01, 0, 47, 0, -.01}};
   spec.overviews = {2, 4};
-  spec.value = [](int col, int row) { return col < 100 && row < 90 ? -32768 : 500 + col; };  // not declared
+  spec.value = [](int col, int row) { return col < 100 && row < 90 ? -32768 : 500 + col; };  // undeclared
   const std::string path = WriteRaster(dir, spec), cache = dir.File("cache");
   using Files = std::map<std::string, FileIdentity>;
   const auto files = [&] {
@@ -336,7 +336,7 @@ TEST(Prepare, DamagedAveragesAreReadFromTheSourceAndMadeAnew) {
   const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
   const auto source = OpenWithCache(path, cache);
   const std::string cache_file = StatisticsPath(cache, path);
-  // Averages are most of the file: this hits them all.
+  // Overwrites all averages, which are most of the file.
   std::fstream file(cache_file, std::ios::binary | std::ios::in | std::ios::out);
   const auto size = std::filesystem::file_size(cache_file);
   for (std::uintmax_t at = 40; at < size * 9 / 10; at += 997) {
@@ -369,7 +369,7 @@ TEST(Prepare, AFolderThatCannotBeWrittenToCostsNothingButTheCache) {
   EXPECT_FALSE(source->preparation().from_cache);
 }
 
-// Several chunks, overviews that are worth nothing, and undeclared nodata values.
+// Several chunks, unusable overviews, and undeclared nodata values.
 std::string WriteRasterWithUndeclaredNodata(const TempDir& dir, const std::string& name = "marked.tif") {
   RasterSpec spec;
   spec.width = spec.height = 2100;

@@ -73,8 +73,8 @@ void ExpectRefused(const std::string& image, const std::string& dem, const std::
   }
 }
 
-// Red is the longitude, green the latitude, both in tenths of a degree from the corner at 6 E, 46 N: linear, so that
-// bilinear interpolation gives it back.
+// Red is the longitude, green the latitude, both in tenths of a degree from the corner at 6 E, 46 N. They are linear,
+// so bilinear interpolation is exact.
 ColorSpec Gradient() {
   return {
       .width = 200, .height = 100, .geo_transform = {6, .1, 0, 56, 0, -.1}, .value = [](int col, int row, int band) {
@@ -99,7 +99,7 @@ TEST(ReadColors, TakesPixelBySampleWithoutAGeoreference) {
 TEST(ReadColors, PlacesByDegrees) {
   const TempDir dir;
   const std::string image = WriteColors(dir, Gradient());
-  for (const double turn : {0.0, 360.0}) {  // a DEM that counts from 0 to 360 degrees or beyond
+  for (const double turn : {0.0, 360.0}) {  // also a DEM whose longitudes are 360 degrees larger
     const std::string dem =
         WriteRaster(dir, {.width = 30, .height = 20, .geo_transform = {8 + turn, .05, 0, 50, 0, -.05}});
     const auto colors = Colors(image, dem);
@@ -135,7 +135,7 @@ TEST(ReadColors, PlacesThroughProjWhereReferenceSystemsDiffer) {
 
 TEST(ReadColors, AveragesPixelsThatAreFinerThanSamples) {
   const TempDir dir;
-  // A chequerboard under samples that are 8 pixels apart: nearest or bilinear alone would give black or white.
+  // A checkerboard under samples that are 8 pixels apart: without averaging, colours would be black or white.
   const std::string image = WriteColors(dir, {.width = 128,
                                               .height = 128,
                                               .geo_transform = {500000, 1, 0, 5000000, 0, -1},
@@ -215,7 +215,7 @@ TEST(ReadImage, KnowsEveryKindOfBands) {
   EXPECT_EQ(pixel({.bands = 1, .nodata = 2, .has_palette = true, .value = index}, 2, 0)[3], 0);
   EXPECT_EQ(pixel({.bands = 3, .type = GDT_UInt16, .value = [](int, int, int band) { return band * 32767; }}, 0, 0),
             (ColorSample{0, 127, 255, 255}));
-  // No data in one band is a dark colour, in all of them it is none.
+  // A nodata value in one band is a dark colour; in all bands it is no colour.
   EXPECT_EQ(pixel({.nodata = 0, .value = [](int, int, int band) { return band; }}, 0, 0), (ColorSample{0, 1, 2, 255}));
   EXPECT_EQ(pixel({.nodata = 0}, 0, 0)[3], 0);
 }

@@ -1,4 +1,4 @@
-// Where the lattice is at least as fine as the source, heights are gdalwarp's: bilinear, exact positions.
+// If the lattice is at least as fine as the source, heights are equal to gdalwarp's: bilinear, at exact positions.
 #include <gdal_priv.h>
 #include <gdal_utils.h>
 
@@ -84,7 +84,7 @@ TEST(Reference, HeightsAreThoseOfGdalwarp) {
       for (const int share : {1, 2, 3}) {
         const geo::TileKey key{level, range.start_x + (range.end_x - range.start_x) * share / 4,
                                range.start_y + (range.end_y - range.start_y) * (4 - share) / 4};
-        // Along the source's edge GDAL and we choose differently.
+        // Along the source's edge GDAL's rule differs.
         if (key.x <= range.start_x || key.x >= range.end_x || key.y <= range.start_y || key.y >= range.end_y) continue;
         ExpectAgreement(path, *source, key);
         ++compared;

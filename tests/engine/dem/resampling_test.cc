@@ -1,4 +1,4 @@
-// Sampling on drawn rasters, where the right answer is known.
+// Sampling of synthetic rasters whose heights are known.
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
@@ -58,7 +58,7 @@ TEST(Resampling, EndsHalfAPixelBeyondTheOutermostCentres) {
 
 TEST(Resampling, GlobalSourcesWrap) {
   const TempDir dir;
-  // Node-registered with a duplicate column, and pixel-registered, both one degree.
+  // One raster registered at nodes with a duplicate column, one at pixels, both with one degree.
   RasterSpec nodes{.width = 361, .height = 181, .geo_transform = {-180.5, 1, 0, 90.5, 0, -1}};
   nodes.value = [](int col, int) { return 1000 * std::cos((col - 180) * .0174532925199433); };
   RasterSpec pixels{.width = 360, .height = 180, .geo_transform = {0, 1, 0, 90, 0, -1}};
@@ -116,7 +116,7 @@ TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloorOnDemand) {
   EXPECT_EQ(at(12.8, 17.2), -9);
 }
 
-// As gdalwarp -dstalpha and -co PIXELTYPE=SIGNEDBYTE leave them.
+// Rasters as gdalwarp -dstalpha and -co PIXELTYPE=SIGNEDBYTE write them.
 TEST(Resampling, AlphaOfAnyTypeAndSignedBytesAreUnderstood) {
   GDALAllRegister();
   const auto write = [](const std::string& path, GDALDataType type, int bands, const char* pixel_type) {

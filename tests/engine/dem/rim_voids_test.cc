@@ -1,4 +1,4 @@
-// Which voids touch the rim of a raster, found in one pass and against a flood.
+// Compares the one-pass search for voids that touch the rim with a flood fill.
 #include "engine/dem/statistics/rim_voids.h"
 
 #include <gtest/gtest.h>
@@ -127,7 +127,7 @@ TEST(RimVoids, SayHowFarTheyStayTheSame) {
   }
 }
 
-// Tens of thousands of rasters, of which the file stores a part: a run for each of their rows would take gigabytes.
+// For tens of thousands of sparse rasters a run for each row would take gigabytes.
 TEST(RimVoids, TakeMemoryForRowsThatDiffer) {
   std::vector<std::uint8_t> voids(3600 * 3600, 1), holes;
   for (std::size_t row = 2000; row < 2128; ++row) std::fill_n(&voids[row * 3600 + 1000], 128, 0);

@@ -1,5 +1,5 @@
-// Heights of samples, and their averages, against the rule of a single sample: the loops that the product runs take
-// other types, several samples at once and no branch, and must not change a bit.
+// Compares heights of samples and their averages with the rule for a single sample. The loops of the product use other
+// types, several samples at once and no branches, and must give the same bits.
 #include <gdal_priv.h>
 #include <gtest/gtest.h>
 
@@ -45,7 +45,7 @@ TEST(SampleConversion, OfAnyTypeIsThatOfTheSingleSample) {
     double scale = 1, offset = 0;
     std::string unit = {};
   };
-  // The nodata values between numbers that a type has are equal to none of its samples.
+  // Nodata values that the type cannot represent are equal to no sample.
   const std::vector<Case> cases = {{"Byte", 255.0},         {"Byte", 7.0000000001},     {"Int16", -9999.0},
                                    {"Int16", std::nullopt}, {"Int16", -9999.5},         {"Int16", 1e9},
                                    {"UInt16", 65535.0},     {"UInt16", 12.0, 0.25, -3}, {"Int16", 5.0, 1, 0, "ft"},
@@ -89,7 +89,7 @@ TEST(SampleConversion, OfAnyTypeIsThatOfTheSingleSample) {
   }
 }
 
-// Sums in the order of the samples: row by row within a block.
+// Sums are in the order of the samples: row by row within a block.
 TEST(BlockAverages, AreSumsOfTheSamplesOfABlockInTheirOrder) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> height(-400, 8800);

@@ -1,4 +1,4 @@
-// The bound of boxes does not depend on what was prepared for them.
+// The bound of a box does not depend on prepared tables.
 #include "engine/dem/bound/smooth_error_bound.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-// A source that changed under the server gives an error, never a flat or a mixed tile.
+// A source that changes while it is served gives an error, never a flat or a mixed tile.
 #include <cpl_vsi.h>
 
 #include <chrono>
@@ -48,7 +48,7 @@ TEST(SourceChanges, OverwrittenFileIsToldAndStaysSo) {
   ExpectChanged(*source);
 }
 
-// By its size and its time, which a copy may keep, it is the same file. What was learnt of it must not be believed.
+// Size and modification time are the same, but its statistics must not be used.
 TEST(SourceChanges, OneOverwrittenInPlaceWithItsTimesKeptIsAnother) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {}),
@@ -90,7 +90,7 @@ TEST(SourceChanges, ChangedPartOfAMosaicIsTold) {
   EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
 }
 
-// GDAL lists the parts of the outermost VRT alone.
+// GDAL lists only the parts of the outermost VRT.
 TEST(SourceChanges, ChangedPartOfAMosaicInAMosaicIsTold) {
   const TempDir dir;
   WriteRaster(dir, {}, "part.tif");
@@ -120,7 +120,7 @@ TEST(SourceChanges, ChangedPartOfAMosaicInAMosaicIsTold) {
   EXPECT_NE(again->fingerprint(), before);
 }
 
-// Files of GDAL's own file systems are told apart by name, size and time.
+// Files of GDAL's file systems are distinguished by name, size and time.
 TEST(SourceChanges, FilesElsewhereAreToldApart) {
   const auto put = [](const char* name, std::size_t size) {
     VSILFILE* const file = VSIFOpenL(name, "wb");
@@ -142,7 +142,7 @@ TEST(SourceChanges, FilesElsewhereAreToldApart) {
   VSIUnlink("/vsimem/b.tif");
 }
 
-// Whoever holds a handle on the new file when the old one comes back must not read from it.
+// When the old file comes back, handles of the new file must not be used.
 TEST(SourceChanges, TheFileMayComeBack) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});

@@ -1,5 +1,5 @@
-// Names of sources that are more than files: all are refused before GDAL sees them, with no byte on the network and no
-// file opened outside of the data roots.
+// Names of sources that are not plain files are rejected before GDAL gets them, without network access and without
+// opening files outside the data roots.
 #include "engine/dem/gdal/source_policy.h"
 
 #include <arpa/inet.h>
@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Accepts on a port of its own and counts.
+// Accepts connections on a free port and counts them.
 class Listener {
  public:
   Listener() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
@@ -60,7 +60,7 @@ class Listener {
   std::jthread thread_;
 };
 
-// Tells which files of a folder were opened.
+// Records which files of a folder are opened.
 class OpenWatch {
  public:
   explicit OpenWatch(const fs::path& folder) : queue_(::inotify_init1(IN_NONBLOCK)) {
@@ -233,7 +233,7 @@ TEST_F(SourcePolicyTest, TheWatchesSee) {
   EXPECT_EQ(web_.hits(), 1);
 }
 
-// What a file leads to is not reached either, were its name to pass.
+// Even if a name is accepted, GDAL cannot reach what the file refers to.
 TEST_F(SourcePolicyTest, GdalItselfReachesNoNetwork) {
   for (const std::string& name :
        {"/vsicurl/" + web_.url("dem.tif"), "/vsicurl_streaming/" + web_.url("dem.tif"), web_.url("dem.tif"),
@@ -317,7 +317,7 @@ TEST_F(SourcePolicyTest, WithoutRootsAVrtStaysInItsFolder) {
   EXPECT_TRUE(OpenRaster((root_ / "mosaic.vrt").string()));
   Write(root_ / "out.vrt", Vrt(Part((outside_ / "secret.tif").string())));
   const fs::path started_in = fs::current_path();
-  fs::current_path(root_);  // a bare name has a folder too
+  fs::current_path(root_);  // a bare name is relative to this folder
   EXPECT_TRUE(OpenRaster("mosaic.vrt"));
   for (const std::string& name : {(root_ / "out.vrt").string(), std::string("out.vrt"), std::string("./out.vrt")}) {
     const auto refused = OpenRaster(name);

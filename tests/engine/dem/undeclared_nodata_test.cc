@@ -1,5 +1,4 @@
-// Voids that files do not declare. What is drawn here is drawn twice: with the damage, and as terrain that only looks
-// like it.
+// Voids that files do not declare. Each case has a counterpart: real terrain that looks similar and must stay.
 #include "engine/dem/statistics/undeclared_nodata.h"
 
 #include <cpl_conv.h>
@@ -26,7 +25,7 @@ RasterSpec Synthetic(std::function<double(int, int)> value) {
 
 const RasterInfo& InfoOf(const DemSource& source) { return source.info().sources.front(); }
 
-// No height of any tile that touches the source lies beyond what is said.
+// All heights of all tiles that touch the source are within the range.
 void ExpectHeightsWithin(const DemSource& source, double lowest, double highest) {
   for (int level = 0; level <= source.max_level(); ++level) {
     for (const geo::TileKey& key : SomeTiles(source, level, 12)) {
@@ -68,7 +67,7 @@ TEST(UndeclaredNodata, CanBeSwitchedOffAndStated) {
 }
 
 TEST(UndeclaredNodata, ATrenchIsNoVoid) {
-  // A sea floor that passes through -9,999 m and holds declared voids.
+  // A sea floor that passes through -9,999 m and has declared voids.
   const TempDir dir;
   auto spec = Synthetic([](int col, int row) {
     if (col > 150 && row > 150) return -1.0;
@@ -106,7 +105,7 @@ TEST(UndeclaredNodata, NoRealRasterIsAccused) {
   if (seen == 0) GTEST_SKIP() << "SKIPPED, test data missing; set TERRACE_TEST_DATA";
 }
 
-// What resampling with a kernel leaves at the edge of a void: values between the nodata value and the ground.
+// Resampling with a kernel leaves values between the nodata value and the ground at the edge of a void.
 double Mixed(int col, int row) {
   const double distance = std::hypot(col - 100, row - 100) - 30;
   if (distance <= 0) return -1;
@@ -142,7 +141,7 @@ TEST(UndeclaredNodata, AWindowShowsTheSameVoidsAsTheWhole) {
   }
 }
 
-// A rotated square of data in a frame of zeros, as a reprojection without a nodata value leaves it.
+// A rotated square of data in a frame of zeros, as reprojection without a nodata value leaves it.
 double Framed(int col, int row) { return std::abs(col - 100) + std::abs(row - 100) > 90 ? 0 : Land(col, row); }
 
 TEST(UndeclaredNodata, ACollarOfZerosIsVoid) {
@@ -167,7 +166,7 @@ TEST(UndeclaredNodata, ASeaIsNoCollar) {
   EXPECT_EQ(InfoOf(*source).void_samples, 0u);
 }
 
-// Samples ten minutes apart: beside the sea the next one lies hundreds of metres up, at every coast of a steep country.
+// Samples are ten minutes apart, so at every coast of a steep country the next sample is hundreds of metres higher.
 TEST(UndeclaredNodata, ASeaOfACoarseRasterIsNoCollar) {
   const TempDir dir;
   RasterSpec spec = Synthetic([](int col, int row) {
@@ -201,7 +200,7 @@ TEST(UndeclaredNodata, FlatGroundAtZeroBelowACliffStays) {
 }
 
 TEST(UndeclaredNodata, NarrowBathymetryStays) {
-  // Tracks of a ship: every depth lies beside a void.
+  // Tracks of a ship: every depth is beside a void.
   const TempDir dir;
   const auto source =
       OpenOrFail(WriteRaster(dir, Synthetic([](int col, int row) { return row % 40 < 5 ? -4000.0 + col : -1.0; })));
@@ -211,7 +210,7 @@ TEST(UndeclaredNodata, NarrowBathymetryStays) {
   EXPECT_EQ(InfoOf(*source).heights.min, -4000);
 }
 
-// Opens what is drawn, with -99999 declared, and expects that every other sample is served.
+// Opens a raster with these values and -99999 as declared nodata, and expects that all other samples are served.
 void ExpectEverySampleStays(const std::function<double(int, int)>& value) {
   const TempDir dir;
   RasterSpec spec = Synthetic(value);
@@ -254,7 +253,7 @@ TEST(UndeclaredNodata, TracksOfAShipStay) {
 TEST(UndeclaredNodata, TerrainBetweenScatteredVoidsStays) {
   std::mt19937 random(2);
   for (const double share : {.003, .02, .1, .4, .8}) {
-    for (const double relief : {400.0, 2000.0}) {  // the latter leaps wherever it is
+    for (const double relief : {400.0, 2000.0}) {  // the second has steps everywhere
       SCOPED_TRACE(testing::Message() << share << ' ' << relief);
       std::vector<double> drawn(200 * 200);
       std::uniform_real_distribution<double> chance(0, 1);
@@ -267,7 +266,7 @@ TEST(UndeclaredNodata, TerrainBetweenScatteredVoidsStays) {
   }
 }
 
-// The statistics ends, or was cut off, just below -500 m: all that is deeper lies beside the void, and none elsewhere.
+// The data ends just below -500 m, so all deeper samples are beside the void.
 TEST(UndeclaredNodata, ASeaFloorThatEndsBelowTheLowestLandStays) {
   for (const double slope : {1.0, 20.0, 300.0}) {  // metres from a column to the next, 750 m on
     for (const int deep : {1, 2, 3}) {
@@ -280,7 +279,7 @@ TEST(UndeclaredNodata, ASeaFloorThatEndsBelowTheLowestLandStays) {
   }
 }
 
-// Samples in error beside three of many voids: these are voids, and what lies beside the others is none.
+// Wrong samples beside three of many voids become voids, but samples beside the other voids do not.
 TEST(UndeclaredNodata, VoidsWithoutMixturesDoNotGrow) {
   const TempDir dir;
   const auto is_void = [](int col, int row) { return col % 25 == 12 && row % 25 == 12; };
@@ -306,7 +305,7 @@ TEST(UndeclaredNodata, ACollarDoesNotGrowScatteredVoids) {
   EXPECT_EQ(InfoOf(*source).void_samples, voids);
 }
 
-// GDAL moves a raster by parts of a pixel, and does not know that the nodata value is none of its heights.
+// GDAL shifts a raster by fractions of a pixel, and treats the nodata value as a height.
 TEST(UndeclaredNodata, EdgesThatResamplingMixedAreFound) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> part(0.05, 0.95);
@@ -367,7 +366,7 @@ TEST(UndeclaredNodata, AnUndeclaredVoidOfARealRasterIsServedLikeADeclaredOne) {
   }
 }
 
-// Overviews that were made of voids too.
+// Overviews that average voids as heights.
 
 RasterSpec WithOverviews(double nodata, const std::string& type = "Float32") {
   RasterSpec spec = Synthetic([nodata](int col, int row) {
@@ -397,7 +396,7 @@ TEST(Overviews, OfSamplesThatTheConfigurationCallsVoidsAreNotUsed) {
   EXPECT_EQ(InfoOf(*trusted).overviews_unused, "");
 
   RasterSpec declared = WithOverviews(500);
-  declared.nodata = 500;  // what is stated twice is declared
+  declared.nodata = 500;  // a value that both the file and the options state is declared
   const auto both =
       OpenOrFail(WriteRaster(dir, declared, "declared.tif"), {.source = {.vertical = "unknown", .nodata = {500}}});
   ASSERT_NE(both, nullptr);
@@ -407,14 +406,14 @@ TEST(Overviews, OfSamplesThatTheConfigurationCallsVoidsAreNotUsed) {
 TEST(Overviews, OfUndeclaredVoidsAreNotUsed) {
   const TempDir dir;
   ExpectUnused(WriteRaster(dir, WithOverviews(-32768, "Int16")), {.vertical = "unknown"}, "not declared");
-  RasterSpec whole = WithOverviews(1100, "Int16");  // without a void nothing has to be declared
+  RasterSpec whole = WithOverviews(1100, "Int16");  // without voids no declaration is needed
   const auto source = OpenOrFail(WriteRaster(dir, whole, "whole.tif"), {.source = {.vertical = "unknown"}});
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(InfoOf(*source).overview_factors, (std::vector<int>{2, 4, 8}));
 }
 
-// Hides everything outside of the circle with GDAL's mask, in the file or beside it, before or after overviews are
-// made.
+// Masks everything outside of the circle with GDAL's mask, in the file or in a separate one, before or after the
+// overviews are made.
 std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first, const std::string& type = "Float32",
                         const char* resampling = "AVERAGE") {
   RasterSpec spec = WithOverviews(0, type);
@@ -448,7 +447,7 @@ TEST(Overviews, WithoutTheMaskOfTheRasterAreNotUsed) {
   ExpectUnused(WriteMasked(other, true, true), {.vertical = "unknown"}, "heights that the raster has not");
 }
 
-// GDAL keeps such masks in files of their own, too, and in VRTs.
+// GDAL also stores such masks in separate files and in VRTs.
 TEST(UndeclaredNodata, AMaskOfTheBandAloneCounts) {
   const TempDir dir;
   RasterSpec spec;
@@ -471,8 +470,7 @@ TEST(UndeclaredNodata, AMaskOfTheBandAloneCounts) {
   EXPECT_EQ(InfoOf(*source).void_samples, 128U);
 }
 
-// Int16 has a nodata value whether it is declared or not, and a cubic kernel goes a little beyond the heights it is
-// given.
+// Int16 always has a nodata value, and a cubic kernel slightly exceeds the range of its input.
 TEST(Overviews, WithTheMaskOfTheRasterAreUsed) {
   for (const std::string type : {"Float32", "Int16", "UInt16"}) {
     for (const char* resampling : {"AVERAGE", "CUBIC", "NEAREST"}) {

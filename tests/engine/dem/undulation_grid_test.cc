@@ -1,4 +1,4 @@
-// Grids of undulations as PROJ reads them: PROJ itself is the judge.
+// Compares grids of undulations with the results of PROJ.
 #include "engine/dem/crs/undulation_grid.h"
 
 #include <cpl_string.h>
@@ -28,7 +28,7 @@ struct TiffSpec {
   std::function<float(int column, int row)> value = Wavy;
 };
 
-// As PROJ's own: https://proj.org/en/9.1/specifications/geodetictiffgrids.html
+// In PROJ's format: https://proj.org/en/9.1/specifications/geodetictiffgrids.html
 std::string WriteTiff(const TempDir& dir, const std::string& name, const TiffSpec& spec) {
   InitGdal();
   const std::string path = dir.File(name);
@@ -68,7 +68,8 @@ std::shared_ptr<const Geoid> GeoidOf(const std::string& path, Position centre) {
   return geoid ? *std::move(geoid) : nullptr;
 }
 
-// Nodes of lattices of several levels around `box`: PROJ's, and within the bounds over a box around each.
+// Nodes of lattices of several levels around `box` have PROJ's undulations, and are within the bounds over a box around
+// each.
 void ExpectProjs(const Geoid& geoid, const std::shared_ptr<const Geoid>& shared, const Footprint& box, double close) {
   const auto undulations = Undulations::Of(shared, box);
   ASSERT_TRUE(undulations) << undulations.error().message;
@@ -92,7 +93,7 @@ void ExpectProjs(const Geoid& geoid, const std::shared_ptr<const Geoid>& shared,
         ASSERT_TRUE(std::isnan(value)) << at.x << " " << at.y;
         continue;
       }
-      const bool is_pole = std::abs(at.y) == 90;  // which has one undulation
+      const bool is_pole = std::abs(at.y) == 90;  // a pole has one undulation
       const double there = exact.At({is_pole ? 0 : at.x, at.y});
       ASSERT_EQ(std::isnan(value), std::isnan(there)) << "level " << level << " " << at.x << " " << at.y;
       if (std::isnan(value)) continue;
@@ -159,7 +160,7 @@ TEST(UndulationGrid, OfGeoTiffIsProjs) {
   }
 }
 
-// A coarse grid and a fine one in it, with a summit on one node: PROJ takes the finer where there is one.
+// A coarse grid and a fine one inside it, with a summit at one node: PROJ uses the finer one where it exists.
 TEST(UndulationGrid, OfSeveralGridsIsLeftToProj) {
   const TempDir dir;
   WriteTiff(dir, "nested.tif", {});

@@ -28,7 +28,7 @@ std::vector<double> At(const Undulations& undulations, const Grid& grid, const N
   return values ? *std::move(values) : std::vector<double>{};
 }
 
-// Metres from what PROJ gives: both interpolate between the same nodes.
+// Permitted difference from PROJ in metres; both interpolate between the same nodes.
 constexpr double kCloseToProj = 1e-6;
 
 struct Area {
@@ -70,7 +70,7 @@ TEST(Undulations, AreTheGeoids) {
   }
 }
 
-// Where steps of longitude are short on the ground a block of nodes may look bilinear by chance.
+// Near a pole steps of longitude are short on the ground, so a block of nodes may be bilinear by chance.
 TEST(Undulations, NearThePoleAreTheGeoidsAtEveryNode) {
   const auto geoid = Egm96();
   const auto undulations = Over(geoid, {-180, -90, 180, 90});
@@ -153,7 +153,7 @@ TEST(Undulations, StayWithinTheRangeOfAnyBoxAndTheRangeIsNarrow) {
         least = std::min(least, value);
         most = std::max(most, value);
       }
-      // A tile is much smaller than the area: so is what its bound allows, in the Andes as anywhere.
+      // A tile is much smaller than the area, and so is the range of its bound, also in the Andes.
       if (level == 11) {
         EXPECT_LT(range.max - range.min, 20) << name;
       }

@@ -1,4 +1,4 @@
-// Heights above geoids become ellipsoidal, everywhere alike: in tiles, at points, on Web Mercator, in bounds.
+// Heights above geoids become ellipsoidal in the same way in tiles, at points, on Web Mercator, and in bounds.
 #include "engine/dem/crs/vertical_datum.h"
 
 #include <gdal_priv.h>
@@ -69,7 +69,7 @@ TEST(VerticalDatum, ConvertsWhatTheReferenceSystemStates) {
   EXPECT_EQ(*denied->ReadPoints(SomePoints()), *ignored->ReadPoints(SomePoints()));
 }
 
-// GeoTIFF has said so since its first version, which most files are of.
+// GeoTIFF has stated datums since its first version, which most files use.
 TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, Hills("EPSG:4326+5773")), old = dir.File("old.tif");
@@ -86,7 +86,7 @@ TEST(VerticalDatum, ConvertsWhatAGeoTiffOfTheFirstVersionStates) {
   EXPECT_EQ(*source->ReadPoints(SomePoints()), *now->ReadPoints(SomePoints()));
 }
 
-// What GDAL makes of GeoTIFFs that state the unit of their heights, or say in words what they are, and no more.
+// GDAL's reference systems for GeoTIFFs that state only the unit of their heights, or describe them only in words.
 TEST(VerticalDatum, AVerticalPartWithoutADatumStatesAUnitAlone) {
   for (const char* name : {"unknown", "Mean Sea Level"}) {
     const std::string in_feet =
@@ -118,7 +118,8 @@ TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
   EXPECT_EQ(source->info().sources.front().datum_in_use, "ellipsoid");
 }
 
-// The unit of a compound CRS has a name; that of a third axis is only so long, and its feet are feet all the same.
+// The unit of a compound CRS has a name; the unit of a third axis has only a length, but its feet must be converted
+// too.
 TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   constexpr const char* kInFeet =
       R"(GEOGCRS["in feet",DATUM["World Geodetic System 1984",ELLIPSOID["WGS 84",6378137,298.257223563]],)"
@@ -129,7 +130,7 @@ TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   const auto metres = OpenOrFail(WriteRaster(dir, Hills("EPSG:4979")));
   const std::string path = WriteRaster(dir, Hills("EPSG:4979"), "feet.tif");
   std::ofstream(path + ".aux.xml") << "<PAMDataset><SRS dataAxisToSRSAxisMapping=\"2,1,3\">" << kInFeet
-                                   << "</SRS></PAMDataset>";  // GeoTIFF cannot say it
+                                   << "</SRS></PAMDataset>";  // GeoTIFF cannot represent it
   const auto feet = OpenOrFail(path);
   ASSERT_TRUE(feet && metres);
   EXPECT_EQ(feet->info().sources.front().height_unit, "foot");
@@ -139,7 +140,7 @@ TEST(VerticalDatum, AThirdAxisInFeetIsConverted) {
   for (std::size_t i = 0; i < of_feet->size(); ++i) EXPECT_NEAR((*of_feet)[i], (*of_metres)[i] * .3048, .002) << i;
 }
 
-// Feet of a county: the file says neither what they count from nor what they are, its owner says both with one name.
+// Heights in feet: the file states neither datum nor unit, and the configuration names both with one reference system.
 TEST(VerticalDatum, AFileWithoutAUnitHasThatOfTheReferenceSystemThatTheConfigurationNames) {
   const TempDir dir;
   RasterSpec undulations{.geo_transform = {-128, 1, 0, 44, 0, -1}, .crs = "EPSG:6319"};
@@ -278,7 +279,7 @@ TEST(VerticalDatum, TheGridIsOneOfItsFiles) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
   const std::filesystem::path installed = (*Geoid::OfCrs("EPSG:5773", {0, 0}))->files().path(0);
-  // PROJ tells formats by the ending: .gtx or .tif, by what the machine has.
+  // PROJ recognizes formats by the extension: .gtx or .tif, depending on the installed file.
   const std::string grid = dir.File("geoid" + installed.extension().string());
   std::filesystem::copy_file(installed, grid);
   const auto source = OpenOrFail(path, With(grid));

@@ -11,7 +11,7 @@ namespace {
 const float kVoid = std::nanf("");
 
 TEST(FillVoids, InterpolatesBetweenTheRims) {
-  // One row: only the row's own pair exists.
+  // One row: only the pair along the row exists.
   const std::vector<float> row = {0, kVoid, kVoid, kVoid, 8};
   const GridWindow window{0, 0, 5, 1};
   EXPECT_EQ(FillVoids(row, window, window, 4), (std::vector<float>{0, 2, 4, 6, 8}));

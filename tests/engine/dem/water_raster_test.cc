@@ -95,7 +95,7 @@ TEST(WaterRaster, NoDataAndTheOutsideAreLand) {
   EXPECT_EQ(std::count(far.begin(), far.end(), 0), kSide * kSide);
 }
 
-// No pixel depends on the window that was read for its tile.
+// A pixel does not depend on the window that was read for its tile.
 TEST(WaterRaster, TilesOfALevelFitTogether) {
   const TempDir dir;
   RasterSpec spec = WaterSpec(2);
@@ -136,7 +136,7 @@ TEST(WaterRaster, OverviewsOfOddSidesShowTheCoastWhereItIs) {
   RasterSpec spec = WaterSpec(8);
   spec.width = spec.height = 1601;
   spec.overviews = {2, 4, 8};
-  // Where a sample of the coarsest overview begins: none of them is mixed.
+  // At the start of a sample of the coarsest overview, so that no sample is mixed.
   spec.value = [](int column, int row) { return column >= 1498 || row >= 1498 ? 1 : 0; };
   const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), kWaterTile);
   constexpr int kCoast = 187;  // three quarters of this pixel are water

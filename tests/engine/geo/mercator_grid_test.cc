@@ -20,7 +20,7 @@ TEST(MercatorGrid, LatitudesAreThoseOfTheFormula) {
   EXPECT_EQ(MercatorLatitude(0.5), 0);
 }
 
-// The bits themselves: they must not depend on the machine.
+// The exact bits, because they must not depend on the machine.
 TEST(MercatorGrid, LatitudesHaveTheseBits) {
   EXPECT_EQ((MercatorGrid{3}.Latitude(700)), 0x1.8a99d98ef5d25p+5);
   EXPECT_EQ((MercatorGrid{12}.Latitude(1)), 0x1.54344f74f04eap+6);
@@ -38,7 +38,7 @@ TEST(MercatorGrid, PixelCentresOfALevelHalveThoseAbove) {
   EXPECT_EQ((MercatorGrid{0}.Longitude(0)), -180 + 360.0 / 512);
   EXPECT_EQ((MercatorGrid{2}.Longitude(512)), 360.0 / 2048);
   EXPECT_EQ((MercatorGrid{1}.StepDegrees()), (MercatorGrid{0}.StepDegrees()) / 2);
-  // Deep pixels stay apart.
+  // Pixels of deep levels are distinct.
   const MercatorGrid deep{24};
   EXPECT_GT(deep.Latitude(deep.rows() / 3), deep.Latitude(deep.rows() / 3 + 1));
 }

@@ -40,7 +40,7 @@ TEST(RoundedSinCos, IsTheNearestOfItsGridAnywhere) {
   }
 }
 
-// Columns of level 24 whose sine lies within 10^-6 of the middle between two numbers of the grid: found by trying 24
+// Columns of level 24 whose sine is within 10^-6 of the middle between two numbers of the grid, found by testing 24
 // million.
 TEST(RoundedSinCos, IsTheNearestOfItsGridInHardCases) {
   for (const std::int64_t column :
@@ -53,7 +53,7 @@ TEST(RoundedSinCos, IsTheNearestOfItsGridInHardCases) {
   }
 }
 
-// Around the octants, where signs and functions change places.
+// Around the octants, where signs change and sine and cosine are exchanged.
 TEST(RoundedSinCos, IsTheNearestOfItsGridAroundOctants) {
   for (double octant = -360; octant <= 360; octant += 45) {
     for (const double offset : {1e-14, 1e-9, 1e-3}) {

@@ -37,7 +37,7 @@ TEST(Border, JudgesASampleByItsChord) {
   EXPECT_EQ(SquaredBorderDistances(field, west, east), 9 + 16 + 9);
 }
 
-// The rule one by one.
+// The rule, sample by sample.
 Candidate WorstOneByOne(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options) {
   const bool along_x = a.y == b.y;
   const int from = along_x ? a.x : a.y, to = along_x ? b.x : b.y;
@@ -53,8 +53,7 @@ Candidate WorstOneByOne(const HeightField& field, const Corner& a, const Corner&
   return worst;
 }
 
-// On all sides, for chords of all lengths, among voids and equal errors; rows of the wider field lie further apart than
-// they are long.
+// On all sides, for chords of all lengths, with voids and equal errors. The rows of the wider field have padding.
 TEST(Border, JudgesInVectorsAsOneByOne) {
   ForEachInstructionSet([] {
     Random random(7);
@@ -98,7 +97,7 @@ TEST(Border, JudgesSumsThatOverflowAsOneByOne) {
   }
 }
 
-// Behind the last sample between the ends lies a page that must not be read.
+// The page after the last sample between the ends must not be read.
 TEST(Border, ReadsNothingBeyondTheChord) {
   const auto page = static_cast<std::size_t>(sysconf(_SC_PAGESIZE));
   void* const pages = mmap(nullptr, 2 * page, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
@@ -123,7 +122,7 @@ TEST(Border, KnowsItsFourSides) {
   EXPECT_EQ(SideOf(field, {0, 4, 0}, {0, 2, 0}), Side::kWest);
 }
 
-// The 1-D greedy set of one border, found without any triangle.
+// The vertices of one border by one-dimensional greedy insertion, without triangles.
 std::vector<int> SplitChord(const HeightField& field, int a, int b, double threshold, const BorderOptions& options) {
   const Corner low{0, a, static_cast<double>(field.At(0, a))}, high{0, b, static_cast<double>(field.At(0, b))};
   const Candidate worst = WorstBorderSample(field, low, high, options);
@@ -148,7 +147,7 @@ TEST(Border, HasTheVerticesOfItsOwnOneDimensionalSimplification) {
   }
 }
 
-// Fields that share one border column and nothing else, as neighbours in east-west direction.
+// Fields that share only one border column, like neighbours in east-west direction.
 TEST(Border, IsTheSameInBothNeighboursWhateverTheirInsides) {
   constexpr int kSide = 65;
   for (std::uint64_t seed = 0; seed < 12; ++seed) {

@@ -19,7 +19,7 @@ struct Expected {
   std::size_t slot = 0;
 };
 
-// The foremost of all, by looking at all: of equal ones the last.
+// The first candidate in the queue's order, by testing all; of equal ones the last.
 Expected Foremost(const std::vector<Candidate>& candidates) {
   Expected best;
   for (std::size_t slot = 0; slot < candidates.size(); ++slot) {
@@ -56,7 +56,7 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
       if (slot > 0 && random.Below(3) > 0) slot = static_cast<std::uint32_t>(random.Below(static_cast<int>(slot)));
       if (slot == candidates.size()) candidates.emplace_back();
       Candidate candidate;
-      // Few different errors and samples: many ties. Errors fall, as they do in a run, but not steadily.
+      // Few different errors and samples, so many ties. Errors decrease as in a run, but not monotonically.
       if (random.Below(5) > 0) {
         const double error = 1 + (20000 - round) / 2000 + random.Below(4) * 0.5;
         candidate = {integers ? error : error * random.Unit(), static_cast<std::uint32_t>(1 + random.Below(50))};
@@ -70,7 +70,7 @@ TEST(CandidateQueue, AgreesWithALinearSearch) {
   }
 }
 
-// As the star of an insertion does, here of up to 80 triangles, with many ties or few.
+// Like the star of an insertion, here of up to 80 triangles, with many or few ties.
 TEST(CandidateQueue, TakesManyAtOnce) {
   for (const int most_y : {9, 0x7FFF}) {
     Random random(7);
@@ -95,7 +95,7 @@ TEST(CandidateQueue, TakesManyAtOnce) {
   }
 }
 
-// As greedy insertion uses it: the winner is replaced by smaller ones, until nothing is left.
+// As in greedy insertion: smaller candidates replace the winner, until nothing is left.
 TEST(CandidateQueue, EmptiesInOrder) {
   Random random(2);
   CandidateQueue queue;
@@ -131,14 +131,14 @@ TEST(CandidateQueue, OrdersTheSmallestAndTheLargestErrors) {
   EXPECT_EQ(queue.Winner(), 0u);
   queue.Set(2, {1e300, 9});
   queue.Set(3, {1e305, 8});
-  EXPECT_EQ(queue.Winner(), 3u);  // both too large for a float: the smaller sample
+  EXPECT_EQ(queue.Winner(), 3u);  // both errors are too large for a float, so the smaller sample wins
   queue.Set(3, {});
   EXPECT_EQ(queue.Winner(), 2u);
   queue.Set(2, {});
   EXPECT_GT(queue.error(queue.Winner()), 0);
 }
 
-// Samples of a tile, of which a sweep's entries fit a word each, and of the largest fields, of which they do not.
+// Samples of a tile, for which an entry of a sweep fits into a word, and of the largest fields, for which it does not.
 TEST(CandidateQueue, SortsWhatASweepFinds) {
   for (const int most_y : {256, 0x7FFF}) {
     Random random(5);
@@ -160,7 +160,8 @@ TEST(CandidateQueue, SortsWhatASweepFinds) {
   }
 }
 
-// Few are sorted in another way than many: from one to more than few, with ties of two, on every set of instructions.
+// Few entries are sorted by another method than many. Tests numbers around the limit, with ties of two, for every
+// instruction set.
 TEST(CandidateQueue, SortsFewAndMany) {
   ForEachInstructionSet([] {
     Random random(11);

@@ -44,7 +44,7 @@ HeightField FieldWithVoids(int width, int height, std::uint64_t seed) {
   });
 }
 
-// Whatever the slots are: triangles from their smallest vertex on, sorted.
+// Triangles, each starting at its smallest vertex, sorted; independent of slots.
 std::set<std::array<VertexId, 3>> TrianglesOf(const TinMesh& mesh) {
   std::set<std::array<VertexId, 3>> triangles;
   for (std::array<VertexId, 3> triangle : mesh.triangles) {
@@ -62,8 +62,8 @@ testing::AssertionResult HaveTheSameTriangles(const TinMesh& a, const TinMesh& b
   return testing::AssertionSuccess();
 }
 
-// Data-dependent greedy insertion with nothing that makes it quick: no queue, no fit that is remembered, every test in
-// full, every sample of the field looked at for every triangle.
+// Data-dependent greedy insertion without optimizations: no queue, no cached fit, complete tests, and a scan of all
+// samples of the field for every triangle.
 class NaiveDataDependent {
  public:
   NaiveDataDependent(const HeightField& field, DataDependentOptions options)
@@ -168,7 +168,7 @@ class NaiveDataDependent {
     return then < now || (then == now && quality.pw >= quality.uv) ? Verdict::kTakesByFit : Verdict::kKeeps;
   }
 
-  // Squared, one triangle after the other.
+  // Squared qualities, triangle by triangle.
   static ShapeQuality Quality(const Quadrilateral& q) {
     const auto area = [](const RingVertex& a, const RingVertex& b, const RingVertex& c) {
       return static_cast<double>((b.dx - a.dx) * (c.dy - a.dy) - (b.dy - a.dy) * (c.dx - a.dx));
@@ -194,14 +194,14 @@ class NaiveDataDependent {
     const SamplePosition at = PositionOf(sample);
     const float height = field_.At(at.x, at.y);
     const Corner p{at.x, at.y, static_cast<double>(height)};
-    std::set<std::pair<VertexId, VertexId>> further_out;  // edges that a cut by its fit has brought into the outline
+    std::set<std::pair<VertexId, VertexId>> further_out;  // edges that a flip decided by fit added to the outline
     triangulation_.Insert(
         {at, height}, triangle, [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId back) {
           if (Cross(u, v) == 0) return true;
           if (!Sees(u, v, w)) return false;
           const bool is_further_out = further_out.contains({u.id, v.id});
           const Verdict verdict = Judge({u, v, w, height}, p, back / 4, is_further_out);
-          // With normals the walk itself is all there is.
+          // With normals there are only the tests of the walk.
           if (options_.measure != FitMeasure::kNormals && (verdict == Verdict::kTakesByFit || is_further_out)) {
             further_out.insert({{u.id, w.id}, {w.id, v.id}});
           }
@@ -232,8 +232,8 @@ TEST(DataDependent, ChoosesAsTheFullTestOfEveryQuadrilateral) {
   }
 }
 
-// Between 0 and 1 cuts are decided by shape and by fit in turns, and what is known of a triangle must not be taken for
-// what is known of the one in its place.
+// Between 0 and 1 both shape and fit decide tests, and the cached fit of a triangle must not be used for the triangle
+// that replaces it.
 TEST(DataDependent, ChoosesAsTheFullTestWhereShapeAndFitTakeTurns) {
   for (std::uint64_t seed = 0; seed < 60; ++seed) {
     Random random(seed);
@@ -247,9 +247,9 @@ TEST(DataDependent, ChoosesAsTheFullTestWhereShapeAndFitTakeTurns) {
   }
 }
 
-// Rings of vertices close to each other, and then their middle: the innermost becomes its outline, and what is beyond
-// each of its edges is a matter of the fit, as is what is beyond those. More pairs than one scan takes, in the first
-// round and in the next ones.
+// Concentric rings of vertices, then their centre: the innermost ring becomes the outline, and the fit decides the
+// tests of its edges and of the edges beyond. There are more pairs than one scan can take, in the first round and in
+// later ones.
 TEST(DataDependent, ChoosesAsTheFullTestOfOutlinesOfManyEdges) {
   constexpr int kMiddle = 80, kEdges = 140;
   std::vector<SamplePosition> rings;
@@ -402,7 +402,7 @@ TEST(DataDependent, ReplaysEveryPrefixOfARun) {
   }
 }
 
-// The refinement numbers slots anew.
+// The refinement renumbers slots.
 TEST(DataDependent, ContinuesARefinementToTheRefinementOfOneRun) {
   for (const HeightField& field : {HillField(65, 65, 9), StepField(65, 65, 9, 2), FieldWithVoids(65, 65, 3)}) {
     for (const FitMeasure measure : kMeasures) {

@@ -52,7 +52,7 @@ bool IsSubsequence(const TinMesh& part, const TinMesh& whole) {
   return true;
 }
 
-// What every drop promises, on top of what every mesh is.
+// The promises of the drop pass, in addition to the laws of all meshes.
 testing::AssertionResult IsFairDrop(const HeightField& field, const TinMesh& before, const TinMesh& after,
                                     double bound) {
   if (!IsSubsequence(after, before)) return testing::AssertionFailure() << "vertices are new or in another order";
@@ -202,7 +202,7 @@ TEST(DropVertices, TurnsNewTrianglesCounterClockwiseWhenQuantized) {
   const HeightField field = HillField(kSide, kSide, 11);
   const TinMesh greedy = GreedyMesh(field, 10);
   Random random(12);
-  std::vector<std::uint16_t> columns, rows;  // jolted by far more than rounding would jolt them
+  std::vector<std::uint16_t> columns, rows;  // displaced by far more than rounding would do
   for (int i = 0; i < kSide; ++i) {
     columns.push_back(static_cast<std::uint16_t>(10 * i + random.Below(25)));
     rows.push_back(static_cast<std::uint16_t>(10 * i + random.Below(25)));

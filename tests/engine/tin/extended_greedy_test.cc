@@ -42,8 +42,8 @@ HeightField Flat(int width, int height) {
   return MakeField(width, height, [](int, int) { return 12.5F; });
 }
 
-// The largest error by the paper's formula, over the field itself: for every sample the first triangle that holds it,
-// by barycentric coordinates in floating point. Shares nothing with the rasterizer of the product.
+// The largest error by the paper's formula: for every sample the first triangle that contains it, by barycentric
+// coordinates in floating point. Independent of the product's rasterizer.
 struct Measured {
   double combined = 0, height = 0, color_squares = 0;
   int known = 0;
@@ -150,7 +150,7 @@ TEST(ExtendedGreedy, InsertsTheWorstSampleOfAll) {
 
 TEST(ExtendedGreedy, WithoutColorChoosesTheVerticesOfThePlainOne) {
   for (const int seed : {1, 2, 3}) {
-    const HeightField heights = NoiseField(50, 40, static_cast<std::uint64_t>(seed));  // no two errors tie
+    const HeightField heights = NoiseField(50, 40, static_cast<std::uint64_t>(seed));  // all errors differ
     for (const double bound : {80.0, 40.0, 10.0}) {
       GreedyTriangulation plain(heights);
       plain.Run({.max_error = bound});
@@ -163,7 +163,7 @@ TEST(ExtendedGreedy, WithoutColorChoosesTheVerticesOfThePlainOne) {
 TEST(ExtendedGreedy, WithColorAloneIgnoresHeights) {
   const ExtendedField hills = Hills(1), flat = Make(Flat(61, 43), Picture, 1);
   const ColoredMesh over_hills = MeshOf(hills, {.max_points = 300}), over_plain = MeshOf(flat, {.max_points = 300});
-  // M differs by a factor and rounds differently: equal but for ties.
+  // M differs by a factor and rounds differently, so results are equal except for ties.
   std::vector<std::pair<int, int>> common;
   std::ranges::set_intersection(Positions(over_hills.tin), Positions(over_plain.tin), std::back_inserter(common));
   EXPECT_GE(common.size(), 285u);
@@ -181,7 +181,7 @@ TEST(ExtendedGreedy, WeighsHeightsAgainstColorsAsThePaperDoes) {
         },
         weight);
   };
-  // A wholly wrong height counts (1 - w) M, a wholly wrong colour w M.
+  // A completely wrong height has the error (1 - w) M, a completely wrong colour w M.
   for (const auto& [weight, expected] : {std::pair{0.25, 75.0}, std::pair{0.5, 50.0}, std::pair{0.75, 75.0}}) {
     const ExtendedField judged = field(weight);
     EXPECT_DOUBLE_EQ(judged.Error(0, 3 * 255), weight * 100);
@@ -248,7 +248,7 @@ TEST(ExtendedGreedy, KeepsItsBoundAroundVoidsAndUnknownColors) {
   const HeightField heights =
       MakeField(61, 43, [&](int x, int y) { return is_void(x, y) ? kVoid : HillHeight(x, y, 3); });
   const auto picture = [&](int x, int y) {
-    // What voids and transparent samples hold must not matter.
+    // The values of voids and transparent samples must have no effect.
     if (is_clear(x, y)) return ColorSample{255, 0, 255, 0};
     return is_void(x, y) ? ColorSample{255, 255, 0, 255} : Picture(x, y);
   };

@@ -35,7 +35,7 @@ TinMesh MeshWhole(const HeightField& field, double error) {
   return greedy.Mesh();
 }
 
-// The joined mesh keeps every law of a mesh but Delaunay's.
+// The joined mesh keeps all laws of a mesh except the Delaunay criterion.
 void ExpectLawful(const HeightField& field, int block_cells, double error) {
   const TinMesh mesh = MeshInBlocks(field, FieldPartition(field.width(), field.height(), block_cells), error);
   EXPECT_TRUE(CoversExactly(field, mesh)) << field.width() << " x " << field.height() << " at " << error;
@@ -101,7 +101,7 @@ TEST(FieldPartition, JoinsBlocksOfOneCell) {
 
 TEST(FieldPartition, GivesCornersInAVoidTheHeightOfTheWholeField) {
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
-    // A wide void with whole blocks in it, and single voids all over, corners of blocks among them.
+    // A wide void that contains whole blocks, and single voids everywhere, also at corners of blocks.
     Random random(seed);
     const HeightField field = MakeField(90, 75, [&](int x, int y) {
       return (x + y > 40 && x + y < 110) || random.Below(4) == 0 ? kVoid : HillHeight(x, y, seed);
@@ -166,11 +166,12 @@ TEST(FieldPartition, CutsFinelyOnlyWhereBordersCostLittle) {
 TEST(FieldPartition, LeavesSmallFieldsAndSmallMeshesWhole) {
   const HeightField small = HillField(500, 300, 12), large = HillField(900, 700, 12);
   EXPECT_EQ(FieldPartition::For(large, 8).size(), 12u);
-  EXPECT_EQ(FieldPartition::For(small, 8).size(), 1u);  // as many vertices a sample, but all fits the cache
+  EXPECT_EQ(FieldPartition::For(small, 8).size(),
+            1u);  // the same density of vertices, but the whole field fits into the cache
   EXPECT_EQ(FieldPartition::For(large, 100).size(), 1u);
 }
 
-// Sea is not a reason for larger blocks.
+// Sea does not make blocks larger.
 TEST(FieldPartition, CutsAnIslandAsFinelyAsTheLandAlone) {
   const HeightField land = HillField(700, 700, 13);
   const HeightField island = MakeField(2800, 2800, [&](int x, int y) {

@@ -17,7 +17,7 @@
 namespace terrace::tin {
 namespace {
 
-// The same triangles, wherever they and their corners begin.
+// The same triangles, in any order and with any first corner.
 testing::AssertionResult AreSameMesh(TinMesh a, TinMesh b) {
   for (TinMesh* mesh : {&a, &b}) {
     for (auto& triangle : mesh->triangles) {
@@ -32,7 +32,7 @@ TEST(Greedy, InsertsInTheOrderOfTheNaiveAlgorithm) {
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
     Random random(seed);
     const int width = 2 + random.Below(12), height = 2 + random.Below(12);
-    // Odd seeds: steps, where nearly every choice is a tie.
+    // Odd seeds have steps, where nearly all choices are ties.
     const HeightField field = seed % 2 == 0 ? NoiseField(width, height, seed) : StepField(width, height, 4, seed);
     GreedyOptions options;
     for (BorderOptions& border : options.borders) {

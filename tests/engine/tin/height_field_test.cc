@@ -72,7 +72,7 @@ TEST(HeightField, KnowsTheRangeOfWhatIsFinite) {
   });
 }
 
-// Widths of short rows, of rows that lie further apart than they are long, and of others; the smallest, too.
+// Widths of short rows, of rows with padding, and of others, including the smallest.
 TEST(HeightField, HasItsRowsWhereverTheyLie) {
   constexpr int kRows = 9;
   for (const int width : {2, 3, 17, 511, 512, 513, 1024, 1025, 1040, 1201, 1280, 2047}) {
@@ -148,7 +148,7 @@ TEST(HeightField, FindsTheNearestHeightAcrossWideVoids) {
     const int width = 2 + random.Below(400), height = 2 + random.Below(300);
     std::vector<std::pair<int, int>> valid;
     for (int k = 0; k < 6; ++k) valid.push_back({random.Below(width), random.Below(height)});
-    valid.push_back({width - 1 - valid[0].first, valid[0].second});  // ties are likely half way between them
+    valid.push_back({width - 1 - valid[0].first, valid[0].second});  // ties are likely halfway between the two
     std::vector<float> heights(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), kVoid);
     for (const auto& [x, y] : valid)
       heights[static_cast<std::size_t>(y * width + x)] = static_cast<float>(y * width + x);

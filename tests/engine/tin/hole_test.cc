@@ -26,7 +26,7 @@ TEST(Hole, OffersEachFanOnce) {
 TEST(Hole, OffersTheNearestFanFirst) {
   Hole hole;
   hole.Begin({2, 2}, 10);
-  // The diagonal from corner 0 passes at height 4, that from corner 1 at 9.
+  // The diagonal from corner 0 has height 4 at the sample, that from corner 1 has 9.
   hole.AddCorner({0, 0}, 4);
   hole.AddCorner({4, 0}, 8);
   hole.AddCorner({4, 4}, 4);

@@ -34,7 +34,7 @@ TEST(InsertSamples, AppendsWhatIsNoVertexYet) {
 }
 
 TEST(InsertSamples, KeepsAnyMeshAMesh) {
-  // A fan of slivers: nothing Delaunay about it.
+  // A fan of slivers, which is not Delaunay.
   TinMesh fan{{{0, 0}, {40, 0}, {40, 40}, {0, 40}}, {}};
   for (std::uint16_t y = 1; y < 40; ++y) fan.vertices.push_back({40, y});
   std::uint32_t before = 1;
@@ -102,7 +102,7 @@ TEST(InsertSamplesDeathTest, RefusesBorderSamples) {
   SampleInserter inserter;
   TinMesh mesh = tin.Mesh(), other = mesh;
   inserter.InsertInto(mesh, {&inside, 1});
-  EXPECT_DEATH(inserter.InsertInto(other, {&inside, 1}), "check failed");  // not what it has left
+  EXPECT_DEATH(inserter.InsertInto(other, {&inside, 1}), "check failed");  // not the mesh that it returned last
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Runs a test with every set of instructions that this processor has and that was compiled.
+// Runs a test with every compiled instruction set that this processor has.
 #pragma once
 
 #include <gtest/gtest.h>

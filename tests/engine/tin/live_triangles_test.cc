@@ -18,7 +18,7 @@ namespace {
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 using WideRecord = InsertionRecord<std::uint32_t>;
 
-// Rings of anything, of one triangle to `most`, open and closed; what an insertion removes is any that stands.
+// Random rings of one triangle up to `most`, open and closed. An insertion removes random live triangles.
 WideRecord RandomRecord(Random& random, std::size_t insertions, int most) {
   WideRecord record;
   record.removed.assign(2, WideRecord::kNever);
@@ -64,13 +64,13 @@ Triangles OneByOne(const WideRecord& record, std::size_t insertions) {
   return standing;
 }
 
-// Every prefix, so that the end of a record is met in every way.
+// Every prefix, so that records end at all positions.
 TEST(LiveTriangles, AreThoseThatNothingHasRemovedYet) {
   Random random(1);
   for (const int most : {2, 6, 8, 9, 40}) {
     for (const std::size_t length : {0u, 1u, 7u, 60u}) {
       const WideRecord record = RandomRecord(random, length, most);
-      // Copies have no room beyond their ends: what is read there is a fault that AddressSanitizer sees.
+      // Copies have no spare memory at their ends, so AddressSanitizer reports reads beyond.
       const auto wide = ConvertTo<std::uint32_t>(record);
       const auto narrow = ConvertTo<std::uint16_t>(record);
       for (std::size_t insertions = 0; insertions <= length; ++insertions) {

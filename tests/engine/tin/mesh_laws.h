@@ -1,4 +1,4 @@
-// What every mesh of the mesher must be, checked the slow way.
+// Laws of all meshes of the mesher, checked by slow plain code.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,7 +15,8 @@ namespace terrace::tin {
 // each used once in each direction or lie on the border.
 testing::AssertionResult CoversExactly(const HeightField& field, const TinMesh& mesh);
 
-// No vertex across an edge lies strictly inside the circle of the triangle: locally, hence globally, Delaunay.
+// No vertex across an edge is strictly inside the circumcircle of the triangle, so the mesh is locally, and therefore
+// globally, Delaunay.
 testing::AssertionResult IsDelaunay(const TinMesh& mesh);
 
 // Every valid sample is within `bound` of the mesh, as measured by MeasureError, and every valid sample was measured.
@@ -27,7 +28,7 @@ std::vector<int> BorderVertices(const HeightField& field, const TinMesh& mesh, S
 // The same vertices in the same order, and the same triangles in the same order.
 testing::AssertionResult AreEqual(const TinMesh& a, const TinMesh& b);
 
-// The mesh of the mesher, which must reach the goal.
+// Runs the mesher, which must reach the goal.
 TinMesh MeshAt(const HeightField& field, const GreedyGoal& goal, const GreedyOptions& options = {});
 
 }  // namespace terrace::tin

@@ -56,7 +56,7 @@ class NaivePass {
     if (error > 0 && Precedes(candidate, worst_)) worst_ = candidate;  // false for NaN
   }
 
-  // The formula of triangle_scan.h, relative to the corner that was inserted last.
+  // The formula of triangle_scan.h, relative to the last inserted corner.
   double PlaneErrorOf(const std::array<SamplePosition, 3>& corners, SamplePosition sample) const {
     const Corner u = CornerAt(corners[0]), v = CornerAt(corners[1]), p = CornerAt(corners[2]);
     const double ux = u.x - p.x, uy = u.y - p.y, uz = u.z - p.z, vx = v.x - p.x, vy = v.y - p.y, vz = v.z - p.z;
@@ -65,7 +65,7 @@ class NaivePass {
     return std::abs(d * (height - p.z) - (a * (sample.x - p.x) + b * (sample.y - p.y))) / d;
   }
 
-  // p lies on the border and in the triangle, and is no corner: it lies on the one edge that is collinear with it.
+  // p is on the border and in the triangle, and not a corner, so it is on the edge that is collinear with it.
   double BorderErrorOf(const std::array<SamplePosition, 3>& corners, SamplePosition p) const {
     for (unsigned i = 0; i < 3; ++i) {
       SamplePosition low = corners[i], high = corners[(i + 1) % 3];
@@ -86,7 +86,7 @@ class NaivePass {
   const HeightField& field_;
   const std::array<BorderOptions, 4>& borders_;
   const Triangulation& triangulation_;
-  Candidate worst_;  // of the triangle at hand
+  Candidate worst_;  // of the current triangle
 };
 
 }  // namespace

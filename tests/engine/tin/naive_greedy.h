@@ -1,7 +1,6 @@
-// Greedy insertion as section 3.2 of the paper has it: every pass looks at every sample of the field again.
-//
-// The oracle of the optimized algorithm. It shares the triangulation and the rounding of errors with it, and nothing of
-// what makes it fast: no spans, no candidates, no queue, no update region.
+// Greedy insertion as in section 3.2 of the paper: every pass scans all samples of the field again.  The oracle of the
+// optimized algorithm. It shares the triangulation and the rounding of errors with it, but no optimization: no spans,
+// no candidates, no queue, no update region.
 #pragma once
 
 #include "engine/tin/greedy.h"
@@ -10,10 +9,11 @@
 
 namespace terrace::tin {
 
-// The rule of BorderOptions for a border sample that misses its chord by so much, sagitta included; metres.
+// The error in metres that BorderOptions gives a border sample with this distance from its chord, including the
+// sagitta.
 double BorderError(double misfit_m, const BorderOptions& options);
 
-// Knows borders and goals, but no curvature and no seeds.
+// Supports borders and goals, but no curvature and no seeds.
 TinMesh NaiveGreedy(const HeightField& field, const std::array<BorderOptions, 4>& borders, const GreedyGoal& goal);
 
 }  // namespace terrace::tin

@@ -15,7 +15,7 @@ __extension__ typedef __int128 Wide;
 
 int Sign(Wide value) { return value > 0 ? 1 : value < 0 ? -1 : 0; }
 
-// The textbook determinant, in 128 bits and about the origin instead of d.
+// The textbook determinant, in 128 bits and relative to the origin instead of d.
 Wide WideInCircle(SamplePosition a, SamplePosition b, SamplePosition c, SamplePosition d) {
   const auto lifted = [](SamplePosition p) { return Wide{p.x} * p.x + Wide{p.y} * p.y; };
   const auto det3 = [&](SamplePosition p, SamplePosition q, SamplePosition r) {

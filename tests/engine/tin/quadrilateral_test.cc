@@ -11,11 +11,11 @@ namespace terrace::tin {
 namespace {
 
 TEST(Quadrilateral, ComparesShapesByAreasOverDiameters) {
-  // Both cuts of a rectangle are alike.
+  // Both diagonals of a rectangle give equal shapes.
   const Quadrilateral rectangle{{1, 4, 0, 0}, {2, 0, 2, 0}, {3, 4, 2, 0}, 0};
   EXPECT_EQ(ShapeQualityOf(rectangle).uv, ShapeQualityOf(rectangle).pw);
-  // Corners p (0, 0), u (2, 1), w (1, 16), v (0, 1): twice the areas are 2 and 30 with boxes of 2 x 1 and 2 x 15 along
-  // u-v, but 31 and 1 with boxes of 2 x 16 and 1 x 16 along p-w.
+  // Corners p (0, 0), u (2, 1), w (1, 16), v (0, 1). With the diagonal u-v twice the areas are 2 and 30, in boxes of 2
+  // x 1 and 2 x 15. With p-w they are 31 and 1, in boxes of 2 x 16 and 1 x 16.
   const Quadrilateral kite{{1, 2, 1, 0}, {2, 0, 1, 0}, {3, 1, 16, 0}, 0};
   const ShapeQuality quality = ShapeQualityOf(kite);
   EXPECT_EQ(quality.uv, 2 * 30 * (4 * 16 + 2) * (4 * 16 + 1));
@@ -31,7 +31,7 @@ TEST(Quadrilateral, HoldsTheLargestCoordinates) {
 }
 
 TEST(Quadrilateral, BendsLessWhereThreeCornersAreLevel) {
-  // A square with one corner lifted: the cut that leaves the other three in one triangle.
+  // A square with one raised corner: the best diagonal leaves the other three in one triangle.
   const auto lifted = [](float u, float v, float w, float p) {
     return Quadrilateral{{1, 4, 0, u}, {2, 0, 4, v}, {3, 4, 4, w}, p};
   };
@@ -50,7 +50,7 @@ TEST(Quadrilateral, BendsByTheAngleBetweenNormals) {
   EXPECT_NEAR(BendsOf(roof).pw, 1 - -1.0 / 3, 1e-15);
   // Along u-v: (-1, -1, 1) and (1, 1, 1).
   EXPECT_NEAR(BendsOf(roof).uv, 1 - -1.0 / 3, 1e-15);
-  // Planes that rounding has put there are never bent by less than nothing.
+  // Rounded planes never have a negative angle.
   Random random(1);
   for (int i = 0; i < 100000; ++i) {
     const auto height = [a = random.Unit() * 3, b = random.Unit() * 3](int x, int y) {

@@ -1,4 +1,4 @@
-// The error bound and the cover on thousands of small random fields, by every way to a mesh.
+// The error bound and the coverage on thousands of small random fields, for every way to make a mesh.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -44,7 +44,7 @@ float HeightOf(Sort sort, int x, int y, Random& random) {
   return 0;
 }
 
-// Sizes from 2 x 2 to 20 x 20, some with voids, infinities among them.
+// Sizes from 2 x 2 to 20 x 20, some with voids, including infinities.
 HeightField RandomField(Sort sort, float scale, Random& random) {
   const int width = 2 + random.Below(19), height = 2 + random.Below(19);
   const int voids = random.Below(3) * random.Below(5);  // of 16
@@ -64,7 +64,7 @@ TinMesh MeshInBlocks(const HeightField& field, int block_cells, double bound, co
   return std::move(joiner).Take();
 }
 
-// Plain, compact and in blocks, the last one compact as well.
+// Plain, compact, in blocks, and compact in blocks.
 void ExpectBounds(const HeightField& field, const GreedyOptions& options, double bound, int block_cells) {
   GreedyTriangulation tin(field, options);
   ASSERT_TRUE(tin.Run({bound}));

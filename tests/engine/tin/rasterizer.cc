@@ -20,7 +20,7 @@ struct Side2D {
 
   std::int64_t At(std::int64_t x, std::int64_t y) const { return dx * y - dy * x + offset; }
 
-  // Shortens first..last to the samples of row y that are not to the right.
+  // Shortens first..last to the samples of row y that are not to the right of the side.
   void Clip(std::int64_t y, std::int64_t& first, std::int64_t& last) const {
     const std::int64_t at_zero = At(0, y);
     if (dy > 0) last = std::min(last, FloorDivide(at_zero, dy));
@@ -115,7 +115,7 @@ class Raster {
            (p.y == q.y && (p.y == 0 || p.y == field_.height() - 1));
   }
 
-  // Gathers the edges by their smaller vertex: 2 * the larger one, plus one for those that come from it.
+  // Collects the edges of each smaller vertex as 2 * the larger vertex, plus one for edges from the larger vertex.
   void CountOpenEdges() {
     std::vector<std::size_t> ends(mesh_.vertices.size() + 1);
     const auto for_each_edge = [&](auto&& visit) {
@@ -163,7 +163,7 @@ testing::AssertionResult Keeps(const Rasterization& raster, double bound) {
   if (raster.not_once > 0) return testing::AssertionFailure() << raster.not_once << " samples are not covered once";
   if (raster.open_edges > 0) return testing::AssertionFailure() << raster.open_edges << " edges are open";
   if (!raster.has_area_of_field) return testing::AssertionFailure() << "the triangles have not the field's area";
-  // Interpolating and subtracting rounds a few times by half a unit of the largest height.
+  // Interpolation and subtraction round a few times by half a unit in the last place of the largest height.
   const double allowed = bound * (1 + 1e-9) + 0x1p-50 * raster.magnitude;
   if (!(raster.max_error <= allowed)) {
     return testing::AssertionFailure() << "sample " << raster.worst.x << ", " << raster.worst.y << " is "

@@ -1,7 +1,6 @@
-// A mesh rasterized by code that has nothing in common with the mesher's: what its promises are held to on real data.
-//
-// Of the engine it takes TinMesh and the samples of HeightField. Coverage is decided in integers, heights in long
-// double by barycentric coordinates. Safe to call from many threads at once.
+// Rasterizes a mesh independently of the mesher, to check the mesher's promises on real data.  It uses only TinMesh and
+// the samples of HeightField of the engine. Coverage is computed in integers, heights in long double by barycentric
+// coordinates. Thread-safe.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -15,22 +14,22 @@ namespace terrace::tin {
 
 struct Rasterization {
   double max_error = 0;      // metres, vertical, over the valid samples that a triangle covers
-  SamplePosition worst;      // one that is so far off
+  SamplePosition worst;      // a sample with this error
   double magnitude = 0;      // the largest absolute height of a valid sample or a vertex
   std::size_t turned = 0;    // triangles that are not counter-clockwise; not rasterized
   std::size_t not_once = 0;  // samples, voids included, that no triangle covers, or more than one
-  // Edges that are used twice in one direction, or once and not along the field's border. Without any, and with the
-  // field's area, counter-clockwise triangles cover every point of the field once, not the samples alone.
+  // Edges used twice in one direction, or once and not along the field's border. If there are none and the areas add up
+  // to the field's, counter-clockwise triangles cover every point of the field once, and not only the samples.
   std::size_t open_edges = 0;
   bool has_area_of_field = false;
 };
 
-// A sample on an edge belongs to the triangle that also holds the point next to it, moved by less than any distance
-// that matters: along x first, then along y, into the field. That point is on no edge.
+// A sample on an edge belongs to the triangle that contains the sample after an infinitesimal shift along x, and a far
+// smaller one along y, into the field. The shifted point is on no edge.
 Rasterization Rasterize(const HeightField& field, const TinMesh& mesh);
 
-// Whether the triangles cover the field once and no valid sample is further off than `bound`, up to one part in 10^9 of
-// it and what the mesher's doubles round at heights as large as these.
+// Whether the triangles cover the field once and no valid sample has an error above `bound`, allowing one part in 10^9
+// of it and the rounding of the mesher's doubles at heights of this magnitude.
 testing::AssertionResult Keeps(const Rasterization& raster, double bound);
 
 }  // namespace terrace::tin

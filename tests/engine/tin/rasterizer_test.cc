@@ -1,4 +1,4 @@
-// The measure itself: it sees what is wrong with a mesh, and agrees with the engine's own measure on one that is right.
+// Tests the rasterizer: it finds errors in meshes, and agrees with the engine's measurement of correct ones.
 #include "tests/engine/tin/rasterizer.h"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ TinMesh Fan() {
 }
 
 TEST(Rasterizer, MeasuresTheWorstSample) {
-  // One row from the border the pyramid is 4 m high.
+  // The pyramid is 4 m high one row from the border.
   const Rasterization fan = Rasterize(Spike(), Fan());
   EXPECT_EQ(fan.max_error, 4);
   EXPECT_TRUE(Keeps(fan, 4));

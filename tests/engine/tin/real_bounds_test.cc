@@ -1,7 +1,6 @@
-// The error bound on every real elevation model, by every way to a mesh, measured by a rasterizer of its own.
-//
-// Rasters of more than 1.5 million samples are tried on a window from their middle; all of them when the environment
-// variable TERRACE_LONG_TESTS is 1. One line for each mesh goes to the output: vertices, worst error over the bound,
+// The error bound on every real elevation model, for every way to make a mesh, measured by an independent rasterizer.
+// Of rasters with more than 1.5 million samples a window at the centre is tested; with the environment variable
+// TERRACE_LONG_TESTS=1 the whole raster. Prints one line for each mesh: vertices, largest error divided by the bound,
 // seconds.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -39,7 +38,7 @@ struct Dem {
   int width, height;  // of the whole raster
 };
 
-// In an order that gives three shards about the same work.
+// In this order three shards have about the same work.
 constexpr Dem kDems[] = {
     {"N43E007.hgt.zip", 1201, 1201},
     {"SainteHelens.dem", 327, 468},
@@ -89,7 +88,7 @@ Result<HeightField> Read(const Dem& dem) {
   return HeightField::Make(raster->width, raster->height, std::move(raster->heights));
 }
 
-// Coarse to fine: a run that goes on ends in the mesh of one run.
+// Coarse to fine, because a continued run ends in the mesh of one run.
 std::vector<double> ErrorsOf(const Dem& dem) {
   std::vector<double> errors = {20, 5, 1};
   if (std::string_view(dem.file).starts_with("lidar_")) errors.push_back(0.1);
@@ -98,7 +97,7 @@ std::vector<double> ErrorsOf(const Dem& dem) {
 
 class RealBounds : public testing::TestWithParam<Dem> {
  protected:
-  // `make` is what takes the seconds.
+  // Measures the time of `make`.
   template <typename Make>
   TinMesh Expect(const HeightField& field, const char* way, double error, Make&& make) {
     const Clock::time_point start = Clock::now();
@@ -114,7 +113,8 @@ class RealBounds : public testing::TestWithParam<Dem> {
 
 TinMesh MeshInBlocks(const HeightField& field, double error, Criterion criterion) {
   FieldPartition cut = FieldPartition::For(field, error);
-  if (cut.size() == 1) cut = FieldPartition(field.width(), field.height(), kBlock);  // where it would not pay as well
+  if (cut.size() == 1)
+    cut = FieldPartition(field.width(), field.height(), kBlock);  // also if one block would be better
   BlockJoiner joiner(cut);
   GreedyOptions options;
   options.criterion = criterion;

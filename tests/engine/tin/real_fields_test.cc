@@ -1,4 +1,5 @@
-// The mesher on real elevation models: the counts of other implementations of the paper, and the laws.
+// The mesher on real elevation models: numbers of vertices of other implementations of the paper, and the laws of
+// meshes.
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -64,7 +65,7 @@ TEST(RealFields, NeighbouringTilesShareTheirBorders) {
     std::vector<HeightField> fields;
     std::vector<TinMesh> meshes;
     for (int i = 0; i < kBlock * kBlock; ++i) {
-      // Row 0 of a field is its first row in the file; "north" below is merely the side of larger y.
+      // Row 0 of a field is the first row of the file; "north" below means the side of larger y.
       fields.push_back(
           FieldOf(ReadTestRaster(kName, 300 + i % kBlock * (kSide - 1), 200 + i / kBlock * (kSide - 1), kSide, kSide)));
       GreedyTriangulation tin(fields.back(), options);

@@ -19,7 +19,7 @@ GreedyOptions Recorded(GreedyOptions options = {}) {
   return options;
 }
 
-// Seeds, curvature and borders as tiles have them.
+// Seeds, curvature and borders as for tiles.
 GreedyOptions TileOptions(int side) {
   GreedyOptions options = Recorded();
   options.seeds = {{80, (side - 1) / 2}, {30, (side - 1) / 4}, {12, (side - 1) / 8}};

@@ -1,4 +1,4 @@
-// Scans where single precision cannot tell samples apart.
+// Scans in which single precision cannot distinguish samples.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -12,8 +12,8 @@
 namespace terrace::tin {
 namespace {
 
-// Slopes of a fraction of a metre: all samples but a few lie on the triangles' planes, up to the rounding of floats, so
-// that single precision takes many of them for the furthest. And heights that overflow it.
+// Slopes of a fraction of a metre: all samples but a few are on the triangles' planes up to the rounding of floats, so
+// that in single precision many can be the furthest. Also heights that overflow single precision.
 TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
   Random random(5);
   for (int i = 0; i < 200; ++i) {
@@ -30,8 +30,8 @@ TEST(TriangleScan, TellsApartWhatSinglePrecisionDoesNot) {
   }
 }
 
-// Two to four samples that only double tells apart, in columns that share a lane of any vector: of one row of vectors
-// or of several.
+// Two to four samples that only double precision distinguishes, in columns of the same vector lane, in one row of
+// vectors or in several.
 TEST(TriangleScan, TellsApartWhatSharesALane) {
   Random random(23);
   for (int i = 0; i < 3000; ++i) {
@@ -57,9 +57,9 @@ TEST(TriangleScan, TellsApartWhatSharesALane) {
   }
 }
 
-// Planes whose steps round in opposite ways at two samples that are almost equally far: found by a search for the most
-// that a block's single precision can be off. With a doubt of 2^-20 in blocks the wrong sample of the first one wins
-// where vectors have eight lanes.
+// Planes whose steps round in opposite directions at two samples with almost equal distances, found by a search for the
+// largest error of a block's single precision. With a rounding bound of 2^-20 in blocks the wrong sample of the first
+// one would win with vectors of eight lanes.
 TEST(TriangleScan, TellsApartWhatStepsOfPlanesBlur) {
   struct Case {
     float pz, uz, vz, at_39, at_38;
@@ -85,8 +85,8 @@ TEST(TriangleScan, TellsApartWhatStepsOfPlanesBlur) {
   }
 }
 
-// The plane rises to a spike from two zeros; the sample on the edge between those lies on it. Its distance is 0, and
-// what rounding leaves in doubt is 2^-20 of the spike: below the limit for a sample outside.
+// The plane rises to a spike from two zeros, and the sample on the edge between the zeros is on it. Its distance is 0,
+// and the rounding bound is 2^-20 of the spike, below the limit for a sample outside.
 TEST(TriangleScan, TakesNoSampleFromOutsideWhereDoubtsAreLarge) {
   for (const int reach : {2, 6, 40}) {
     const HeightField field = MakeField(2 * reach + 5, reach + 4, [&](int x, int y) {

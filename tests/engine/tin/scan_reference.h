@@ -1,4 +1,4 @@
-// What scans of triangles are held against: the formula of triangle_scan.h, sample by sample.
+// The reference for scans of triangles: the formula of triangle_scan.h, sample by sample.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 
 namespace terrace::tin {
 
-// Stars of one triangle or more, as long as they are counter-clockwise around their centre.
+// Stars of one or more triangles, which must be counter-clockwise around their centre.
 class TestStar {
  public:
   TestStar(const HeightField& field, SamplePosition centre, const std::vector<SamplePosition>& ring);
@@ -26,10 +26,10 @@ PlaneMisfit Reference(const HeightField& field, const Star& star, std::size_t i)
 
 SamplePosition RandomSample(Random& random, const HeightField& field);
 
-// Fails where a scan by any set of instructions differs in a bit.
+// Fails if a scan with any instruction set differs in a bit.
 void ExpectReference(const HeightField& field, const Star& star);
 
-// One triangle with corners at random, unless they have the wrong order.
+// One triangle with random corners, skipped if they are not counter-clockwise.
 void ExpectReferenceAtRandom(Random& random, const HeightField& field);
 
 }  // namespace terrace::tin

@@ -76,7 +76,7 @@ TEST_F(SpareBlocks, GrowsABlockThatKeepsItsContents) {
   block[40 * kBytes - 1] = 1;
   void* const spare = TakeBlock(50 * kBytes);
   GiveBlock(spare);
-  block = static_cast<std::uint8_t*>(GrowBlock(block, kBytes, 45 * kBytes));  // copied into the one that is there
+  block = static_cast<std::uint8_t*>(GrowBlock(block, kBytes, 45 * kBytes));  // copied into the existing block
   EXPECT_EQ(block, spare);
   EXPECT_TRUE(is_kept());
   EXPECT_EQ(SpareBytes(), 40 * kBytes);
@@ -98,7 +98,7 @@ TEST_F(SpareBlocks, HoldLargeArrays) {
   LargeArray<std::uint32_t> array;
   EXPECT_TRUE(array.empty());
   for (std::uint32_t i = 0; i < 200000; ++i) array.push_back(i == 0 ? 0 : array[i - 1] + 1);
-  array.push_back(array[17]);  // its own, while it may move
+  array.push_back(array[17]);  // an element of the array itself, which may move meanwhile
   array.GrowTo(300000, 5);
   EXPECT_EQ(array.size(), 300000u);
   for (std::uint32_t i = 0; i < 200000; ++i) ASSERT_EQ(array[i], i);
@@ -113,7 +113,7 @@ TEST_F(SpareBlocks, HoldLargeArrays) {
   EXPECT_GT(SpareBytes(), before);
 }
 
-// Whatever the run before left in them.
+// The content that an earlier run left must have no effect.
 TEST_F(SpareBlocks, MakeTheSameMesh) {
   const HeightField field = NoiseField(120, 90, 1), other = NoiseField(90, 130, 2);
   const auto mesh_of = [](const HeightField& of) {

@@ -1,4 +1,4 @@
-// Height fields to try the mesher on.
+// Height fields for tests of the mesher.
 #pragma once
 
 #include <array>
@@ -13,7 +13,7 @@ namespace terrace::tin {
 
 inline constexpr float kVoid = std::numeric_limits<float>::quiet_NaN();
 
-// A small generator of its own: the same numbers with every standard library.
+// A small random number generator with the same numbers in every standard library.
 class Random {
  public:
   explicit Random(std::uint64_t seed) : state_(seed * 0x9E3779B97F4A7C15u + 1) {}
@@ -36,7 +36,7 @@ HeightField NoiseField(int width, int height, std::uint64_t seed);
 // Whole metres in 0..range-1: many samples tie.
 HeightField StepField(int width, int height, int range, std::uint64_t seed);
 
-// Value noise in octaves: looks like hills, a few hundred metres high.
+// Octaves of value noise: hills a few hundred metres high.
 float HillHeight(int x, int y, std::uint64_t seed);
 HeightField HillField(int width, int height, std::uint64_t seed);
 

@@ -11,7 +11,7 @@
 namespace terrace::tin {
 namespace {
 
-// Looked for among all samples; negative when there is none.
+// The largest distance of all samples; negative if there is none.
 double WorstDistance(const HeightField& field, const std::array<Corner, 3>& corners) {
   const std::array<Corner, 3> sorted = SortedByRow(corners);
   const Plane plane(sorted);
@@ -42,7 +42,7 @@ TEST(SamplesAreWithin, AgreesWithTheWorstSample) {
 }
 
 TEST(SamplesAreWithin, IsExactOnWholeMetres) {
-  // A third of a metre off: 1 / 3 in double is below one third, its successor above.
+  // The distance is a third of a metre: 1 / 3 in double is below one third, its successor above.
   const HeightField field = MakeField(5, 4, [](int x, int y) { return x == 2 && y == 2 ? 1.f : 0.f; });
   const std::array<Corner, 3> corners = {Corner{1, 1, 0}, {4, 1, 0}, {2, 3, 1}};  // (2, 2) lies at 1 / 2
   EXPECT_TRUE(SamplesAreWithin(field, corners, 0.5));

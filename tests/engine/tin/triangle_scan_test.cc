@@ -22,15 +22,15 @@ HeightField WithVoids(const HeightField& field, int voids, Random& random) {
   while (voids-- > 0) at.push_back(RandomSample(random, field));
   std::vector<bool> is_void(static_cast<std::size_t>(field.width() * field.height()));
   for (const auto [x, y] : at) is_void[static_cast<std::size_t>(y * field.width() + x)] = true;
-  is_void[0] = false;  // or nothing would be left of the smallest
+  is_void[0] = false;  // otherwise the smallest field would be empty
   return MakeField(field.width(), field.height(), [&](int x, int y) {
     const bool is_one = is_void[static_cast<std::size_t>(y * field.width() + x)];
     return is_one ? std::numeric_limits<float>::quiet_NaN() : field.At(x, y);
   });
 }
 
-// Multiples of a quantum, from so few of them that single precision is exact to so many that it never is: all that lies
-// between is a triangle's own matter.
+// Multiples of a quantum: from a range in which single precision is always exact to one in which it never is. Between
+// them it depends on the triangle.
 HeightField RoundedField(int width, int height, int kind, std::uint64_t seed) {
   const float quantum = kind % 3 == 0 ? 1.0F : kind % 3 == 1 ? 0x1p-10F : 0x1p-14F;
   const double most = quantum * std::ldexp(1.0, 4 + kind / 3 % 20);
@@ -49,13 +49,13 @@ TEST(TriangleScan, EqualsTheFormulaOnEveryTargetBitForBit) {
     const HeightField field = i % 2 == 0   ? StepField(width, height, 3, seed)
                               : i % 4 == 1 ? NoiseField(width, height, seed)
                                            : RoundedField(width, height, i, seed);
-    const int voids = i % 8 < 4 ? random.Below(width * height / 4) : 0;  // where there are any, integers are not used
+    const int voids = i % 8 < 4 ? random.Below(width * height / 4) : 0;  // scans do not use integers if there are voids
     ExpectReferenceAtRandom(random, WithVoids(field, voids, random));
     if (HasFatalFailure()) return;
   }
 }
 
-// Triangles from well below to well beyond those whose numerators 32 bits hold.
+// Triangles whose numerators are from well below to well above 32 bits.
 TEST(TriangleScan, CountsInIntegersWhereTheyHoldAllNumerators) {
   Random random(17);
   int held = 0, not_held = 0;
@@ -78,8 +78,8 @@ TEST(TriangleScan, CountsInIntegersWhereTheyHoldAllNumerators) {
   EXPECT_GT(not_held, 40);
 }
 
-// Boxes from a vector of columns to spans of several, the furthest sample in the first or the last column; in single
-// precision, in integers and in doubt.
+// Boxes from one vector of columns to spans of several, with the furthest sample in the first or the last column, in
+// single precision, in integers and with rounding doubts.
 TEST(TriangleScan, SeesTheFirstAndTheLastColumnOfBoxesOfAnyWidth) {
   const auto at = [](int x, int y) {
     return SamplePosition{static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y)};
@@ -89,7 +89,7 @@ TEST(TriangleScan, SeesTheFirstAndTheLastColumnOfBoxesOfAnyWidth) {
       const int end = 1 + reach;
       for (const int column : {1, end}) {
         const HeightField field = MakeField(reach + 4, reach + 4, [&](int x, int y) {
-          if (x == 0 && y == 0) return base;  // which single precision is exact with, or not
+          if (x == 0 && y == 0) return base;  // single precision is exact with it, or not
           if (x == column && y == 1 + reach / 2) return 5.0F;
           return x == 1 + reach / 2 && y == 1 + reach / 2 ? 1.0F : 0.0F;
         });
@@ -101,14 +101,14 @@ TEST(TriangleScan, SeesTheFirstAndTheLastColumnOfBoxesOfAnyWidth) {
   }
 }
 
-// All around a centre: the outline of a rectangle with most of its samples left out, so that triangles of all sizes
-// share a star.
+// A star around a centre whose outline is a rectangle without most of its samples, so that it has triangles of all
+// sizes.
 TestStar RectangularStar(const HeightField& field, Random& random) {
   const int x = 1 + random.Below(field.width() - 2), y = 1 + random.Below(field.height() - 2);
   const int most = 1 + random.Below(random.Below(2) == 0 ? 8 : std::max(field.width(), field.height()));
   const int west = std::max(x - most, 0), east = std::min(x + most, field.width() - 1);
   const int south = std::max(y - most, 0), north = std::min(y + most, field.height() - 1);
-  const int kept = 1 + random.Below(3 + most / 4);  // one of so many
+  const int kept = 1 + random.Below(3 + most / 4);  // one in this many
   std::vector<SamplePosition> ring;
   const auto put = [&](int at_x, int at_y, bool is_corner) {
     if (!is_corner && random.Below(kept) != 0) return;
@@ -123,8 +123,8 @@ TestStar RectangularStar(const HeightField& field, Random& random) {
   return {field, centre, ring};
 }
 
-// Noise, spikes on a plain of zeros, spikes on a slope, steps, and magnitudes that differ within one field; of either
-// sign, with voids here and there.
+// Noise, spikes on a plain of zeros, spikes on a slope, steps, and different magnitudes within one field, with both
+// signs and some voids.
 HeightField ExtremeField(int width, int height, int kind, float scale, Random& random) {
   const int voids = kind % 3 == 0 ? 2 : 0;  // of 16
   return MakeField(width, height, [&](int x, int y) {
@@ -146,8 +146,8 @@ HeightField ExtremeField(int width, int height, int kind, float scale, Random& r
   });
 }
 
-// What rounding leaves in doubt is relative to the corners' heights, not to the samples' distances: at 1e30 it is far
-// more than all of those that lie flat between two corners. Beyond 1e30 floats overflow, and denormals have few digits.
+// The rounding bound is relative to the corners' heights, not to the samples' distances: at 1e30 it is far larger than
+// the distances of samples between two corners. Beyond 1e30 floats overflow, and denormals have few digits.
 TEST(TriangleScan, EqualsTheFormulaWhateverTheMagnitude) {
   constexpr float kLargest = std::numeric_limits<float>::max();
   constexpr float kDenormal = std::numeric_limits<float>::denorm_min();
@@ -158,7 +158,7 @@ TEST(TriangleScan, EqualsTheFormulaWhateverTheMagnitude) {
   for (int i = 0; i < 1200; ++i) {
     const float scale = kScales[static_cast<std::size_t>(random.Below(kScales.size()))];
     const int side = 3 + random.Below(i % 4 == 0 ? 80 : 12);
-    // Once in a while too wide for single precision to tell what is inside.
+    // Some triangles are too wide for an inside test in single precision.
     const int width = i % 200 == 0 ? 2100 + random.Below(90) : side + random.Below(side);
     const HeightField field =
         WithVoids(ExtremeField(width, i % 200 == 0 ? 5 : side + random.Below(side), i, scale, random),
@@ -185,8 +185,8 @@ std::array<int, 2> SpanOf(const std::array<SamplePosition, 3>& corners, int row)
   return span;
 }
 
-// Everything is void but the ends of one row's span, which are to be found, and the samples beyond them, further off,
-// which are not. In fields whose rows lie further apart than they are long.
+// All samples are void except the ends of one row's span, which must be found, and the samples beyond them with larger
+// distances, which must not. The rows of the field have padding.
 TEST(TriangleScan, SeesTheEndsOfLongSpansAndNothingBeyond) {
   Random random(11);
   int tried = 0;
@@ -205,7 +205,7 @@ TEST(TriangleScan, SeesTheEndsOfLongSpansAndNothingBeyond) {
     const int row = corners[static_cast<std::size_t>(random.Below(3))].y + random.Below(9) - 4;
     if (row < 1 || row > height - 2) continue;
     const auto [first, last] = SpanOf(corners, row);
-    const float base = i % 2 == 0 ? 0 : 0.37F;  // exact in single precision or not
+    const float base = i % 2 == 0 ? 0 : 0.37F;  // exact in single precision, or not
     const HeightField field = MakeField(width, height, [&, first = first, last = last](int x, int y) {
       for (const SamplePosition corner : corners) {
         if (x == corner.x && y == corner.y) return base;
@@ -233,7 +233,7 @@ TEST(TriangleScan, ScansStarsOfAnySize) {
   }
 }
 
-// What is left out has any corners: a ring may hold several fans one behind the other.
+// Skipped entries may have any corners: a ring may contain several fans in sequence.
 TEST(TriangleScan, LeavesOutWhatIsNoTriangle) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     Random random(seed);
@@ -283,8 +283,8 @@ TEST(TriangleScan, SkipsVoidsAndTheBorder) {
   EXPECT_EQ(worst.sample, SampleNumber(3, 1));
 }
 
-// Corners lie on the plane, but for the rounding of floats, and the border wherever it likes. All else is void, or one
-// sample that lies on the plane as well is not.
+// Corners are on the plane up to the rounding of floats; border samples are anywhere. All others are void, except
+// possibly one sample on the plane.
 TEST(TriangleScan, TakesNoCornerForASample) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr std::array kScales = {1.0F, 0.37F, 1e8F, 1e30F, 1e38F, 1e-30F, 1e-42F};
@@ -322,7 +322,7 @@ TEST(TriangleScan, TellsWhenThereIsNothingToScan) {
 }
 
 TEST(TriangleScan, HasSeveralTargetsToCompare) {
-  // On x86 the baseline and what the processor has; elsewhere at least the one.
+  // On x86 the baseline and the processor's sets; elsewhere at least one.
   int sets = 0;
   ForEachInstructionSet([&] { ++sets; });
   EXPECT_GE(sets, 1);

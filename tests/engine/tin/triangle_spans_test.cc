@@ -69,7 +69,7 @@ TEST(EdgeCrossing, IsExactForTheLongestEdges) {
   }
 }
 
-// The reciprocal of 49 times 49 is below 1: such quotients are where rounding would lose a sample.
+// In floating point, 49 times the reciprocal of 49 is below 1; with such quotients rounding could lose a sample.
 TEST(EdgeCrossing, IsExactWhereAnEdgeMeetsSamples) {
   for (int dy = 1; dy < HeightField::kMaxSide; dy += 1 + dy / 500) {
     for (const int x : {1, 49, 4097, HeightField::kMaxSide - 1}) {

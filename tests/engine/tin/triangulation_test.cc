@@ -197,7 +197,7 @@ TEST(Triangulation, FindsItsWayAroundAnyMesh) {
     const SamplePosition p{static_cast<std::uint16_t>(random.Below(30)), static_cast<std::uint16_t>(random.Below(20))};
     const TriangleId t = triangulation.Locate(p, 0);
     if (triangulation.IsCorner(p, t)) continue;
-    // Any criterion: slivers all over.
+    // A random criterion, which makes many slivers.
     triangulation.Insert({p, 0}, t, [&](const RingVertex& u, const RingVertex& v, const RingVertex& w, HalfEdgeId) {
       return Cross(u, v) == 0 || (Sees(u, v, w) && random.Below(2) == 0);
     });

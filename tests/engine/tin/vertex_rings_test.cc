@@ -16,7 +16,7 @@ std::vector<std::uint32_t> RingOf(const VertexRings& rings, std::uint32_t vertex
   return {ring.begin(), ring.end()};
 }
 
-// A square with its corners 0 to 3, and 4 in the middle.
+// A square with corners 0 to 3 and vertex 4 in the middle.
 const TinMesh kSquare = {{{0, 0}, {4, 0}, {4, 4}, {0, 4}, {2, 2}}, {{2, 3, 4}, {4, 0, 1}, {1, 2, 4}, {3, 0, 4}}};
 
 TEST(VertexRings, RunCounterClockwise) {
@@ -43,7 +43,7 @@ TEST(VertexRings, FillAHoleWithAFan) {
 TEST(VertexRings, GrowWhereAFanIsWide) {
   // A wheel of 12 around vertex 12: the fan from 0 gives it nine more neighbours.
   TinMesh wheel;
-  for (std::uint16_t i = 0; i < 13; ++i) wheel.vertices.push_back({i, i});  // rings know no positions
+  for (std::uint16_t i = 0; i < 13; ++i) wheel.vertices.push_back({i, i});  // rings do not use positions
   for (std::uint32_t i = 0; i < 12; ++i) wheel.triangles.push_back({12, i, (i + 1) % 12});
   VertexRings rings(wheel);
   rings.Remove(12, 0);

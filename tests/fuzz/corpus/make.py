@@ -3,7 +3,7 @@
 
     tests/fuzz/corpus/make.py
 
-Files of other names are what a fuzzer found, and inputs of targets that read binary data; they stay.
+Files with other names are findings of a fuzzer and inputs of targets that read binary data; they are kept.
 """
 import json
 import pathlib
@@ -86,7 +86,7 @@ def write(target, seeds):
 
 write("url_fuzz", [*URLS.items(), *((f"query-{name}", "?" + text) for name, text in QUERIES.items()),
                    *((f"header-{name}", ":" + text) for name, text in HEADERS.items())])
-# Ahead of the bytes: where they are cut.
+# The first bytes say where the rest is split.
 write("http_fuzz", ((name, b"\x10\x00\x05\x00" + text) for name, text in HTTP.items()))
 write("heights_fuzz", HEIGHTS.items())
 write("config_fuzz", configs())

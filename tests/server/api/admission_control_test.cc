@@ -16,7 +16,7 @@ AdmissionControl GateWith(const std::vector<config::TokenConfig>& tokens, const 
   return AdmissionControl(std::move(options));
 }
 
-// One request on its way past a gate.
+// One request that passes a gate.
 struct Visit {
   explicit Visit(const AdmissionControl& admission_control, const std::string& target, RequestFields fields = {}) {
     request.target = target;
@@ -63,7 +63,7 @@ TEST(AdmissionControl, TakesTheTokenOutOfTheTarget) {
       {"/a?tokens=s", "/a?tokens=s", ""},
       {"/a?error=%zz&x=token", "/a?error=%zz&x=token", ""},
       {"/token=s", "/token=s", ""},
-      {"/a?token=s&token=t", "/a", "s t"},  // fits nobody
+      {"/a?token=s&token=t", "/a", "s t"},  // matches no token
   };
   for (const auto& c : cases) {
     const Visit visit(admission_control, c.sent);

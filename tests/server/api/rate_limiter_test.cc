@@ -11,7 +11,7 @@ using namespace std::chrono_literals;
 
 class RateLimiterTest : public testing::Test {
  protected:
-  // How many of `tries` requests pass at once.
+  // Number of `tries` requests that pass without waiting.
   int Passing(std::string_view client, RateLimiter::Rate rate, int tries) {
     int passed = 0;
     for (int i = 0; i < tries; ++i) passed += limiter_.Take(client, rate, now_, 0ms).granted;

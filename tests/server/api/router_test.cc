@@ -16,7 +16,7 @@ TEST(Router, FindsEveryUrl) {
       {"/?dataset=maui", "viewer"},
       {"/viewer/", "viewer"},
       {"/viewer/app.js", "viewer"},
-      {"/viewer/tiles.json", "viewer"},  // named as URLs of datasets are
+      {"/viewer/tiles.json", "viewer"},  // has the name of a dataset's URL
       {"/viewer/heights", "viewer"},
       {"/viewer/3/4/5.png", "viewer"},
       {"/datasets", "datasets"},

@@ -45,7 +45,7 @@ TEST(TileHead, PutsWhatDescribesTheBodyFirst) {
   EXPECT_EQ(head.text.substr(head.of_body), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
 }
 
-// A tile has such an error where a source's own is not known.
+// A tile has such an error if the error of a source is unknown.
 TEST(TileHead, LeavesAnErrorWithoutBoundUnsaid) {
   tiler::EncodedTile tile = HeadTile();
   tile.certified_error_m = std::numeric_limits<double>::infinity();

@@ -39,7 +39,7 @@ TEST(NegotiateTile, ChoosesTheCodingByQuality) {
       {"gzip;q=0.5, identity;q=0.9", tiler::Coding::kIdentity},
       {"identity;q=0.5, gzip;q=0.9", tiler::Coding::kGzip},
       {"gzip;q=1, identity;q=1", tiler::Coding::kGzip},
-      {"identity;q=0", tiler::Coding::kIdentity},  // nothing is left: plain bytes rather than none
+      {"identity;q=0", tiler::Coding::kIdentity},  // no coding is acceptable: plain bytes are better than none
       {"gzip;q=abc", tiler::Coding::kIdentity},
       {"gzip;q=2", tiler::Coding::kIdentity},
       {"gzip;q=nan", tiler::Coding::kIdentity},
@@ -134,8 +134,9 @@ TEST(NegotiateTile, AtLeastNeverGoesBelowTheDefault) {
   EXPECT_EQ(ErrorStep(Requested(d * 2, true), 10, false, 0.5), -4);
 }
 
-// Nothing finer follows the deepest level: layer.json?error=E would otherwise never show E. A tile of another level
-// without children is not deepest: clients stop there because of availability, and the neighbours go deeper.
+// No finer level follows the deepest one, so without this rule layer.json?error=E would never show E. A tile of another
+// level without children is not at the deepest level: clients stop there because of availability, and its neighbours go
+// deeper.
 TEST(NegotiateTile, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
   std::array<DatasetView, 1> datasets;
   datasets[0].name = "maui";
@@ -176,7 +177,7 @@ TEST(NegotiateTile, ComesToFortyOneErrorsAtMost) {
   EXPECT_EQ(*steps.rbegin(), geo::kFinestStep);
   RecordProperty("errors", 2 * kErrors);
   RecordProperty("steps",
-                 static_cast<int>(steps.size()));  // 41, for there is nothing between the ends but whole numbers
+                 static_cast<int>(steps.size()));  // 41, because steps are all whole numbers between the ends
 }
 
 TEST(NegotiateTile, HeightTilesAreThoseThatMeetTheBounds) {
@@ -262,12 +263,12 @@ TEST(NegotiateTile, GlbTilesAreCanonicalToo) {
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=quantized")->coding, tiler::Coding::kGzip);
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=zip").error().code, ErrorCode::kInvalidArgument);
   EXPECT_EQ(negotiate("/maui/0/1/0.terrain?compression=none").error().code, ErrorCode::kInvalidArgument);
-  // The dataset's word for GLB tiles makes no second variant of the others.
+  // The dataset's option for GLB tiles makes no second variant of other tiles.
   EXPECT_EQ(negotiate("/maui/0/1/0.terrain")->compression, tiler::TileRequest{}.compression);
 }
 
-// What skirts rely on (proto/mesh/skirt.h): whatever is asked for, a parent's error is at most twice what they are made
-// for.
+// Skirts require this (proto/mesh/skirt.h): for any request, a parent's error is at most twice the error for which they
+// are made.
 TEST(NegotiateTile, AParentIsAtMostTwiceAsCoarse) {
   for (int level = 1; level <= geo::kMaxLevel; ++level) {
     for (double error_m = 1e-5; error_m < 1e8; error_m *= 1.31) {

@@ -194,14 +194,14 @@ class Config(unittest.TestCase):
                 self.assertEqual((result.returncode, result.stdout), (code, ""), (options, result.stderr))
                 for word in words:
                     self.assertIn(word, result.stderr)
-        # What a folder has besides rasters is none of the datasets' files.
+        # Files of a folder that are not rasters do not belong to the dataset.
         (self.folder / "dems").mkdir()
         (self.folder / "dems/a.tif").symlink_to(dem)
         (self.folder / "dems/index.vrt").write_text("<VRTDataset>", encoding="utf-8")
         fine = self.write(json.dumps({"datasets": [{"name": "a", "sources": ["dems"]}], "disk_cache": {"directory": "x/y"},
                                       "access_log": "json", "access_log_file": "access.log"}))
         self.assertEqual(run("serve", "--config", fine, "--check-config").returncode, 0)
-        # What it made would belong to whoever checks, who may be another user than the server.
+        # A created file would belong to the user who checks, who may differ from the server's user.
         self.assertFalse((self.folder / "x").exists() or (self.folder / "access.log").exists())
 
     def test_equal_tokens_are_refused_with_their_place(self):

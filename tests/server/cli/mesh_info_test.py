@@ -1,4 +1,4 @@
-"""terrace mesh and terrace info, and what all commands say about bad rasters: mesh_info_test.py BINARY SOURCE_DIR."""
+"""terrace mesh and terrace info, and the messages of all commands about bad rasters: mesh_info_test.py BINARY SOURCE_DIR."""
 import html
 import json
 import math
@@ -74,7 +74,7 @@ class InFolder(unittest.TestCase):
         self.assertEqual((result.returncode, result.stdout), (code, ""), result.stderr)
         for word in words:
             self.assertIn(word, result.stderr)
-        self.assertRegex(result.stderr, r"(?m)^terrace: ")  # the log may have told of other things before
+        self.assertRegex(result.stderr, r"(?m)^terrace: ")  # the log may have other lines before
 
 
 class Mesh(InFolder):
@@ -96,7 +96,7 @@ class Mesh(InFolder):
             self.assertAlmostEqual(math.sqrt(squares / 1200), statistics["rms_error"], delta=1e-3)
 
     def measure(self, vertices, triangles):
-        """Every sample under the first triangle that holds it; pixel coordinates make this possible."""
+        """Measures every sample against the first triangle that contains it, in pixel coordinates."""
         self.assertAlmostEqual(sum(area(*(vertices[i] for i in t)) for t in triangles), 2 * 39 * 29, places=6)
         worst = squares = 0
         for y, row in enumerate(BUMPS):
@@ -126,7 +126,7 @@ class Mesh(InFolder):
 
     def raster_of_zeros(self, name, columns, rows):
         path = self.write(name + ".img", b"")
-        os.truncate(path, columns * rows)  # takes no space on the disk
+        os.truncate(path, columns * rows)  # a sparse file
         self.write(name + ".hdr", f"ENVI\nsamples = {columns}\nlines = {rows}\nbands = 1\ndata type = 1\ninterleave = bsq\nbyte order = 0\n")
         return path
 
@@ -198,7 +198,7 @@ class Mesh(InFolder):
             self.assertEqual(one.read_bytes()[:4], b"glTF")
 
     def test_of_degrees_keep_their_error_in_a_glb(self):
-        # Spikes on a plain: triangles between them are as thin as they are steep.
+        # Spikes on a plain: triangles between them are thin and steep.
         picks = random.Random(4)
         size, cell, west, north = 400, 1 / 3600, 10.003, 46.5
         rows = [[0] * size for _ in range(size)]
@@ -282,7 +282,7 @@ class Mesh(InFolder):
         dem = self.write("dem.asc", grid(BUMPS, PLACE))
         (self.folder / "link.obj").symlink_to("between.obj")
         (self.folder / "between.obj").symlink_to("real.obj")
-        for mode in (None, 0o640):  # a file that is yet to be, and one that is there
+        for mode in (None, 0o640):  # a new file, and an existing one
             if mode:
                 (self.folder / "real.obj").chmod(mode)
             self.mesh(dem, "link.obj", "--points", 9)
@@ -468,7 +468,7 @@ class InfoOfFiles(InFolder):
 
 
 class BadRasters(InFolder):
-    SERVE = ("serve", "--listen", "127.0.0.1:0")  # whatever else listens on this machine
+    SERVE = ("serve", "--listen", "127.0.0.1:0")  # a free port
 
     def test_are_refused_with_the_reason(self):
         empty = self.write("empty.tif", b"")

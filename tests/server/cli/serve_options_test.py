@@ -1,4 +1,4 @@
-"""What options of `terrace serve` do to replies and logs: serve_options_test.py BINARY SOURCE_DIR."""
+"""The effect of options of `terrace serve` on replies and logs: serve_options_test.py BINARY SOURCE_DIR."""
 import contextlib
 import fcntl
 import json
@@ -24,7 +24,7 @@ TILE = "9/272/359"
 
 @contextlib.contextmanager
 def serving(config, log):
-    """The URL of a server with this configuration; afterwards it has ended well, and `log` holds its lines."""
+    """Yields the URL of a server with this configuration. Afterwards the server must end cleanly, and `log` has its lines."""
     with tempfile.TemporaryDirectory() as folder:
         path = pathlib.Path(folder, "terrace.json")
         path.write_text(json.dumps(config))
@@ -95,14 +95,14 @@ class Log(unittest.TestCase):
         self.assertEqual(process.wait(30), 0)
 
     def test_stops_nothing_when_its_reader_stalls(self):
-        asked = 1500  # lines of more than 100 bytes, twice what a pipe holds
+        asked = 1500  # lines of more than 100 bytes, twice the capacity of a pipe
         process = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--access-log", "log"], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, text=True)
         try:
             url = re.search(r"http://\S+/", process.stdout.readline())[0]
             for _ in range(asked):
                 self.assertEqual(urllib.request.urlopen(url + "livez", timeout=30).status, 200)
-            while "/livez" not in process.stderr.readline():  # somebody reads again
+            while "/livez" not in process.stderr.readline():  # the test reads again
                 pass
             os.set_blocking(process.stderr.fileno(), False)
             while process.stderr.buffer.read():
@@ -139,7 +139,7 @@ class Log(unittest.TestCase):
             self.assertEqual(set(line), {"time", "level", "message"})
 
     def test_levels_hold_back_what_is_below(self):
-        for level, told in (("error", False), ("warn", True)):  # that no vertical datum is stated is a warning
+        for level, told in (("error", False), ("warn", True)):  # a missing vertical datum is a warning
             with serving({"datasets": [{"name": "maui", "sources": [str(DEM)]}], "log_level": level}, log := []):
                 pass
             self.assertEqual(any("vertical datum" in line for line in log), told, log)
@@ -224,7 +224,7 @@ class Stopping(unittest.TestCase):
         self.assertEqual(process.returncode, 1)
 
     def test_a_source_that_cannot_be_read_does_not_keep_it(self):
-        """Opening a file that somebody has a write lease of waits for up to 45 s, as on a mount that does not answer."""
+        """Opening a file with a write lease of another process blocks for up to 45 s, as on a mount that does not answer."""
         signal.signal(signal.SIGIO, signal.SIG_IGN)
         with tempfile.TemporaryDirectory() as folder:
             source, beside = pathlib.Path(folder, "source.tif"), pathlib.Path(folder, "beside.tif")
@@ -235,7 +235,7 @@ class Stopping(unittest.TestCase):
                 fcntl.fcntl(leased, fcntl.F_SETLEASE, fcntl.F_WRLCK)
                 os.rename(beside, source)
                 self.wait_for(process.stderr, "opening")
-                while fcntl.fcntl(leased, fcntl.F_GETLEASE) == fcntl.F_WRLCK:  # until the file is being opened
+                while fcntl.fcntl(leased, fcntl.F_GETLEASE) == fcntl.F_WRLCK:  # until the server opens the file
                     time.sleep(0.01)
                 process.terminate()
                 log = process.communicate(timeout=120)[1]
@@ -244,7 +244,7 @@ class Stopping(unittest.TestCase):
 
 
 class WorkingDirectory(unittest.TestCase):
-    """Names on the command line count from where the server was started, whatever becomes of that folder."""
+    """Paths on the command line are relative to the folder at the start, also if that folder is renamed or removed."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
@@ -256,7 +256,7 @@ class WorkingDirectory(unittest.TestCase):
         (self.folder / "terrace.json").write_text(json.dumps(config))
 
     def outlive(self, leave, *arguments):
-        """What /readyz says after the start and after `leave` and a few looks at the files."""
+        """The replies of /readyz after the start, and after `leave` and a few checks of the files."""
         log = tempfile.TemporaryFile("w+")
         self.addCleanup(log.close)
         process = subprocess.Popen([BINARY, "serve", "--listen", "127.0.0.1:0", *arguments], cwd=self.folder / "run",

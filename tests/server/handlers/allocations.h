@@ -1,4 +1,4 @@
-// What a test's program asks for by operator new.
+// Records the allocations of a test program by operator new.
 #pragma once
 
 #include <atomic>
@@ -7,11 +7,11 @@
 
 namespace terrace::server {
 
-// Bytes that are held, and the most that were since a test set it back.
+// Bytes allocated now, and the peak since a test reset it.
 extern std::atomic<std::size_t> held_bytes, peak_bytes;
 
-// Requests a stop in the middle of a job that asks for ever larger pieces of memory: at the first of `at_bytes` or
-// more. Of one thread; one at a time.
+// Requests a stop during a job that allocates larger and larger blocks: at the first block of `at_bytes` or more. For
+// one thread, and one object at a time.
 class StopAtAllocation {
  public:
   explicit StopAtAllocation(std::size_t at_bytes);
@@ -21,7 +21,7 @@ class StopAtAllocation {
 
   std::stop_token token() const { return source_.get_token(); }
   bool happened() const { return source_.stop_requested(); }
-  // What was asked for afterwards.
+  // The largest block allocated after the stop.
   std::size_t largest_after() const { return largest_after_; }
 
   void Note(std::size_t bytes);

@@ -1,4 +1,4 @@
-// Handlers of made-up datasets, and what those of documents answer, with documents made in place.
+// Handlers for fake datasets, and the replies of document handlers, with documents made in the calling thread.
 #pragma once
 
 #include <map>

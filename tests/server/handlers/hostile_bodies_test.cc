@@ -1,5 +1,5 @@
-// Bodies that were made to cost: each is read at most once, to its first fault, in memory of at most twice its size,
-// and reading ends at the stop token.
+// Bodies designed to be expensive: each is read at most once, up to its first error, in at most twice its size of
+// memory, and reading ends at the stop token.
 #include <gtest/gtest.h>
 
 #include <stop_token>
@@ -14,7 +14,7 @@ namespace terrace::server {
 namespace {
 
 constexpr std::size_t kSize = 640'000, kMaxLocations = 10'000;
-// What the smallest body takes: the reader itself, the message, the current item.
+// Memory for the smallest body: the parser itself, the message, the current item.
 constexpr std::size_t kOverhead = 8'192;
 
 std::string Repeated(std::string begin, std::string_view piece) {
@@ -26,11 +26,11 @@ struct Hostile {
   const char* name;
   bool is_json;
   std::string body;
-  const char* says;       // nothing: it is read to its end, and is fine as far as it goes
+  const char* says;       // null: the body is read to its end without an error
   std::size_t most_read;  // bytes
 };
 
-// What is wrong at the beginning is found in the first part.
+// An error at the beginning is found in the first part.
 std::vector<Hostile> HostileBodies() {
   return {
       {"ListOfObjects", true, Repeated("[", "{},"), "not a JSON object", kPartBytes},

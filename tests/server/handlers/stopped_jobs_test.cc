@@ -1,5 +1,5 @@
-// Jobs ask their stop token as they go: one that is requested in their middle ends them before they have asked for as
-// much memory again.
+// Jobs check their stop token: a stop that is requested in the middle of a job ends it before it has allocated as much
+// memory again.
 #include <gtest/gtest.h>
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a tileset says of its tiles' heights, beside the GLB tiles themselves, as a client gets both.
+// Compares the heights in a tileset with the GLB tiles themselves, as a client gets both.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -123,7 +123,7 @@ bool IsWithin(const HeightSpan& inner, const HeightSpan& outer) {
   return inner.min_m >= outer.min_m && inner.max_m <= outer.max_m;
 }
 
-// Of each level of the first subtree its first and its last tile are built.
+// Builds the first and the last tile of each level of the first subtree.
 void TilesetBoundsTest::CheckTree(const Json& tile, const HeightSpan& heights, bool builds) {
   ++trees_;
   flattest_tree_m = std::min(flattest_tree_m, heights.max_m - heights.min_m);
@@ -158,7 +158,7 @@ void TilesetBoundsTest::CheckTree(const Json& tile, const HeightSpan& heights, b
   }
 }
 
-// The heights that it states; where it has a sphere instead, those of the tiles below it.
+// The heights that the tile states; if it has a sphere instead, those of the tiles below it.
 HeightSpan TilesetBoundsTest::CheckTile(const Json& tile, bool builds) {
   const Json& bounds = tile.at("boundingVolume");
   HeightSpan stated;

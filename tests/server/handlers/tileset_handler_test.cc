@@ -17,7 +17,7 @@ using Json = nlohmann::json;
 
 class TilesetHandlerTest : public testing::Test {
  protected:
-  // 40 x 24 tiles of level 12, all ancestors of them, and both roots: rooted at two tiles of level 7.
+  // 40 x 24 tiles of level 12, all their ancestors, and both roots. The roots of the trees are two tiles of level 7.
   TilesetHandlerTest() {
     DatasetView& maui = datasets_[0];
     maui.name = "maui";
@@ -61,7 +61,7 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
   EXPECT_EQ(west.at("implicitTiling").at("subtreeLevels"), 6);
 }
 
-// A tile has four children or none, so that beside the data and above its roots there are tiles without any.
+// A tile has four children or none, so there are tiles without children beside the data and above its roots.
 TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMakeFour) {
   DatasetView& maui = datasets_[0];
   const double tile = 180.0 / 4096;
@@ -109,10 +109,10 @@ TEST_F(TilesetHandlerTest, RegionHoldsDataFloorAndSkirtsOfTheErrorAskedFor) {
     EXPECT_LE(box[5], 3000 + error_m / 3) << error_m;
   };
   holds(region(""), geo::DefaultError(7));
-  holds(region("?error=5"), geo::DefaultError(7));  // at least the default is asked for
+  holds(region("?error=5"), geo::DefaultError(7));  // the templates request at least the default
   holds(region("?error=1000"), geo::LadderError(7, geo::SnapToLadder(7, 1000)));
   holds(region("?fraction=0.05"), geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7))));
-  // The deepest level's skirts hang for its default error at least, however small the fraction.
+  // Skirts of the deepest level have at least the depth of its default error, also at a small fraction.
   const Json box = region("?fraction=0.008");
   EXPECT_LE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)));
   EXPECT_GE(box[4], -20 - proto::SkirtDepth(12, geo::DefaultError(12)) - geo::DefaultError(12));
@@ -237,7 +237,7 @@ TEST_F(TilesetHandlerTest, TakesTheTilesetsParametersOnSubtreesToo) {
   EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?compression=none&v=1").body, *plain.body);
   const Response requested = Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1");
   EXPECT_EQ(requested.status, 200);
-  // deck.gl sends the tileset's query once more.
+  // deck.gl repeats the query of the tileset.
   EXPECT_EQ(*Get("/maui/3dtiles/7-16-32/0/0/0.6.subtree?error=500&atleast=1&error=500&compression=none").body,
             *requested.body);
   EXPECT_NE(*requested.body, *plain.body) << "deeper skirts";

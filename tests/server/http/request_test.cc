@@ -10,7 +10,7 @@ namespace {
 
 std::string Get(const std::string& fields) { return "GET / HTTP/1.1\r\nHost: x\r\n" + fields + "\r\n"; }
 
-// All that a head says.
+// All fields of a parsed head.
 auto Said(const Request& r) {
   return std::tuple(r.method, r.version, r.keep_alive, r.method_name, r.target, *r.fields, r.content_length,
                     r.expects_continue);
@@ -59,7 +59,7 @@ TEST(HeadMemo, ChangesNoRequest) {
     for (const std::string& second : heads) {
       const auto plain = ParseHead(second);
       Request taken;
-      taken.client = 7;  // of the request before
+      taken.client = 7;  // from the previous request
       const std::size_t size = TakeRepeated(second + "GET / HTTP/1.1\r\n", primed, taken);
       if (size == 0) continue;
       ++repeated;
@@ -71,7 +71,7 @@ TEST(HeadMemo, ChangesNoRequest) {
       EXPECT_TRUE(taken.is_private);
     }
   }
-  EXPECT_GT(repeated, 100);  // it is used at all
+  EXPECT_GT(repeated, 100);  // the shortcut is used
 }
 
 TEST(Request, ReadsWhatMatters) {

@@ -134,7 +134,7 @@ TEST(HttpError, KeepsTheDetailFromTheClient) {
   EXPECT_NE(SerializeHead(response, {.keep_alive = true}).find("\r\nRetry-After: 5\r\n"), std::string::npos);
 }
 
-// An image that is too large to cut is no fault of the client that asked for a tile of it.
+// An image that is too large is not an error of the client that requests a tile of it.
 TEST(Response, FailuresBehindAreNeverTheClients) {
   const Response response = BackendErrorResponse(Error{ErrorCode::kInvalidArgument, "too many pixels"}, "id8");
   EXPECT_EQ(response.status, 503);

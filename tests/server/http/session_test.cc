@@ -1,4 +1,4 @@
-// Sessions of one thread: whose turn it is.
+// Several sessions on one thread take turns.
 #include "server/http/session.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@
 namespace terrace::server {
 namespace {
 
-// Answers at once, and keeps the targets in the order in which they were asked for.
+// Answers immediately, and records the targets in the order of the requests.
 class Echo : public Application {
  public:
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address&) override {
@@ -43,7 +43,7 @@ class Echo : public Application {
   };
 };
 
-// Both ends of a connection to an acceptor of its own.
+// Both ends of a connection.
 struct Ends {
   explicit Ends(asio::io_context& io) : client(io), server(io) {
     asio::ip::tcp::acceptor acceptor(io, {asio::ip::address_v4::loopback(), 0});

@@ -23,7 +23,7 @@ class FairQueueTest : public testing::Test {
     queue.Push(job, now_);
     return job;
   }
-  // One thread runs the next job for `time`; the client it was of, 0 if there is none.
+  // One thread runs the next job for `time`. Returns the client of the job, 0 if there is none.
   std::uint64_t Serve(FairQueue& queue, std::chrono::milliseconds time) {
     const PoolJobPtr job = queue.Take(now_);
     if (!job) return 0;
@@ -105,7 +105,7 @@ TEST_F(FairQueueTest, NewcomersDoNotStarveWhoWaits) {
   std::uint64_t newcomer = 100;
   int served = 0;
   for (int i = 0; i < 20; ++i) {
-    for (int k = 0; k < 2; ++k) Push(queue, newcomer++);  // twice as many as are served
+    for (int k = 0; k < 2; ++k) Push(queue, newcomer++);  // twice as many as the number of served jobs
     served += Serve(queue, 10ms) == 1;
   }
   EXPECT_EQ(served, 2);

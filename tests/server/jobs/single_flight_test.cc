@@ -34,7 +34,7 @@ JobOrder Until(JobClock::time_point deadline, std::uint64_t client = 0, int leve
   return order;
 }
 
-// Waits until `stop` is requested, at most ten seconds.
+// Waits until `stop` is requested, for at most ten seconds.
 bool StopComes(const std::stop_token& stop) {
   for (int i = 0; i < 2000 && !stop.stop_requested(); ++i) std::this_thread::sleep_for(5ms);
   return stop.stop_requested();
@@ -47,16 +47,20 @@ class SingleFlightTest : public testing::Test {
 
   void Join(Flights::Build build, JobClock::time_point deadline,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
+      flights_done_.push_back(std::move(flight));
+    };
     asio::co_spawn(io_, flights_.Join(0, "it", std::move(build), Until(deadline)),
                    asio::bind_cancellation_slot(slot, keep));
   }
   void JoinAs(std::size_t key, JobOrder order, Flights::Build build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
-    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) { flights_done_.push_back(std::move(flight)); };
+    auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
+      flights_done_.push_back(std::move(flight));
+    };
     asio::co_spawn(io_, flights_.Join(key, "it", std::move(build), order), asio::bind_cancellation_slot(slot, keep));
   }
-  // As jobs of the first client.
+  // Blocks the workers with jobs of the first client.
   void HoldWorkers(const std::shared_future<void>& open) {
     std::latch begun(pool_.threads());
     for (unsigned i = 0; i < pool_.threads(); ++i) {
@@ -79,7 +83,7 @@ class SingleFlightTest : public testing::Test {
   std::vector<Flights::FlightResult> flights_done_;
 };
 
-// Builds run in the order in which the queue hands them out.
+// With one worker, builds run in the order of the queue.
 class SingleFlightOfOneWorker : public SingleFlightTest {
  protected:
   SingleFlightOfOneWorker() : SingleFlightTest(1) {}
@@ -254,9 +258,8 @@ TEST_F(SingleFlightTest, TellsWhomTheQueueDisplaces) {
   };
   std::vector<Result<Value>> ends;
   const auto join = [&](std::size_t i, std::uint64_t client) {
-    asio::co_spawn(
-        io_, flights.Join(i, "it", wait, Until(Soon(), client)),
-        [&](std::exception_ptr, Flights::FlightResult flight) { ends.push_back(std::move(flight.value)); });
+    asio::co_spawn(io_, flights.Join(i, "it", wait, Until(Soon(), client)),
+                   [&](std::exception_ptr, Flights::FlightResult flight) { ends.push_back(std::move(flight.value)); });
     io_.poll();
     io_.restart();
   };

@@ -32,7 +32,7 @@ PoolJobPtr JobOf(std::function<void()> run, JobOrder order = {}) {
   return job;
 }
 
-// A pool whose threads are busy until Open; what waits behind them is in the queue.
+// A pool whose threads are busy until Open, so that further jobs stay in the queue.
 struct BusyPool {
   BusyPool(unsigned threads, std::size_t queue_length, WorkerPool::Now now = JobClock::now)
       : pool(threads, queue_length, std::move(now)) {
@@ -98,7 +98,7 @@ TEST(WorkerPool, RefusesOnlyWhatCannotBeginInTime) {
   const auto now = [&] { return JobClock::time_point(1h) + std::chrono::seconds(seconds); };
   BusyPool busy(1, 10'000, now);
   seconds = 10;
-  busy.Open();  // a job of ten seconds, as it seems
+  busy.Open();  // the clock of the test makes this a job of ten seconds
   ASSERT_TRUE(busy.pool.Submit(JobOf([&] {
     begun.set_value();
     is_open.wait();
@@ -141,7 +141,7 @@ TEST(WorkerPool, RunsWhatItTookAndTakesNothingAfterShutdown) {
   EXPECT_EQ(pool.Submit(JobOf([&] { ++done; })).error().code, ErrorCode::kUnavailable);
 }
 
-// What Run brings a coroutine on a thread of its own; `leave` cancels the wait.
+// The result of Run in a coroutine on a separate thread; `leave` cancels the wait.
 template <typename T>
 std::future<Result<T>> RunAside(WorkerPool& pool, Work<T> work, std::chrono::milliseconds time = 10s,
                                 asio::cancellation_slot leave = {}) {

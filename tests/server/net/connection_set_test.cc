@@ -72,7 +72,7 @@ TEST_F(Eviction, TakesTheNewestServingConnectionOfAClientThatHasMoreThanTheNewco
   EXPECT_FALSE(set_.EvictOne("new")) << "the flood has one left, as the newcomer will";
 }
 
-// Whatever those of others are at: one client that is served all it can get does not drive them out.
+// A client whose connections are all being served does not displace those of others, whatever their state.
 TEST_F(Eviction, TakesFromTheClientThatHasMostWhateverItsConnectionsAreAt) {
   const FakeConnection& idle = Add(Phase::kIdle, "polite");
   const FakeConnection& secured = Add(Phase::kReceives, "slow line");
@@ -94,7 +94,7 @@ TEST_F(Eviction, AClientThatHasMostTakesItsOwn) {
   EXPECT_FALSE(idle.evicted);
 }
 
-// They speak for many clients, who must not be counted as one.
+// A proxy sends requests of many clients, which must not count as one.
 TEST_F(Eviction, ConnectionsOfProxiesAreNoClient) {
   const FakeConnection& first = Add(Phase::kIdle, "");
   const FakeConnection& second = Add(Phase::kReceives, "");

@@ -52,7 +52,7 @@ class TransferBudgetTest : public testing::Test {
   std::optional<Hold> TryUpload(std::size_t bytes, std::uint64_t client = 1) {
     return budget_.TryHold(AskFor(bytes, client));
   }
-  // `name` is noted, and the hold kept, when there is room. Deadlines are an hour away unless they have passed.
+  // Records `name` and keeps the hold when there is memory. The deadline is in an hour, or has passed with `is_late`.
   void Wait(int name, TransferBudget::HoldRequest ask, bool is_late = false,
             asio::cancellation_slot slot = asio::cancellation_slot()) {
     const auto deadline = now_ + (is_late ? -1h : 1h);
@@ -68,7 +68,7 @@ class TransferBudgetTest : public testing::Test {
     io_.poll();
   }
 
-  // A reply of another connection that is on offer.
+  // A reply of another connection that is being sent.
   std::optional<Hold> Offer(std::size_t bytes, std::uint64_t client, std::shared_ptr<FakeTransfer>& connection) {
     connection_ = connection = std::make_shared<FakeTransfer>();
     auto hold = Try(BodyOf(bytes), client);
@@ -118,7 +118,7 @@ TEST_F(TransferBudgetTest, RoomsTakeNothingFromOneAnother) {
   EXPECT_TRUE(TryUpload(3 * kMb)) << "a single one may be larger";
 }
 
-// However many replies one client asks for, and however large they are, another one gets its tile at once.
+// Whatever the number and the size of one client's replies, another client gets its tile immediately.
 TEST_F(TransferBudgetTest, NoClientKeepsSmallRepliesOfOthersOut) {
   std::vector<Hold> holds;
   for (const std::size_t bytes : {2 * kMb, 6 * kMb, kMb / 2, kMb / 10}) {
@@ -237,7 +237,7 @@ TEST_F(TransferBudgetTest, UseIsForgotten) {
   EXPECT_EQ(granted_, std::vector<int>{1}) << "the oldest of those alike";
 }
 
-// Else a crowd of ever new clients would keep those out who come twice.
+// Otherwise a stream of new clients would block those that request twice.
 TEST_F(TransferBudgetTest, LittleUseTakesNobodysPlace) {
   auto little = Try(BodyOf(kMb * 6 / 10), 1);
   now_ += 50ms;
@@ -287,7 +287,7 @@ TEST_F(TransferBudgetTest, CutsWhoIsLateAndHoldsMost) {
   EXPECT_EQ(budget_.stats().cut, 1u);
 }
 
-// 30 MB at the rate would take half a minute; nobody waits so long for who takes nothing.
+// 30 MB at the required rate take half a minute. Nobody waits that long for a client that reads nothing.
 TEST_F(TransferBudgetTest, TimeCountsByWhatIsTaken) {
   std::shared_ptr<FakeTransfer> slow, stopped, quick;
   auto hold = Offer(30 * kMb, 1, slow);
@@ -331,7 +331,7 @@ TEST_F(TransferBudgetTest, AReplyThatIsBeingMadeIsNotLate) {
   EXPECT_EQ(connection_->aborts, 0) << "the client has nothing to take yet";
 }
 
-// What passes beside its room is held all the same.
+// A body that exceeds its budget counts as held as well.
 TEST_F(TransferBudgetTest, CutsTheLateHolderOfAnOversizedBody) {
   std::shared_ptr<FakeTransfer> oversized, large;
   const auto slow = Offer(10 * kMb, 1, oversized), other = Offer(2 * kMb, 5, large);
@@ -344,7 +344,7 @@ TEST_F(TransferBudgetTest, CutsTheLateHolderOfAnOversizedBody) {
   EXPECT_EQ(oversized->aborts, 1);
 }
 
-// Else two of them would displace one another without end.
+// Otherwise two of them would displace each other forever.
 TEST_F(TransferBudgetTest, AnOversizedUploadIsDisplacedOnceItIsLate) {
   const auto upload = TryUpload(3 * kMb, 1);
   ASSERT_TRUE(upload);

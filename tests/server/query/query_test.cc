@@ -96,7 +96,7 @@ TEST(Query, TakesACompressionWhereItIsOffered) {
 
 TEST(Query, RefusesAtLeastWhereItIsNotOffered) { EXPECT_FALSE(ParseTileParameters("error=5&atleast=1", false)); }
 
-// deck.gl appends the query of tileset.json to the URLs under it, which carry it already.
+// deck.gl appends the query of tileset.json to the URLs in it, which already have it.
 TEST(Query, TakesAnEqualValueAgainOn3dTilesUrls) {
   const auto accepts = [](const char* query) {
     return ParseTileParameters(query, /*allow_at_least=*/true, /*allow_compression=*/true).has_value();

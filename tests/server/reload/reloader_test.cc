@@ -1,4 +1,4 @@
-// The reloader with a configuration and an opener that the tests steer; sources are copies of a sample.
+// The reloader with a configuration and an opener that tests replace. Sources are copies of a sample.
 #include "server/reload/reloader.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ class ReloaderTest : public testing::Test {
     return dataset;
   }
 
-  // A new file under the source's name, written long ago.
+  // Puts a new file with an old time under the source's name.
   void Put(const std::string& name) {
     const fs::path beside = folder_ / "new";
     fs::copy_file(test_support::SourceDir() / "config/samples/jacksboro.tif", beside);
@@ -68,7 +68,8 @@ class ReloaderTest : public testing::Test {
     tiler::Dataset dataset;
     dataset.name = wanted.name;
     dataset.source = *std::move(source);
-    dataset.generation = dataset.source->files().fingerprint();  // of this opening of these files, whatever is in them
+    dataset.generation =
+        dataset.source->files().fingerprint();  // depends on the files and their opening, not on their content
     return dataset;
   }
 
@@ -127,7 +128,7 @@ class ReloaderTest : public testing::Test {
   std::atomic<bool> changes_{true};
   std::atomic<bool> blocks_{false}, fails_{false}, throws_{false};
   std::mutex mutex_;
-  config::ConfigResult next_;                                  // guarded by mutex_, as the rest
+  config::ConfigResult next_;                                  // mutex_ guards this and the following
   std::vector<std::pair<std::string, std::uint64_t>> served_;  // name and generation
   std::map<std::string, std::string> troubles_;
   std::unique_ptr<Reloader> reloader_;
@@ -210,7 +211,7 @@ TEST_F(ReloaderTest, LoadsNoConfigurationThatStaysAsItIs) {
   Start();
   ASSERT_TRUE(Eventually([&] { return looks_ >= 3; }));
   EXPECT_EQ(loads_, 0);
-  reloader_->Reload();  // who asks knows better
+  reloader_->Reload();  // an explicit reload does not wait
   ASSERT_TRUE(Eventually([&] { return loads_ == 1; }));
 }
 
@@ -234,7 +235,7 @@ TEST_F(ReloaderTest, StoppingStopsAnOpening) {
   Put("a");
   reloader_->Look();
   ASSERT_TRUE(Eventually([&] { return openings_ == 1; }));
-  reloader_.reset();  // or this would never return
+  reloader_.reset();  // otherwise this would never return
 }
 
 TEST_F(ReloaderTest, WaitsForAFileThatIsBeingWritten) {
@@ -242,7 +243,7 @@ TEST_F(ReloaderTest, WaitsForAFileThatIsBeingWritten) {
   const auto before = Served();
   Put("a");
   auto last = std::chrono::steady_clock::now();
-  bool is_busy = false;  // the machine, so that the file looks complete
+  bool is_busy = false;  // a busy machine, on which the file looks complete
   for (int i = 0; i < 30 && !is_busy; ++i) {
     fs::last_write_time(folder_ / "a.tif", fs::file_time_type::clock::now());
     reloader_->Look();

@@ -1,4 +1,4 @@
-// What a store of records does on a disk that keeps its promises, on one that is too small, and on one that fails.
+// A store of records on a working disk, on a disk that is too small, and on a disk that fails.
 #include "server/store/disk_store.h"
 
 #include <fmt/format.h>
@@ -27,7 +27,7 @@ using std::chrono::milliseconds;
 
 bool IsLong() { return std::getenv("TERRACE_LONG_TESTS") != nullptr; }
 
-// A function of its number alone, so that every answer can be judged.
+// A function of the number alone, so that every result can be checked.
 std::string KeyOf(int i) { return fmt::format("key {}", i); }
 std::string ValueOf(int i, std::size_t bytes = 1000) {
   std::string value(bytes, '\0');
@@ -53,7 +53,7 @@ class DiskStoreTest : public testing::Test {
     store.Keep(
         KeyOf(i), [i, bytes] { return ValueOf(i, bytes); }, bytes);
   }
-  // Every answer is right or none: how many were right.
+  // Every record found must be right. Returns how many were found.
   static int FoundRight(DiskStore& store, int count, std::size_t bytes = 1000) {
     int found = 0;
     for (int i = 0; i < count; ++i) {
@@ -73,7 +73,7 @@ class DiskStoreTest : public testing::Test {
   }
   std::size_t DirectoryBytes() const {
     std::size_t bytes = 0;
-    std::error_code error;  // the store takes files away meanwhile
+    std::error_code error;  // the store removes files meanwhile
     for (auto file = fs::recursive_directory_iterator(scratch_.path(), error);
          !error && file != fs::recursive_directory_iterator(); file.increment(error)) {
       std::error_code gone;
@@ -83,7 +83,7 @@ class DiskStoreTest : public testing::Test {
     return bytes;
   }
 
-  // Of this store, by this process; those of records alone.
+  // Number of files of this store that this process has open, by their ending.
   std::size_t OpenFiles(const std::string& ending = "") const {
     std::size_t count = 0;
     for (const auto& entry : fs::directory_iterator("/proc/self/fd")) {
@@ -272,8 +272,8 @@ TEST_F(DiskStoreTest, NeverServesARecordOfAnotherKeyOrWithoutASeal) {
   EXPECT_EQ(store.stats().damaged, 3u) << "they are still there";
 }
 
-// Row 26: bytes of the store's files flipped and their ends cut, on disk, while no server runs: some of them, the same
-// in every run, and with TERRACE_LONG_TESTS nearly all. Every byte and length of a record: Seal's tests.
+// Row 26: while no server runs, bytes of the store's files are flipped and their ends cut off: some of them, the same
+// in every run, or nearly all with TERRACE_LONG_TESTS. The tests of Seal try every byte and length of a record.
 class DamagedStoreTest : public DiskStoreTest {
  protected:
   void SetUp() override {
@@ -281,7 +281,7 @@ class DamagedStoreTest : public DiskStoreTest {
       DiskStore store(Options());
       for (int i = 0; i < kCount; ++i) Keep(store, i, kBytes);
     }
-    // The log becomes a table when it is opened; both kinds of file are to be there.
+    // Opening turns the log into a table, so that both kinds of file exist.
     DiskStore store(Options());
     for (int i = kCount; i < 2 * kCount; ++i) Keep(store, i, kBytes);
     store.Flush();
@@ -289,7 +289,7 @@ class DamagedStoreTest : public DiskStoreTest {
     fs::copy(Options().db.directory, scratch_.path() / "good", fs::copy_options::recursive);
   }
 
-  // Opens the store with one file changed; it then answers rightly or not at all, and takes new values.
+  // Opens the store with one changed file. It must return right values or none, and accept new ones.
   template <typename Damage>
   void Check(const fs::path& name, const std::string& what, const Damage& damage) {
     const fs::path directory = Options().db.directory;
@@ -351,11 +351,11 @@ TEST_F(DamagedStoreTest, ServesNothingWrongWhereFilesAreCut) {
   EXPECT_GT(lost_, 0) << "no damage was met";
 }
 
-// Row 27: the nth call that reads or writes fails, once or for good, for n = 1, 2, ... until a whole life of the store
-// passes without a failure. Nothing wrong is ever found, and once the disk is well the store is.
+// Row 27: the nth read or write fails, once or from then on, for n = 1, 2, ... until the whole life of the store passes
+// without a failure. The store never returns a wrong value, and works again once the disk does.
 class FailingDiskTest : public DiskStoreTest {
  protected:
-  // Open, keep, find, close; twice. Returns how often the plan struck.
+  // Opens the store, writes, reads and closes it, twice. Returns the number of injected failures.
   std::uint64_t Live(FaultPlan& plan, rocksdb::Env* env, std::uint64_t n, FaultPlan::Kind kind, bool for_good) {
     fs::remove_all(Options().db.directory);
     const std::uint64_t before = plan.failures();
@@ -392,7 +392,7 @@ TEST_F(FailingDiskTest, SurvivesReadsThatFailForGood) { LiveUntilClean(FaultPlan
 TEST_F(FailingDiskTest, SurvivesEachWriteThatFailsOnce) { LiveUntilClean(FaultPlan::Kind::kWrite, false); }
 TEST_F(FailingDiskTest, SurvivesWritesThatFailForGood) { LiveUntilClean(FaultPlan::Kind::kWrite, true); }
 
-// Row 28 with a disk that is played; tests/e2e/disk_cache_test.py has a real one.
+// Row 28 with a simulated disk; tests/e2e/disk_cache_test.py has a real one.
 TEST_F(FailingDiskTest, ReadsOnAFullDiskAndWritesAgainWhenThereIsSpace) {
   FaultPlan plan;
   const std::unique_ptr<rocksdb::Env> env = MakeFaultEnv(plan);
@@ -423,7 +423,7 @@ TEST_F(FailingDiskTest, FindsNothingWhileReadsFailAndEverythingAfterwards) {
     DiskStore store(Options(env.get()));
     for (int i = 0; i < 10; ++i) Keep(store, i);
   }
-  DiskStore store(Options(env.get()));  // the log becomes a table, which is read
+  DiskStore store(Options(env.get()));  // opening turns the log into a table, which is read
   plan.FailNth(1, FaultPlan::Kind::kRead, /*for_good=*/true);
   EXPECT_EQ(FoundRight(store, 10), 0);
   EXPECT_FALSE(store.stats().on);

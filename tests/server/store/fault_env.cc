@@ -15,7 +15,7 @@ using rocksdb::IOOptions;
 using rocksdb::IOStatus;
 using rocksdb::Slice;
 
-// Both as errno says it: reads end in EIO, writes in a full disk.
+// Errors with the text of errno: EIO for reads, a full disk for writes.
 IOStatus ReadFault() { return IOStatus::IOError("made to fail: Input/output error"); }
 IOStatus WriteFault() { return IOStatus::NoSpace("made to fail: No space left on device"); }
 
@@ -24,7 +24,7 @@ class Written : public rocksdb::FSWritableFileOwnerWrapper {
   Written(FaultPlan& plan, std::unique_ptr<rocksdb::FSWritableFile> file)
       : FSWritableFileOwnerWrapper(std::move(file)), plan_(plan) {}
 
-  // Half of what was to be written is: what a torn write leaves.
+  // Writes only the first half, as a torn write does.
   IOStatus Append(const Slice& data, const IOOptions& options, IODebugContext* debug) override {
     if (!plan_.Fails(Kind::kWrite)) return FSWritableFileOwnerWrapper::Append(data, options, debug);
     static_cast<void>(FSWritableFileOwnerWrapper::Append(Slice(data.data(), data.size() / 2), options, debug));

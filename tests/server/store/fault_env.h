@@ -1,4 +1,4 @@
-// A disk that fails when it is told to, in front of the real one.
+// A file system that fails on request, in front of the real one.
 #pragma once
 
 #include <rocksdb/env.h>
@@ -14,7 +14,7 @@ class FaultPlan {
  public:
   enum class Kind { kRead = 1, kWrite = 2, kAny = 3 };
 
-  // The nth call of the kind from now on fails, counted from 1, and with `for_good` every later one as well.
+  // The nth call of this kind from now on fails, counted from 1; with `for_good` all later ones too.
   void FailNth(std::uint64_t n, Kind kind, bool for_good) {
     kind_ = kind;
     for_good_ = for_good;
@@ -39,7 +39,7 @@ class FaultPlan {
   std::atomic<std::uint64_t> calls_{0}, fail_at_{0}, failures_{0};
 };
 
-// `plan` outlives it.
+// `plan` must outlive the result.
 std::unique_ptr<rocksdb::Env> MakeFaultEnv(FaultPlan& plan);
 
 }  // namespace terrace::server

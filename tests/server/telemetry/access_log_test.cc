@@ -48,7 +48,7 @@ TEST(AccessLog, CutsLongTargets) {
   EXPECT_LT(FormatJsonLine(record, kNow).size(), 3 * kMaxLoggedTargetBytes + 300);
 }
 
-// What stands where a name is expected may be a token.
+// The text in place of a name may be a token.
 TEST(AccessLog, HidesLongPathsThatNameNothing) {
   const std::string token = "SECRETsecret0123456789";
   const auto shown = [&](std::string_view route, std::string_view dataset, int status, const std::string& target) {
@@ -122,13 +122,13 @@ TEST(AccessLog, AppendsToItsFileAndFollowsARotation) {
   EXPECT_EQ(std::count(old.begin(), old.end(), '\n'), 2);
   EXPECT_EQ(std::count(now.begin(), now.end(), '\n'), 1);
   std::filesystem::remove_all(folder);
-  log->Reopen();  // nowhere to go: the old file stays in use
+  log->Reopen();  // fails, so the old file stays in use
   log->Write(Record());
   EXPECT_FALSE(AccessLog::Try(config::AccessLogForm::kJson, folder / "nothing" / "access.log"));
   EXPECT_FALSE(AccessLog::Open(config::AccessLogForm::kJson, folder / "nothing" / "access.log"));
 }
 
-// A reader of a pipe takes the first writer's end for the end of all.
+// A reader of a pipe would see the end of the pipe after the first writer.
 TEST(AccessLog, IsTriedWithoutATrace) {
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / ("access_log_try_" + std::to_string(::getpid()));

@@ -35,7 +35,7 @@ class Pipe {
     ::fcntl(ends_[0], F_SETFL, O_NONBLOCK);
     static_cast<void>(::read(ends_[0], part.data(), most) > 0);
   }
-  // What is in it.
+  // Content of the file.
   std::string Read() {
     ::fcntl(ends_[0], F_SETFL, O_NONBLOCK);
     std::string text;
@@ -61,7 +61,7 @@ TEST(LineWriter, WritesLines) {
   EXPECT_EQ(writer.TakeMissed(), 0U);
 }
 
-// That this ends is the test: the pipe blocks.
+// The pipe is full; the test passes if this ends.
 TEST(LineWriter, DoesNotWaitForAReaderThatStallsAndCountsWhatHeMisses) {
   Pipe pipe;
   LineWriter writer(pipe.writer());
@@ -79,7 +79,7 @@ TEST(LineWriter, DoesNotWaitForAReaderThatStallsAndCountsWhatHeMisses) {
   EXPECT_EQ(pipe.Read(), "again\n");
 }
 
-// One who takes a little again and again does not hold everything up for ever.
+// A reader that reads a little from time to time must not block forever.
 TEST(LineWriter, DoesNotFollowAReaderWhoIsSlow) {
   Pipe pipe;
   LineWriter writer(pipe.writer());

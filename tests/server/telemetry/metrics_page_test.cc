@@ -15,7 +15,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// What `scrapers` that ask from one thread are given.
+// The texts that `scrapers` on one thread get.
 std::vector<MetricsPage::Text> Scrape(MetricsPage& page, int scrapers, asio::io_context& io) {
   std::vector<MetricsPage::Text> texts;
   for (int i = 0; i < scrapers; ++i) {

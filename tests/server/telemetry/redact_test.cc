@@ -66,7 +66,7 @@ TEST(RedactReferer, IsAPageWithoutSecrets) {
   EXPECT_EQ(RedactReferer("s"), "");
 }
 
-// A parameter that is missing there would keep its replies out of shared caches.
+// If a parameter is missing from the list, its replies are not in shared caches.
 TEST(IsPlainTarget, KnowsTheParametersOfTheManual) {
   std::ifstream file(test_support::SourceDir() / "docs/http-api.md");
   const std::string manual{std::istreambuf_iterator<char>(file), {}};

@@ -1,11 +1,11 @@
-#include "server/tiles/catalog.h"
-
 #include <gtest/gtest.h>
+
+#include "server/tiles/catalog.h"
 
 namespace terrace::server {
 namespace {
 
-// Of the whole Earth, with these tiles at level 3, whose tiles are 22.5 degrees wide: 16 columns, 8 rows.
+// A dataset of the whole Earth with these tiles at level 3, which has 16 columns and 8 rows of 22.5 degrees.
 DatasetView Earth(std::vector<geo::TileRange> deepest) {
   DatasetView dataset;
   dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, std::move(deepest)};

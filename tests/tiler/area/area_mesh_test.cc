@@ -1,4 +1,4 @@
-// Meshes of areas: what is in the file, and what is refused before anything is read.
+// Meshes of areas: the content of the file, and requests that are rejected before reading.
 #include "tiler/area/area_mesh.h"
 
 #include <fmt/format.h>
@@ -70,7 +70,7 @@ double DoubledArea(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) {
   return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
 }
 
-// The surface's height at a position, by looking at every triangle; NaN where there is none.
+// The surface's height at a position, by testing every triangle; NaN if there is none.
 double HeightAt(const ObjMesh& mesh, double x, double y) {
   const geo::Vec3 p{x, y, 0};
   for (const auto& [i, j, k] : mesh.triangles) {
@@ -149,7 +149,7 @@ TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
   }
 }
 
-// Without the Earth's curvature two triangles would do for a plain, and be far below it.
+// Without the Earth's curvature two triangles would be enough for a plain, but they would be far below it.
 TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
@@ -162,7 +162,7 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
   EXPECT_LT(Build(area).vertices, encoded.vertices);
 }
 
-// Triangles that go half around the Earth collapse into a line; one of them used to be measured as exact.
+// Triangles that go half around the Earth collapse into a line, and must not be measured as exact.
 TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
@@ -175,7 +175,7 @@ TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
   }
 }
 
-// Near a pole parallels are small circles: triangles in space lie beside where they are in longitude and latitude.
+// Near a pole parallels are small circles, so triangles in space are not where they are in longitude and latitude.
 TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
@@ -186,7 +186,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
   }
 }
 
-// Closer to the pole than a node's rounding: one row of cells, not less.
+// An area closer to the pole than the rounding of a node still has one row of cells.
 TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
@@ -269,7 +269,7 @@ TEST_F(AreaMeshTest, ARefusalNamesTheLimitThatIsExceeded) {
   EXPECT_EQ(tiny.find("or for an error"), std::string::npos) << "no error helps";
 }
 
-// Long and narrow: the samples are few.
+// The area is long and narrow, so it has few samples.
 TEST_F(AreaMeshTest, ARefusalForALongSideIsNotAboutSamples) {
   dem::DemOptions deep;
   deep.finest_error = 0.01;
@@ -298,7 +298,7 @@ TEST_F(AreaMeshTest, ARefusalForALongSideIsNotAboutSamples) {
       << both.error().message;
 }
 
-// The error that a refusal names is one that works.
+// The error that the message suggests is accepted.
 TEST_F(AreaMeshTest, ItsRemedyIsOne) {
   const std::string refusal = Refusal(area_, 500);
   const std::size_t at = refusal.find("for an error of ");

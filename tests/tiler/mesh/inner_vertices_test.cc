@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kCells = 64;
 
-// A tile of 40 m a cell at 45 degrees north, its halo too.
+// A tile with its halo, 40 m a cell, at 45 degrees north.
 struct Ground {
   explicit Ground(const std::function<float(int, int)>& height) {
     for (int j = -1; j <= kCells + 1; ++j) {
@@ -46,7 +46,7 @@ std::size_t Misfits(const proto::LatticeView& lattice, const tin::TinMesh& mesh)
   return proto::CountMisfits(mesh, positions, proto::VertexNormals(lattice, mesh, positions));
 }
 
-// The last column of a tile is the end of a survey, level and 1,300 m above everything else.
+// The last column of the tile is the end of a survey, level and 1,300 m above the rest.
 TEST(InnerVertices, LightFitsATileThatHasTheRimOfARasterAlone) {
   const Ground ground([](int i, int) { return i >= kCells ? 1300.0F : 0.0F; });
   const proto::LatticeView lattice = ground.view();

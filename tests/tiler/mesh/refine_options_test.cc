@@ -12,7 +12,7 @@
 namespace terrace::tiler {
 namespace {
 
-// What Sagitta checks. At the equator of deep levels rows differ by less than rounding.
+// Sagitta requires this. At the equator of deep levels rows differ by less than rounding.
 TEST(RefinePlan, HasOneWidestRow) {
   for (const int cells : {32, 256}) {
     for (int level = 0; level <= geo::kMaxLevel; ++level) {

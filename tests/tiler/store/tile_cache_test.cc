@@ -131,8 +131,9 @@ TEST(TileCache, GivesBackWhatASmallerBudgetCannotHold) {
   EXPECT_EQ(cache.stats().bytes, 0u);
 }
 
-// Row 22 of docs/reliability.md: a crawler asks for ten times the cache, once each, while clients go on asking for what
-// fills 60 % of it. The least recently used list that this replaced kept less than a fifth of the hits.
+// Row 22 of docs/reliability.md: a crawler requests ten times the size of the cache, each tile once, while clients
+// continue to request tiles that fill 60 % of it. A list of least recently used tiles keeps less than a fifth of the
+// hits.
 TEST(TileCache, KeepsTheHotSetThroughAScan) {
   constexpr int kTiles = 1000, kHot = 600, kScan = 10 * kTiles;
   TileCache cache(kTiles * kCharge);
@@ -158,7 +159,7 @@ TEST(TileCache, KeepsTheHotSetThroughAScan) {
   EXPECT_EQ(cache.stats().entries, static_cast<std::size_t>(kTiles));
 }
 
-// The hot set moves: what is asked for now gets in, what was hot long ago goes.
+// The hot set changes: tiles requested now enter the cache, earlier hot tiles leave it.
 TEST(TileCache, FollowsTheHotSet) {
   constexpr int kTiles = 100;
   TileCache cache(kTiles * kCharge);
