@@ -10,7 +10,7 @@ namespace terrace::tiler {
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of the level's error; finite, > 0
-  bool at_least = false;           // error_m is the minimum of the default errors
+  bool at_least = false;           // the larger of error_m and the level's default error is used
 };
 
 // The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
