@@ -176,6 +176,28 @@ class ArchiveTest(unittest.TestCase):
             self.assertEqual(server.get("/readyz")[0], 200)
             self.assertEqual(server.get("/metrics")[0], 200)
 
+    def test_single_file_and_folder(self):
+        single, folder = self.scratch / "one.pmtiles", self.scratch / "static"
+        for form, out in (("single", single), ("folder", folder)):
+            done = subprocess.run([BINARY, "bake", "--config", self.scratch / "bake.json", "--out", out, "--form", form,
+                                   "--extensions", "octvertexnormals,watermask,metadata"], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        with self.serve() as live, Server({"datasets": []}, self.scratch, single) as server:
+            for target in self.tiles():
+                if ".terrain" not in target:
+                    continue
+                self.expect_same(target, QUANTIZED, live, server)
+                stored = (folder / target[len("/cell/"):].split("?")[0]).read_bytes()
+                self.assertEqual(stored, server.get(target, QUANTIZED)[2])
+            self.expect_same("/cell/layer.json", {}, live, server)
+            self.assertEqual((folder / "layer.json").read_bytes(), gzip.decompress(live.get("/cell/layer.json")[2]))
+
+    def test_missing_archive_is_named_before_the_start(self):
+        done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--check-config"], text=True, timeout=60,
+                              input=json.dumps({"datasets": [{"name": "cell", "baked": "/nowhere/baked"}]}), capture_output=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("/nowhere/baked", done.stderr)
+
     def test_archive_of_another_version_is_not_used(self):
         version = json.loads((self.place / "terrain/manifest.json").read_text())["dataset"]["version"]
         with self.serve(baked=str(self.place), attribution="somebody") as server:

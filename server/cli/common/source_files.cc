@@ -38,6 +38,12 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
       if (Result<void> readable = read(file, ""); !readable) return readable;
     }
   }
+  const bool is_local = dataset.baked.starts_with('/') && !dataset.baked.starts_with("/vsi");
+  if (dataset.sources.empty() && is_local && ::access(dataset.baked.c_str(), R_OK) != 0) {
+    return MakeError(ErrorCode::kNotFound,
+                     "dataset {}: {}: {}; give the folder or file that 'terrace bake' wrote, or \"sources\"",
+                     dataset.name, dataset.baked, std::generic_category().message(errno));
+  }
   if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
   return read(dataset.water.mask, ", or for a sea level a number of metres");
 }
