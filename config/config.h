@@ -74,7 +74,8 @@ struct SourceConfig {
 
 struct DatasetConfig {
   std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
-  std::vector<SourceConfig> sources;  // where several have a height, the first one is used
+  std::vector<SourceConfig> sources;  // where several have a height, the first one is used; none: `baked` alone
+  std::string baked;                  // place of an archive with finished tiles; empty: none
   std::string vertical = "crs";       // vertical datum: a keyword, "EPSG:5703", or the path of a grid
   NodataConfig nodata;
   std::string attribution;

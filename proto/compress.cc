@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <new>
 
@@ -77,6 +78,26 @@ std::string Gzip(std::string_view bytes, int level, const std::stop_token& stop)
 }
 
 // The result is equal to that of BrotliEncoderCompress, because blocks do not depend on the division of the input.
+std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes) {
+  // The size modulo 2^32 is at the end. Deflate expands by at most 1,032: a wrong size does not cost memory.
+  constexpr std::size_t kMinBytes = 18, kMaxFactor = 1032;
+  if (bytes.size() < kMinBytes) return std::nullopt;
+  std::uint32_t size = 0;
+  std::memcpy(&size, bytes.data() + bytes.size() - sizeof(size), sizeof(size));
+  if (size > max_bytes || size / kMaxFactor > bytes.size()) return std::nullopt;
+  struct Free {
+    void operator()(libdeflate_decompressor* decompressor) const { libdeflate_free_decompressor(decompressor); }
+  };
+  const std::unique_ptr<libdeflate_decompressor, Free> decompressor(libdeflate_alloc_decompressor());
+  if (decompressor == nullptr) throw std::bad_alloc();
+  std::string out(size, '\0');
+  std::size_t read = 0, written = 0;
+  const libdeflate_result result = libdeflate_gzip_decompress_ex(decompressor.get(), bytes.data(), bytes.size(),
+                                                                 out.data(), out.size(), &read, &written);
+  if (result != LIBDEFLATE_SUCCESS || read != bytes.size() || written != out.size()) return std::nullopt;
+  return out;
+}
+
 std::string Brotli(std::string_view bytes, int quality, const std::stop_token& stop) {
   if (bytes.empty()) return "\x06";
   const std::unique_ptr<BrotliEncoderState, void (*)(BrotliEncoderState*)> encoder(

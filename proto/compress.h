@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -21,6 +22,10 @@ inline constexpr std::size_t kCompressedAtOnce = std::size_t{1} << 20;
 // up to kCompressedAtOnce bytes, and zlib above, because libdeflate cannot be interrupted. Thread-safe. Precondition: 0
 // <= level <= 12; 0 stores, 12 is slowest and smallest (zlib's maximum is 9).
 std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop_token& stop = {});
+
+// Decompresses one member of gzip; its checksum must be right. Nothing: it is damaged, something follows it, or it is
+// larger than `max_bytes`. Accepts any bytes. Thread-safe.
+std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes);
 
 // RFC 7932 brotli. Thread-safe. Precondition: 2 <= quality <= 9. From 5 on it takes twice the time of 4 and saves a
 // thousandth.

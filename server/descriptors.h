@@ -20,6 +20,7 @@ struct DescriptorDemand {
   std::size_t open_sources = 0;
   bool has_vrts = false;  // GDAL also keeps their parts open
   std::size_t connections = 1;
+  std::size_t archive_files = 0;
 };
 
 struct DescriptorBudget {

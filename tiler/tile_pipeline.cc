@@ -23,6 +23,19 @@ double MeshError(double error_m) {
   return std::max(error_m - kRounding, error_m / 2);
 }
 
+// Of a dataset without sources.
+Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request) {
+  Result<std::optional<EncodedTile>> found = dataset.baked->Find(request);
+  if (!found) return tl::unexpected(std::move(found.error()));
+  if (!*found) return tl::unexpected(dataset.baked->WhyAbsent(request));
+  return **std::move(found);
+}
+
+tl::unexpected<Error> NoSources() {
+  return MakeError(ErrorCode::kNotFound,
+                   "the dataset is an archive of finished tiles alone; heights and meshes need its sources");
+}
+
 }  // namespace
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
@@ -76,6 +89,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
   const Dataset& dataset = datasets_[request.dataset];
+  if (!dataset.source) return TakeBaked(dataset, request);
   const auto* const encoder = std::ranges::find(kEncoders, request.format, &Encoder::format);
   TERRACE_CHECK(encoder != std::end(kEncoders));
   EncodedTile encoded;
@@ -105,6 +119,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
 
 Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                               dem::HeightDatum datum, std::stop_token stop) const {
+  if (!datasets_[dataset].source) return NoSources();
   std::vector<std::uint8_t> filled(points.size());
   Result<std::vector<float>> heights = datasets_[dataset].source->ReadPoints(points, datum, std::move(stop), filled);
   if (!heights) return tl::unexpected(std::move(heights).error());
@@ -112,11 +127,13 @@ Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<c
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {
+  if (!datasets_[dataset].source) return NoSources();
   return tiler::PlanArea(*datasets_[dataset].source, datasets_[dataset].error_fraction, area, max_samples);
 }
 
 Result<EncodedTile> TilePipeline::BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                             std::stop_token stop) const {
+  if (!datasets_[dataset].source) return NoSources();
   return BuildAreaMesh(*datasets_[dataset].source, plan, area, std::move(stop));
 }
 

@@ -18,6 +18,7 @@
 #include "tiler/area/area_mesh.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/store/baked_tiles.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/tile_request.h"
 
@@ -47,12 +48,15 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;
   MeshRules rules;
-  proto::GlbOptions glb;  // compression: for GLB requests that name none
-  std::shared_ptr<const dem::DemSource> source;
+  proto::GlbOptions glb;                         // compression: for GLB requests that name none
+  std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
+  std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
+  std::vector<std::string> baked_files;          // whose change means another archive
   WaterRules water;
   ImageryRules imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
+  std::uint64_t options = 0;     // the same without what only heights depend on (DemSource::fingerprint)
 };
 
 // Heights of a dataset at points, NaN where it has none.
@@ -78,8 +82,8 @@ class TilePipeline {
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
   // Reads, refines, quantizes, measures, encodes and compresses one tile. All formats share the refinement.
-  // kNotFound: no such dataset or tile outside availability. kUnavailable: the source cannot be read now.
-  // kCancelled: `stop` was requested.
+  // kNotFound: no such dataset, or tile outside availability, or a dataset without sources. kUnavailable: the source
+  // cannot be read now. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // DemSource::ReadPoints.

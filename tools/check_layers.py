@@ -16,24 +16,24 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# A room is a module. The order is core <- {geo, tin} <- {dem, proto} <- tiler <- server, and core <- config <- server
-# (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder itself combine
-# the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store, jobs <-
-# tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
+# A room is a module. The order is core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- {bake, server}, and core <-
+# config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
+# itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
+# jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
 # <- handlers; {frontend, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
-# mesh, info} <- cli.
+# mesh, info, bake} <- cli, and bake <- cli/bake.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
-ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "server/asio.h"]
+ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
 # Headers below a module that count as that module's own: every module that may include it may include these.
 DOORS = {front + "/" + name: front for front, names in {
-    "engine/dem": ("dem_types.h", "common/box_index.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
-                   "gdal/gdal_runtime.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
+    "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
+                   "gdal/gdal_runtime.h", "gdal/remote_file.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
                    "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
     "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
                "options/options.h"),
@@ -58,11 +58,13 @@ ROOMS = {
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
+    "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive"],
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
     "server/http": ["engine/core", "server/asio.h", "server/net"],
-    "server/store": ["engine/core", "config", "tiler"],
+    "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive"],
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
@@ -74,7 +76,8 @@ ROOMS = {
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info"],
+    "server/cli/bake": ENGINE + ["bake", "server/cli/common"],
+    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
 # Library: its headers, and the files that may include them (regular expressions on paths). The first match counts.
@@ -84,7 +87,7 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|server/.*\.cc)"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|bake/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
@@ -94,7 +97,7 @@ LIBRARIES = [
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
-    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|server)/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|server/net/.*)\.cc"),
@@ -105,12 +108,12 @@ LIBRARIES = [
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # Libraries that a module promises not to use: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|server)/"),
-    Library("clocks", r"(chrono|ctime)", r"(config|tiler|server|engine/dem)/"),
-    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|server/|proto/gltf/mesh_file)"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|server)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|server|engine/dem)/"),
+    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|tiler|server)/.*\.cc"),
+            r"(config|engine/dem|tiler|archive|bake|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 

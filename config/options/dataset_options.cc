@@ -31,7 +31,17 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
                   "\"egm96\", \"nodata\": -9999}` with options that differ from the dataset's",
        .codec = SourcesCodec(),
        .other_words = "paths file files dem dems raster rasters input inputs",
-       .missing = "; every dataset needs one"},
+       .missing = "; every dataset needs one, or \"baked\"",
+       .unless = "baked"},
+      {.key = "baked",
+       .value = "PLACE",
+       .help = "Archive with finished tiles of this dataset; other tiles are built from the sources",
+       .details =
+           "What `terrace bake` wrote: a folder, relative to the folder of the file, or a `.pmtiles` file. Used if "
+           "its version is that of the dataset; else the log says so, and tiles are built. Without `sources` "
+           "the archive alone is served. [More](formats/archive.md)",
+       .codec = Path(&DatasetConfig::baked, "the path of an archive"),
+       .other_words = "archive archives pmtiles tiles prebuilt"},
       {.key = "vertical",
        .value = "DATUM",
        .help =

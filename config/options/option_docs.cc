@@ -71,6 +71,7 @@ template <typename Target>
 std::string MeaningOf(const Option<Target>& option, bool has_flag) {
   const char* required = has_flag ? "Required in the file. " : "Required. ";
   std::string meaning = option.missing.empty() ? "" : required;
+  if (!option.unless.empty()) meaning = fmt::format("Required without `{}`. ", option.unless);
   meaning += option.help;
   if (!option.details.empty()) meaning += fmt::format(". {}", option.details);
   if (option.is_live) meaning += ". A change needs no restart";

@@ -28,6 +28,7 @@ void ReadObject(const Json& object, const ConfigLocation& place, const std::vect
   }
   for (const Option<Target>& option : table) {
     if (option.missing.empty() || object.contains(option.key)) continue;
+    if (!option.unless.empty() && object.contains(option.unless)) continue;
     place.Fail(fmt::format("\"{}\" is missing{}", option.key, option.missing));
   }
 }
@@ -44,15 +45,19 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 
 template <typename Target>
 Json ObjectSchema(const std::vector<Option<Target>>& table) {
-  Json required = Json::array(), properties = Json::object();
+  Json required = Json::array(), any = Json::array(), properties = Json::object();
   for (const Option<Target>& option : table) {
-    if (!option.missing.empty()) required.push_back(option.key);
+    if (!option.missing.empty() && option.unless.empty()) required.push_back(option.key);
+    if (!option.unless.empty()) {
+      for (const std::string_view key : {option.key, option.unless}) any.push_back({{"required", Json::array({key})}});
+    }
     Json& property = properties[std::string(option.key)] = {{"description", option.help}};
     property.update(option.codec.schema);
     if (const std::string value = DefaultOf(option); !value.empty()) property["default"] = Json::parse(value);
   }
   Json schema = {{"type", "object"}, {"additionalProperties", false}};
   if (!required.empty()) schema["required"] = std::move(required);
+  if (!any.empty()) schema["anyOf"] = std::move(any);
   schema["properties"] = std::move(properties);
   return schema;
 }

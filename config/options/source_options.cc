@@ -151,6 +151,7 @@ Codec<DatasetConfig> SourcesCodec() {
             for (std::size_t i = 0; i < value.size(); ++i) ReadSource(value[i], place.At(i), dataset);
           },
           [](const DatasetConfig& dataset) {
+            if (dataset.sources.empty() && !dataset.baked.empty()) return Json();
             Json list = Json::array();
             for (const SourceConfig& source : dataset.sources) {
               const bool is_plain = !source.vertical && !source.nodata;

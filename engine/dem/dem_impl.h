@@ -17,6 +17,12 @@ struct PartTrace {
   GridTrace trace = {};
 };
 
+// What the heights of a raster grid depend on, for DemSource::ContentBelow.
+struct GridContent {
+  ContentHash grid;                  // its pixel grid, vertical datum and geoid
+  std::vector<ContentHash> members;  // samples, positions and rules for voids, by member
+};
+
 class DemSource::Impl {
  public:
   // `what`: names the request in messages. `traces`, unless null, receives the traces of the raster grids that were
@@ -35,6 +41,7 @@ class DemSource::Impl {
                             const std::stop_token& stop) const;
   // The raster grids that may have heights in the box, in order of precedence.
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
+  std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
 
   std::vector<RasterGrid> grids;  // in order of precedence
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
@@ -46,6 +53,7 @@ class DemSource::Impl {
   bool has_feather = false;
   DemInfo info;
   std::uint64_t fingerprint = 0;
+  std::vector<GridContent> contents;  // by raster grid
 };
 
 // An index of raster grids by the box in degrees where they may have heights. Longitudes from -540 to 540, with one

@@ -224,6 +224,11 @@ std::vector<std::size_t> DemSource::Impl::GridsAt(const Box& box) const {
   return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 
+std::vector<std::size_t> DemSource::Impl::GridsNear(const geo::TileKey& tile) const {
+  const geo::Lattice& lattice = LatticeOf(tile.level);
+  return GridsAt(BoxOf(lattice, WindowOfTile(lattice, tile)));
+}
+
 const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
   TERRACE_CHECK(level >= 0 && level < static_cast<int>(lattices.size()));
   return lattices[static_cast<std::size_t>(level)];

@@ -89,6 +89,30 @@ Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const 
   return hasher.Hash().low;
 }
 
+// The parts of the fingerprint, for tiles that do not depend on all rasters.
+Result<std::vector<GridContent>> ContentsOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
+  const FileContentOptions content{options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
+  std::vector<GridContent> contents;
+  for (const RasterGrid& grid : grids) {
+    GridContent& of_grid = contents.emplace_back();
+    for (const GridMember& member : grid.members()) {
+      ContentHasher hasher;
+      if (auto added = AddRaster(hasher, *member.raster, content); !added) return tl::unexpected(added.error());
+      of_grid.members.push_back(hasher.Hash());
+    }
+    ContentHasher hasher;
+    if (auto added = grid.georeference().AddTo(hasher, content); !added) return tl::unexpected(added.error());
+    grid.AddTo(hasher);
+    hasher.Add(grid.vertical().is_known());
+    hasher.Add(grid.vertical().geoid != nullptr);
+    if (const auto& geoid = grid.vertical().geoid) {
+      if (auto added = geoid->AddTo(hasher, content); !added) return tl::unexpected(added.error());
+    }
+    of_grid.grid = hasher.Hash();
+  }
+  return contents;
+}
+
 // A sixteenth of an octave: tiles of one product differ by less, as meridians converge.
 int ResolutionStep(const RasterSource& raster) {
   double power = raster.spacing().finer;
@@ -224,6 +248,9 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   const auto fingerprint = FingerprintOf(impl->grids, options, impl->floor);
   if (!fingerprint) return tl::unexpected(fingerprint.error());
   impl->fingerprint = *fingerprint;
+  auto contents = ContentsOf(impl->grids, options);
+  if (!contents) return tl::unexpected(contents.error());
+  impl->contents = *std::move(contents);
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/file_stamp.h"
 #include "engine/geo/lattice.h"
@@ -84,6 +85,13 @@ class DemSource {
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
   // precedence, and every option that changes heights. Copies of the files have the same hash.
   std::uint64_t fingerprint() const;
+
+  // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
+  // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
+  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours.
+  // Conservative: a change of a source near the tiles may change the hash although no height changes. Precondition: top
+  // is a valid key, top.level <= deepest <= geo::kMaxLevel.
+  ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.
   bool has_lost_cache() const;

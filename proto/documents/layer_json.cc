@@ -64,7 +64,8 @@ std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token
   json["maxzoom"] = layer.available.size() - 1;
   json["bounds"] = Bounds(layer);
   json["attribution"] = layer.attribution;
-  json["extensions"] = Json::array({"octvertexnormals"});
+  json["extensions"] = Json::array();
+  if (layer.normals) json["extensions"].push_back("octvertexnormals");
   if (layer.water_mask) json["extensions"].push_back("watermask");
   if (layer.metadata_levels > 0) {
     json["extensions"].push_back("metadata");

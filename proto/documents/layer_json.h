@@ -17,6 +17,7 @@ struct LayerDescription {
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
   double west = -180, south = -90, east = 180, north = 90;
+  bool normals = true;      // tiles have them on request
   bool water_mask = false;  // tiles have it on request
   int metadata_levels = 0;  // tiles at multiples of this level have metadata on request; 0: none
   std::string tile_query;   // appended to the tile template's query: "error=5&atleast=1"; may be empty

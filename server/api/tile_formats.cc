@@ -25,9 +25,12 @@ tl::unexpected<Error> NoSuchTile() {
   return MakeError(ErrorCode::kNotFound, "the dataset has no such tile; its layer.json lists what it has");
 }
 
-void SetError(const RequestedError& requested, const DatasetView& dataset, TileRequest& tile) {
-  const int level = tile.key.level;
-  tile.error_step = ErrorStep(requested, level, level == dataset.max_level(), dataset.error_fraction);
+// Among codings that a client likes equally, that of the dataset's archive comes first: its tiles leave as they are.
+std::span<const tiler::Coding> CodingsOf(const DatasetView& dataset) {
+  using tiler::Coding;
+  static constexpr std::array<Coding, 3> kGzipFirst = {Coding::kGzip, Coding::kBrotli, Coding::kZstd};
+  if (dataset.baked_coding == Coding::kGzip) return kGzipFirst;
+  return tiler::kCodings;
 }
 
 Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
@@ -35,13 +38,17 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   const Result<TileParameters> parameters = ParseTileParameters(query, /*allow_at_least=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  SetError(parameters->requested, dataset, tile);
-  tile.coding = NegotiateCoding(fields.accept_encoding);
-  const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
+  tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
+  tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
+  proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
+  if (dataset.baked_alone) {  // clients pass over extensions that they did not ask for
+    const tiler::BakedExtent& baked = dataset.baked_alone->extent();
+    wanted = {baked.normals, baked.water_mask, baked.metadata_levels > 0};
+  }
   tile.normals = wanted.octvertexnormals;
   tile.water_mask = wanted.watermask && dataset.has_water;
   tile.metadata =
-      wanted.metadata && proto::CarriesMetadata(tile.key.level, dataset.metadata_levels, dataset.max_level());
+      wanted.metadata && proto::CarriesMetadata(tile.key.level, dataset.metadata_levels, dataset.deepest_level());
   return {};
 }
 
@@ -54,10 +61,10 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
       ParseTileParameters(query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  SetError(parameters->requested, dataset, tile);
+  tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
   tile.compression = parameters->compression.value_or(dataset.glb_compression);
   if (dataset.texture) tile.texture = parameters->texture.value_or(*dataset.texture);
-  if (CodingHelps(tile)) tile.coding = NegotiateCoding(fields.accept_encoding);
+  if (CodingHelps(tile)) tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
   return {};
 }
 
@@ -261,17 +268,22 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
   return wanted;
 }
 
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction) {
-  if (requested.fraction) {
-    // The product may overflow or underflow; the ladder's ends lie far inside the range of doubles.
-    const double error_m = std::clamp(*requested.fraction * geo::LevelError(level), std::numeric_limits<double>::min(),
-                                      std::numeric_limits<double>::max());
-    return geo::SnapToLadder(level, error_m, error_fraction);
+int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset) {
+  if (!requested.error_m && !requested.fraction && dataset.baked_alone) {
+    const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
+    return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
   }
-  if (!requested.error_m) return 0;
-  const int step = geo::SnapToLadder(level, *requested.error_m, error_fraction);
-  // max(error, default): steps above 0 are finer than the default.
-  return requested.at_least && !is_deepest ? std::min(step, 0) : step;
+  return ErrorStep(requested, level, level == dataset.deepest_level(), dataset.error_fraction);
+}
+
+Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
+  if (!dataset.baked_alone) return {};
+  const std::vector<tiler::TileFormat>& formats = dataset.baked_alone->extent().formats;
+  if (std::ranges::find(formats, format) != formats.end()) return {};
+  const auto* const row = std::ranges::find(kFormats, format, &TileFormat::format);
+  TERRACE_CHECK(row != std::end(kFormats));
+  return MakeError(ErrorCode::kNotFound, "the dataset is an archive of finished tiles alone, which has no {} tiles",
+                   row->suffix);
 }
 
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
@@ -294,6 +306,9 @@ Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const
   const Route& route = context.route;
   const Result<std::uint32_t> dataset = FindDataset(route.dataset, datasets);
   if (!dataset) return tl::unexpected(dataset.error());
+  if (Result<void> has = CheckHasFormat(datasets[*dataset], route.format->format); !has) {
+    return tl::unexpected(std::move(has.error()));
+  }
   TileRequest tile;
   tile.dataset = *dataset;
   tile.key = route.key;

@@ -16,16 +16,13 @@
 #include "server/api/request_context.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoded_tile.h"
+#include "tiler/requested_error.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::server {
 
-// The geometric error that a client requests; all members are optional.
-struct RequestedError {
-  std::optional<double> error_m;   // finite, > 0
-  std::optional<double> fraction;  // of the level's error; finite, > 0
-  bool at_least = false;           // the larger of error_m and the level's default error is used
-};
+using tiler::ErrorStep;
+using tiler::RequestedError;
 
 struct TileParameters {
   RequestedError requested;
@@ -69,6 +66,9 @@ const TileFormat* CutSuffix(std::string_view& name);
 // outside what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
 Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
+// kNotFound, for a dataset without sources: its archive has no tiles of this format.
+Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
+
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
@@ -81,9 +81,8 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding,
 // ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
 
-// The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
-// of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
+// ErrorStep for a level of this dataset. If no error is requested, and the dataset has no sources, that of its archive.
+int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
 // Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is the tile of

@@ -33,13 +33,15 @@ int Run(int argc, char** argv) {
       "Examples:\n"
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
-      "  terrace info alps.tif                                the raster, and the levels that it can serve");
+      "  terrace info alps.tif                                the raster, and the levels that it can serve\n"
+      "  terrace bake alps.tif --out alps                     all tiles, ahead of requests");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
   int exit_code = kExitOk;
   AddServe(app, exit_code);
   AddMesh(app, exit_code);
   AddInfo(app, exit_code);
+  AddBake(app, exit_code);
   if (argc == 1) {
     std::fputs(app.help().c_str(), stderr);
     return kExitUsage;

@@ -158,6 +158,8 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     return made;
   };
   Result<Made> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
+  if (is_absent) co_return ClientErrorResponse(made.error(), request.id);
   if (!made) co_return co_await BackendFailure(made.error(), request.id);
   response.body = std::make_shared<const std::string>(std::move(made->bytes));
   response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));

@@ -30,6 +30,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
   layer.north = dataset.north;
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
+  if (dataset.baked_alone) layer.normals = dataset.baked_alone->extent().normals;
   layer.tile_query = std::move(tile_query);
   return proto::EncodeLayerJson(layer, stop);
 }
@@ -57,6 +58,9 @@ Document PlainLayer(const DatasetView& dataset) { return Document::Make(WriteLay
 DocumentAnswer DescribeLayer(const Handlers& from, const RequestContext& context) {
   const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
+  if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh); !has) {
+    return ClientErrorResponse(has.error(), context.request->id);
+  }
   const Result<TileParameters> parameters = ParseTileParameters(context.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), context);

@@ -53,6 +53,9 @@ asio::awaitable<Response> BuildTile(const Handlers& from, const RequestContext& 
   const Result<ServedTile> served =
       co_await from.tiles.Build(from.catalog, tile, from.Deadline(), context.request->client);
   if (served) co_return Reply(from, tile, *served, context);
+  const bool is_absent =
+      served.error().code == ErrorCode::kNotFound && from.catalog->datasets[tile.dataset].baked_alone;
+  if (is_absent) co_return ClientErrorResponse(served.error(), context.request->id);
   co_return co_await BackendFailure(served.error(), context.request->id);
 }
 

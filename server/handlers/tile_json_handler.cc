@@ -38,6 +38,9 @@ Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(context.route.query);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const DatasetView& dataset = from.catalog->datasets[*index];
+  if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
+    return ClientErrorResponse(has.error(), context.request->id);
+  }
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;

@@ -28,8 +28,8 @@ dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key) {
 }
 
 double SkirtDepth(const DatasetView& dataset, const RequestedError& requested, int level) {
-  const bool is_deepest = level == dataset.max_level();
-  const int step = ErrorStep(requested, level, is_deepest, dataset.error_fraction);
+  const bool is_deepest = level == dataset.deepest_level();
+  const int step = ErrorStepOf(requested, level, dataset);
   return proto::SkirtDepth(level, proto::SkirtError(level, step, is_deepest, dataset.error_fraction));
 }
 
@@ -38,12 +38,11 @@ double SkirtDepth(const DatasetView& dataset, const RequestedError& requested, i
 // power of two, which is at most a quarter of the error and at least 2^-6 m: such numbers are short and often equal.
 // Reads no raster. Thread-safe. Precondition: a valid key.
 proto::HeightSpan TileHeightSpan(const DatasetView& dataset, const RequestedError& requested, const geo::TileKey& key) {
-  const bool is_deepest = key.level == dataset.max_level();
-  const int step = ErrorStep(requested, key.level, is_deepest, dataset.error_fraction);
+  const int step = ErrorStepOf(requested, key.level, dataset);
   const double error_m = geo::LadderError(key.level, step, dataset.error_fraction);
   // Skirts are shorter on each deeper level, except on the deepest level at a small `fraction`.
   const double skirt_m =
-      std::max(SkirtDepth(dataset, requested, key.level), SkirtDepth(dataset, requested, dataset.max_level()));
+      std::max(SkirtDepth(dataset, requested, key.level), SkirtDepth(dataset, requested, dataset.deepest_level()));
   // Positions are rounded to a grid of at most a 32nd of the error; the lower rims of skirts are rounded twice.
   const double rounding_m = error_m / 32;
   const dem::HeightRange range = RangeOf(dataset, key);
@@ -120,6 +119,7 @@ std::string WriteSubtree(const DatasetView& dataset, const RequestedError& reque
 }  // namespace
 
 void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
+  if (!CheckHasFormat(dataset, tiler::TileFormat::kGlb)) return;
   const std::vector<geo::TileKey> roots = proto::ImplicitRoots(TilesWithData(dataset));
   made.roots = std::make_shared<const std::vector<proto::TreeRoot>>(proto::ImplicitTrees(dataset.available, roots));
   made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
@@ -128,6 +128,9 @@ void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
 DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context) {
   const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
+  if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
+    return ClientErrorResponse(has.error(), context.request->id);
+  }
   const Result<TileParameters> parameters =
       ParseTileParameters(context.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
@@ -154,6 +157,9 @@ DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& conte
       ParseTileParameters(context.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const DatasetView& dataset = from.catalog->datasets[*index];
+  if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kGlb); !has) {
+    return ClientErrorResponse(has.error(), context.request->id);
+  }
   if (!IsAvailable(dataset, context.route.key) ||
       (context.route.key.level - context.route.root.level) % context.route.subtree_levels != 0) {
     return ProblemResponse(404, "the dataset has no such subtree; its tileset.json says where they begin",

@@ -27,7 +27,8 @@ constexpr std::chrono::seconds kPatience{10};
 constexpr int kNiceness = 10;
 
 dem::StampedFiles FilesOf(const tiler::Dataset& dataset) {
-  dem::StampedFiles files = dataset.source->files();
+  dem::StampedFiles files(dataset.baked_files);
+  if (dataset.source) files.Append(dataset.source->files());
   if (dataset.water.mask) files.Append(dataset.water.mask->files());
   if (dataset.imagery.image) files.Append(dataset.imagery.image->files());
   return files;
@@ -41,7 +42,13 @@ std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
   }
   if (!dataset.water.mask.empty()) files.push_back(dataset.water.mask);
   if (!dataset.imagery.image.empty()) files.push_back(dataset.imagery.image);
+  if (!dataset.baked.empty()) files.push_back(dataset.baked);
   return files;
+}
+
+// For messages.
+const std::string& PlaceOf(const config::DatasetConfig& dataset) {
+  return dataset.sources.empty() ? dataset.baked : dataset.sources.front().written;
 }
 
 std::vector<std::optional<dem::FileStamp>> StampsOf(const std::vector<std::string>& files) {
@@ -107,7 +114,7 @@ std::size_t DatasetSlot::CheckFiles(std::size_t most) {
 }
 
 bool DatasetSlot::HasToRecoverCache() {
-  if (Clock::now() < recover_at_ || !serving_->source->has_lost_cache()) return false;
+  if (Clock::now() < recover_at_ || !serving_->source || !serving_->source->has_lost_cache()) return false;
   recover_delay_ = std::clamp<Clock::duration>(2 * recover_delay_, kFirstRecovery, kLastRecovery);
   recover_at_ = Clock::now() + recover_delay_;
   return true;
@@ -135,7 +142,7 @@ void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
   if (is_opening() || (serving_ && !stale_since_)) return;
   if (Clock::now() < retry_at_ && StampsOf(NamedFiles(wanted_)) == tried_) return;
   if (!IsSettled()) return;
-  spdlog::info("dataset {}: opening {}", wanted_.name, wanted_.sources.front().written);
+  spdlog::info("dataset {}: opening {}", wanted_.name, PlaceOf(wanted_));
   tried_ = StampsOf(NamedFiles(wanted_));
   stop_opening_ = std::stop_source();
   try {
@@ -170,9 +177,8 @@ bool DatasetSlot::TakeOpened() {
     return false;
   }
   const auto took = stale_since_ ? Clock::now() - *stale_since_ : Clock::duration(0);
-  spdlog::info("dataset {}: {} is served now, version {}, {} after the change was seen", wanted_.name,
-               wanted_.sources.front().written, tiler::VersionText(opened->generation),
-               std::chrono::duration_cast<std::chrono::milliseconds>(took));
+  spdlog::info("dataset {}: {} is served now, version {}, {} after the change was seen", wanted_.name, PlaceOf(wanted_),
+               tiler::VersionText(opened->generation), std::chrono::duration_cast<std::chrono::milliseconds>(took));
   serving_ = *std::move(opened);
   files_ = FilesOf(*serving_);
   next_file_ = 0;

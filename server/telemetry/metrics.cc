@@ -90,6 +90,7 @@ prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
   family.type = prometheus::MetricType::Counter;
   if (pipeline == nullptr) return family;
   for (const tiler::Dataset& dataset : pipeline->datasets()) {
+    if (!dataset.source) continue;
     const dem::SampleCounts counts = dataset.source->CountSamples();
     const auto add = [&family, &name = dataset.name](const char* kind, std::uint64_t value) {
       prometheus::ClientMetric& metric = family.metric.emplace_back();

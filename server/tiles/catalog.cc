@@ -34,14 +34,40 @@ double WrappedLongitude(double degrees) {
   return degrees > 180 ? degrees - 360 : degrees < -180 ? degrees + 360 : degrees;
 }
 
+// A dataset without sources.
+void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
+  const tiler::BakedExtent& extent = dataset.baked->extent();
+  view.baked_alone = dataset.baked;
+  view.available = extent.available;
+  view.west = extent.bounds.west;
+  view.south = extent.bounds.south;
+  view.east = extent.bounds.east;
+  view.north = extent.bounds.north;
+  view.min_height_m = extent.heights.min;
+  view.max_height_m = extent.heights.max;
+  view.range_bound = [baked = dataset.baked](const geo::TileKey& key) { return baked->RangeBound(key); };
+  view.has_datum = extent.has_datum;
+  view.sources = extent.sources;
+  view.has_water = extent.water_mask;
+  view.texture = extent.texture;
+  view.metadata_levels = extent.metadata_levels;
+  view.floor_m = extent.floor_m;
+  view.max_mercator_depth = extent.max_mercator_depth;
+}
+
 DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, const tiler::Dataset& dataset) {
-  const dem::DemInfo& info = dataset.source->info();
   DatasetView view;
   view.name = dataset.name;
   view.attribution = dataset.attribution;
   view.error_fraction = dataset.error_fraction;
   view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
+  if (dataset.baked) view.baked_coding = dataset.baked->coding();
+  if (!dataset.source) {
+    SetExtent(dataset, view);
+    return view;
+  }
+  const dem::DemInfo& info = dataset.source->info();
   view.available = dataset.source->Availability();
   view.west = info.bounds.west;
   view.south = info.bounds.south;

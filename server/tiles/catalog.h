@@ -43,10 +43,15 @@ struct DatasetView {
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
+  std::optional<tiler::Coding> baked_coding;    // of the tiles of its archive; nothing: it has no archive
+  // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
+  std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
+  // The deepest level of the sources; an archive may end above it.
+  int deepest_level() const { return baked_alone ? baked_alone->extent().deepest_level : max_level(); }
 };
 
 struct Catalog {

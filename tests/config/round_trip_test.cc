@@ -98,6 +98,7 @@ TEST(ToJson, NamesEveryOption) {
   dataset.floor = 0;
   dataset.water.sea_level = 0;
   dataset.imagery.image = "/data/photo.tif";
+  dataset.baked = "/data/baked";
   config.disk_cache.directory = "/srv/cache";
   config.datasets = {dataset};
   config.tls = {"/etc/server.pem", "/etc/server.key"};

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <set>
 
 #include "engine/dem/mosaic/raster_grid.h"
 #include "engine/geo/tile_cover.h"
@@ -80,14 +81,16 @@ BlockRange RasterGrid::Ranges(const Box& pixels) const {
   return range;
 }
 
-BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
+std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) const {
   Box box = pixels;
   const auto has_holes = [&](double west, double north, double east, double south) {
     const double halo = 2.0 * factor;  // an average by overviews may be void beside a hole
     const Box wide{west - halo, north - halo, east + halo, south + halo};
     return Ranges(wide).has_holes || voids_.SharesHole(wide);
   };
-  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.south, box.east, box.north)) return {};
+  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.south, box.east, box.north)) {
+    return std::nullopt;
+  }
   // The holes end where a surrounding band has none.
   const auto grow = [&](double& side, double end, double step, bool holes) {
     if (!holes || (step < 0 ? side <= end : side >= end)) return false;
@@ -112,7 +115,58 @@ BlockRange RasterGrid::RangeAroundHoles(const Box& pixels, int factor) const {
   const double size = std::max(box.east - box.west, box.north - box.south);
   const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
   box.Grow(reach, reach);
-  return Ranges(box);
+  return box;
+}
+
+std::vector<std::size_t> RasterGrid::MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
+                                                  int deepest) const {
+  int factor = 1;
+  for (int level = top.level; level <= deepest; ++level) {
+    factor = std::max(factor, AveragingFactor(SamplesPerCell(lattices[static_cast<std::size_t>(level)], spacing_)));
+  }
+  const geo::Lattice& lattice = lattices[static_cast<std::size_t>(top.level)];
+  std::vector<Box> boxes;
+  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
+    boxes = GeographicBoxes(georeference_, lattice, top);
+  } else if (const auto box = ProjectedBox(georeference_, lattice, top)) {
+    boxes = {*box};
+  } else {
+    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
+  }
+  std::set<std::size_t> members;
+  for (Box& box : boxes) {
+    // Tiles have a halo of one node of at most a 32nd of their size. Interpolation, blocks of averages and the samples
+    // at the rim of a window reach a dozen averages at most.
+    constexpr double kHalo = 1.0 / 16;
+    const double reach = 12 * factor + options_.max_void_gap + 2;
+    const double feather = options_.feather_m > 0 ? Feather(factor) : 0;
+    box.Grow((box.east - box.west) * kHalo + reach + feather / spacing_.east,
+             (box.north - box.south) * kHalo + reach + feather / spacing_.north);
+    const auto add = [&](const Box& in) {
+      for (const std::size_t member : member_index_.Find(in)) members.insert(member);
+    };
+    add(box);
+    // Averages by each factor have holes of their own.
+    for (int f = 1; f <= factor; f *= 2) {
+      if (const auto around = BoxAroundHoles(box, f)) add(*around);
+    }
+  }
+  return {members.begin(), members.end()};
+}
+
+void RasterGrid::AddTo(ContentHasher& hasher) const {
+  for (const int number : {width_, height_, columns_, alignment_, options_.max_void_gap}) hasher.Add(number);
+  hasher.Add(wraps_);
+  hasher.Add(static_cast<std::uint8_t>(options_.voids));
+  for (const double number : {spacing_.east, spacing_.north, spacing_.finer, spacing_.latitude, reach_.west,
+                              reach_.south, reach_.east, reach_.north, options_.feather_m}) {
+    hasher.Add(number);
+  }
+  hasher.Add(spacing_.geographic);
+  for (const auto& height : pole_heights_) {
+    hasher.Add(height.has_value());
+    hasher.Add(height.value_or(0));
+  }
 }
 
 bool RasterGrid::MayBlend(const Box& pixels, int factor) const {
@@ -160,7 +214,7 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
     box.Grow(1.5 * factor + 1, 1.5 * factor + 1);
     BlockRange here = Ranges(box);
     if (here.has_voids) {
-      here.Add(RangeAroundHoles(box, factor));
+      if (const auto around = BoxAroundHoles(box, factor)) here.Add(Ranges(*around));
       box.Grow(options_.max_void_gap + factor, options_.max_void_gap + factor);
       here.Add(Ranges(box));
     }

@@ -28,6 +28,11 @@ class GridVoids {
   // Whether a hole that extends over several members may intersect a box of pixels. RangeTable knows all other holes.
   bool SharesHole(const Box& pixels) const;
 
+  // By region of the member's RimVoids: 1 if it is part of a hole. Empty: the member has no holes.
+  std::span<const std::uint8_t> Closed(std::size_t member) const {
+    return member < closed_.size() ? std::span<const std::uint8_t>(closed_[member]) : std::span<const std::uint8_t>();
+  }
+
   // How often the constructor examined voids of a member: once for each change along the rims of members. For tests.
   std::size_t looks() const { return looks_; }
 

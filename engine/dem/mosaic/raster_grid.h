@@ -18,6 +18,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/common/box_index.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/dem/crs/undulations.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/mosaic/grid_cover.h"
@@ -133,8 +134,19 @@ class RasterGrid {
   // Returns the range of the pixels in a box. Pixels that no member covers are voids.
   BlockRange Ranges(const Box& pixels) const;
 
-  // Returns the range of the pixels from which the holes that meet a box are filled; an empty range without holes.
-  BlockRange RangeAroundHoles(const Box& pixels, int factor) const;
+  // Returns a box around the pixels from which the holes that meet a box are filled; nothing without holes.
+  std::optional<Box> BoxAroundHoles(const Box& pixels, int factor) const;
+
+  // Adds to a hash what heights depend on besides the georeference, the vertical datum, and the members' samples and
+  // positions.
+  void AddTo(ContentHasher& hasher) const;
+  // Returns the indices of the members that heights and RangeOf of the tile, and heights of all tiles below it down to
+  // level `deepest`, may depend on, ascending. `lattices`: by level. It may return members that nothing depends
+  // on.
+  std::vector<std::size_t> MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
+                                        int deepest) const;
+  // Which voids of a member are holes, by region.
+  std::span<const std::uint8_t> ClosedVoids(std::size_t member) const { return voids_.Closed(member); }
 
   // Returns bounds on the ellipsoidal heights that Fill gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;

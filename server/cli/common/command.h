@@ -35,5 +35,6 @@ inline int FinishOutput(int code) {
 void AddServe(CLI::App& app, int& exit_code);
 void AddMesh(CLI::App& app, int& exit_code);
 void AddInfo(CLI::App& app, int& exit_code);
+void AddBake(CLI::App& app, int& exit_code);
 
 }  // namespace terrace::cli

@@ -10,6 +10,7 @@
 
 #include "engine/dem/gdal/file_content.h"
 #include "engine/dem/statistics/cache_folder.h"
+#include "server/cli/common/open_baked.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -67,16 +68,16 @@ Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, con
   return imagery;
 }
 
-// Changes when a source, a layer, or an option that changes bytes does, and with the encoders; equal for equal
-// contents, wherever they lie. What decides heights is in the fingerprint of the source.
+// Changes when a layer or an option that changes bytes does, with the encoders, and with `heights`; equal for equal
+// contents, wherever they lie.
 std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
-                           const std::string& version) {
+                           const std::string& version, std::uint64_t heights) {
   const tiler::WaterRules& water = dataset.water;
   const tiler::ImageryRules& imagery = dataset.imagery;
   const std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(),
-      dataset.source->fingerprint(), dataset.error_fraction, static_cast<int>(dataset.rules.criterion),
-      dataset.rules.compact, static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
+      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(), heights,
+      dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
+      static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
       water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
       dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, static_cast<int>(imagery.texture),
       imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution, dataset.attribution.size(),
@@ -123,16 +124,20 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_levels = wanted.metadata_availability;
-  dataset.generation = GenerationOf(wanted, dataset, version);
+  dataset.generation = GenerationOf(wanted, dataset, version, dataset.source->fingerprint());
+  dataset.options = GenerationOf(wanted, dataset, version, 0);
   return dataset;
 }
 
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress,
                                    std::stop_token stop) {
+  if (wanted.sources.empty() && !wanted.baked.empty()) return OpenBakedAlone(wanted);
   auto source = OpenSource(wanted, cache, progress, stop);
   if (!source) return tl::unexpected(source.error());
-  return MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
+  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
+  if (dataset) AddBaked(wanted, *dataset);
+  return dataset;
 }
 
 }  // namespace terrace::cli

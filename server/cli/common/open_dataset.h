@@ -26,7 +26,7 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
                                    const dem::RasterCache& cache, const std::string& version,
                                    std::stop_token stop = {});
 
-// OpenSource, then MakeDataset.
+// OpenSource, then MakeDataset, with its archive. Without sources: the archive alone.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                    const std::string& version, const std::function<void(double)>& progress = {},
                                    std::stop_token stop = {});

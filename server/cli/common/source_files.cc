@@ -16,6 +16,10 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources) {
   return count;
 }
 
+std::string NameOf(const config::DatasetConfig& dataset) {
+  return dataset.sources.empty() ? dataset.baked : NameOf(dataset.sources);
+}
+
 std::string NameOf(const std::vector<config::SourceConfig>& sources) {
   if (sources.size() == 1) return sources.front().written;
   return fmt::format("{} and {} more source{}", sources.front().written, sources.size() - 1,
@@ -33,6 +37,12 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
     for (const std::string& file : source.files) {
       if (Result<void> readable = read(file, ""); !readable) return readable;
     }
+  }
+  const bool is_local = dataset.baked.starts_with('/') && !dataset.baked.starts_with("/vsi");
+  if (dataset.sources.empty() && is_local && ::access(dataset.baked.c_str(), R_OK) != 0) {
+    return MakeError(ErrorCode::kNotFound,
+                     "dataset {}: {}: {}; give the folder or file that 'terrace bake' wrote, or \"sources\"",
+                     dataset.name, dataset.baked, std::generic_category().message(errno));
   }
   if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
   return read(dataset.water.mask, ", or for a sea level a number of metres");

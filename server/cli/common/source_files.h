@@ -14,6 +14,8 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
+// The same of a dataset; without sources its archive.
+std::string NameOf(const config::DatasetConfig& dataset);
 
 // Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
 // The error names the first one that is not.

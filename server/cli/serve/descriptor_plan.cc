@@ -6,6 +6,7 @@
 #include <string>
 #include <thread>
 
+#include "archive/archive.h"
 #include "server/store/record_db.h"
 
 namespace terrace::cli {
@@ -28,6 +29,9 @@ server::DescriptorDemand DemandOf(const config::Config& config) {
   demand.open_sources = config.max_open_sources;
   demand.has_vrts = std::ranges::any_of(config.datasets, HasVrt);
   demand.connections = config.max_connections;
+  for (const config::DatasetConfig& dataset : config.datasets) {
+    if (!dataset.baked.empty()) demand.archive_files += archive::Archive::kMaxOpenFiles;
+  }
   if (config.disk_cache.directory.empty()) return demand;
   for (const std::size_t bytes : {config.disk_cache.tile_bytes, config.disk_cache.refinement_bytes}) {
     if (bytes == 0) continue;

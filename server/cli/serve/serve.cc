@@ -31,6 +31,7 @@
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/statistics/cache_folder.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/open_baked.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
@@ -43,6 +44,7 @@
 #include "server/memory_trimmer.h"
 #include "server/reload/reloader.h"
 #include "server/server.h"
+#include "server/store/baked_store.h"
 #include "server/store/disk_cache.h"
 #include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
@@ -83,6 +85,18 @@ std::string StemOf(const std::string& dem) {
 bool IsPipe(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::is_other(path, ignored);
+}
+
+// A dataset of an archive alone keeps the name that it was baked under, and so its URLs.
+Result<void> NameArchive(const std::string& place, config::DatasetConfig& dataset) {
+  if (!dataset.baked.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "is an archive, and --baked names another; leave one out");
+  }
+  dataset.baked = place;
+  const Result<std::string> name = NameOfBaked(place);
+  if (!name) return tl::unexpected(name.error());
+  if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(*name);
+  return {};
 }
 
 // The DEMs of the command line are the last datasets of `config`. `dems`: the arguments as written. Each dataset is
@@ -155,6 +169,12 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
     }
     taken.push_back(written);
     config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
+    if (IsArchive(dem)) {
+      if (const Result<void> named = NameArchive(dem, dataset); !named) {
+        errors.push_back({written, named.error().message});
+      }
+      continue;
+    }
     if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
     Result<config::SourceConfig> source = config::SourceAt(dem);
     if (source)
@@ -177,7 +197,7 @@ bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, c
                   std::vector<tiler::Dataset>& datasets) {
   bool all_open = true;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted.sources), FileCount(wanted.sources));
+    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted), FileCount(wanted.sources));
     Result<tiler::Dataset> dataset = OpenDataset(wanted, cache, TERRACE_VERSION, progress.Callback(), stop);
     if (stop.stop_requested()) return false;
     if (!dataset) {
@@ -185,8 +205,11 @@ bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, c
       all_open = false;
       continue;
     }
-    spdlog::info("dataset {}: {}, levels 0 to {}, version {}", dataset->name, NameOf(wanted.sources),
-                 dataset->source->max_level(), tiler::VersionText(dataset->generation));
+    const int max_level = dataset->source ? dataset->source->max_level()
+                                          : static_cast<int>(dataset->baked->extent().available.size()) - 1;
+    const std::string archive = dataset->source && dataset->baked ? ", archive " + wanted.baked : "";
+    spdlog::info("dataset {}: {}{}, levels 0 to {}, version {}", dataset->name, NameOf(wanted), archive, max_level,
+                 tiler::VersionText(dataset->generation));
     datasets.push_back(*std::move(dataset));
   }
   return all_open;
@@ -293,6 +316,8 @@ int Serve(const ServeArguments& arguments) {
   if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
   if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
+  const auto baked = std::make_shared<server::BakedStore>();
+  options.tile_stores.push_back(baked);
   options.refinements =
       std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
   const auto refinements = options.refinements;
@@ -324,6 +349,7 @@ int Serve(const ServeArguments& arguments) {
   if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
   if (!are_open) return kExitFailure;
   if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
+  baked->Use(datasets);
   std::atomic<std::size_t> count = datasets.size();
   const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served) {
     return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements));
@@ -356,6 +382,7 @@ int Serve(const ServeArguments& arguments) {
     } else {
       count = served.size();
     }
+    baked->Use(served);
     std::vector<std::uint64_t> generations;
     for (const tiler::Dataset& dataset : served) generations.push_back(dataset.generation);
     refinements->Retain(generations);
@@ -390,12 +417,15 @@ void AddServe(CLI::App& app, int& exit_code) {
   command->footer(
       "Examples:\n"
       "  terrace serve alps.tif andes.tif\n"
+      "  terrace serve baked/alps\n"
       "  terrace serve --config terrace.json --listen 0.0.0.0:8080\n\n"
-      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. Options of\n"
+      "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. An\n"
+      "archive of 'terrace bake' becomes the dataset that was baked. Options of\n"
       "the command line override those of the configuration. The server prints one line with its\n"
       "URL on stdout when it is ready; the log goes to stderr. SIGTERM or SIGINT ends the server after open\n"
       "requests are answered; a second signal ends it at once.");
-  command->add_option("DEM", arguments->dems, "Rasters that GDAL can read, or folders of them; each is one dataset");
+  command->add_option("DEM", arguments->dems,
+                      "Rasters that GDAL can read, folders of them, or archives; each is one dataset");
   command->add_option("--config", arguments->config_file, "Configuration in JSON; docs/configuration.md describes it")
       ->type_name("FILE");
   command->add_flag("--print-config", arguments->print_config,

@@ -1,0 +1,54 @@
+// Reads an archive. Hostile files are safe to read: every size is checked, every tile has a checksum.
+//
+// Thread-safe. Files of units are opened when they are first needed; a bounded number stays open.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "archive/manifest.h"
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+#include "tiler/encoded_tile.h"
+
+namespace terrace::archive {
+
+struct ArchivedTile {
+  tiler::EncodedTile tile;  // as it was added, with its ETag; no times and no head
+  dem::HeightRange range;
+};
+
+class Archive {
+ public:
+  // Of one archive, at a time.
+  static constexpr std::size_t kMaxOpenFiles = 32;
+
+  // `place`: a folder with a manifest, or a file written by WriteSingle; also /vsis3/... where the source policy allows
+  // it. kNotFound: nothing is there, or the bake is unfinished. kInvalidArgument: it is something else, or of a newer
+  // format. kUnavailable: it cannot be read now. Messages name the place and the remedy.
+  static Result<std::shared_ptr<const Archive>> Open(const std::string& place);
+  // The archives of a place: one, or those of several formats in the folders FolderOf. Errors as Open.
+  static Result<std::vector<std::shared_ptr<const Archive>>> OpenAll(const std::string& place);
+  virtual ~Archive() = default;
+
+  virtual const std::string& place() const = 0;
+  virtual const Manifest& manifest() const = 0;
+
+  // Nothing: the archive does not have the tile. kUnavailable: the tile's file is damaged, is not the one of this bake,
+  // or cannot be read; the message names it.
+  virtual Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const = 0;
+
+  // The range of a tile; nothing as Find, also for errors.
+  virtual std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const = 0;
+
+  // Calls `take` for each tile until it fails: unit by unit, in a unit as its file has them. Reads and checks every
+  // byte. Errors: those of `take` and of Find.
+  using TakeTile = std::function<Result<void>(const geo::TileKey& key, ArchivedTile tile)>;
+  virtual Result<void> ForEach(const TakeTile& take) const = 0;
+};
+
+}  // namespace terrace::archive

@@ -1,0 +1,144 @@
+#include "archive/baked_tiles.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include "proto/compress.h"
+#include "proto/mesh/tile_metadata.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::archive {
+namespace {
+
+using tiler::TileFormat;
+using tiler::TileRequest;
+
+int StepAt(const std::vector<int>& steps, int level) {
+  return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
+}
+
+// Whether the archive's tiles, but for their coding, are what the request asks for.
+bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
+  const TileRequest& kind = manifest.kind;
+  const BakedDataset& dataset = manifest.dataset;
+  const int level = request.key.level;
+  if (request.format != kind.format) return false;
+  if (request.format == TileFormat::kHeightPng) {
+    return request.height_encoding == kind.height_encoding && request.height_size == kind.height_size;
+  }
+  if (request.error_step != StepAt(manifest.error_steps, level)) return false;
+  if (request.format == TileFormat::kGlb) {
+    return request.compression == kind.compression && request.texture == kind.texture;
+  }
+  const bool has_metadata = kind.metadata && proto::CarriesMetadata(level, dataset.metadata_levels, dataset.max_level);
+  return request.normals == kind.normals && request.water_mask == kind.water_mask && request.metadata == has_metadata;
+}
+
+// Nothing: the bytes are not in `from`.
+std::optional<std::string> InCoding(std::string bytes, tiler::Coding from, tiler::Coding to) {
+  constexpr std::size_t kMaxTileBytes = std::size_t{1} << 30;
+  if (from == to) return bytes;
+  if (from == tiler::Coding::kGzip) {
+    std::optional<std::string> plain = proto::Gunzip(bytes, kMaxTileBytes);
+    if (!plain) return std::nullopt;
+    bytes = *std::move(plain);
+  }
+  return tiler::Compress(std::move(bytes), to);
+}
+
+class Baked final : public tiler::BakedTiles {
+ public:
+  explicit Baked(std::vector<std::shared_ptr<const Archive>> archives) : archives_(std::move(archives)) {
+    for (const auto& archive : archives_) Describe(archive->manifest());
+    // Documents need the roots, also if there are height tiles alone.
+    if (extent_.available.empty()) extent_.available = {{{0, 0, 1, 0}}};
+  }
+
+  tiler::Coding coding() const override { return archives_.front()->manifest().kind.coding; }
+  const tiler::BakedExtent& extent() const override { return extent_; }
+
+  Result<std::optional<tiler::EncodedTile>> Find(const TileRequest& request) const override {
+    for (const auto& archive : archives_) {
+      const Manifest& manifest = archive->manifest();
+      if (!IsOfKind(manifest, request)) continue;
+      Result<std::optional<ArchivedTile>> found = archive->Find(request.key);
+      if (!found) return tl::unexpected(std::move(found.error()));
+      if (!*found) continue;
+      tiler::EncodedTile tile = std::move((*found)->tile);
+      if (request.coding == manifest.kind.coding) return tile;
+      std::optional<std::string> bytes = InCoding(std::move(tile.bytes), manifest.kind.coding, request.coding);
+      if (!bytes) {
+        return MakeError(ErrorCode::kUnavailable, "{}: tile {} cannot be decompressed; bake it again", archive->place(),
+                         geo::ToString(request.key));
+      }
+      tile.bytes = *std::move(bytes);
+      tile.etag = tiler::StrongETag(tile.bytes);
+      return tile;
+    }
+    return std::nullopt;
+  }
+
+  dem::HeightRange RangeBound(const geo::TileKey& key) const override {
+    for (const auto& archive : archives_) {
+      if (archive->manifest().kind.format == TileFormat::kHeightPng) continue;
+      if (const std::optional<dem::HeightRange> range = archive->FindRange(key)) return *range;
+    }
+    return {std::min(extent_.heights.min, extent_.floor_m), std::max(extent_.heights.max, extent_.floor_m)};
+  }
+
+  Error WhyAbsent(const TileRequest& request) const override {
+    std::string formats;
+    for (const TileFormat format : extent_.formats) formats += (formats.empty() ? "" : ", ") + FolderOf(format);
+    const bool is_of_a_kind =
+        std::ranges::any_of(archives_, [&](const auto& archive) { return IsOfKind(archive->manifest(), request); });
+    return {ErrorCode::kNotFound,
+            is_of_a_kind
+                ? std::string("the dataset comes from an archive, which does not have this tile")
+                : fmt::format("the dataset comes from an archive ({}) with one error, one set of extensions and one "
+                              "compression; leave these parameters out",
+                              formats)};
+  }
+
+ private:
+  void Describe(const Manifest& manifest) {
+    const BakedDataset& dataset = manifest.dataset;
+    extent_.formats.push_back(manifest.kind.format);
+    extent_.bounds = dataset.bounds;
+    extent_.heights = dataset.heights;
+    extent_.floor_m = dataset.floor_m;
+    extent_.has_datum = dataset.has_datum;
+    extent_.sources = static_cast<std::size_t>(dataset.sources);
+    extent_.deepest_level = dataset.max_level;
+    if (manifest.kind.format == TileFormat::kHeightPng) {
+      extent_.max_mercator_depth = manifest.max_level + (manifest.kind.height_size == 512 ? 1 : 0);
+      return;
+    }
+    // Archives of one bake have the same tiles.
+    if (extent_.available.empty()) {
+      extent_.available = manifest.available;
+      extent_.error_steps = manifest.error_steps;
+    }
+    if (manifest.kind.format == TileFormat::kGlb) {
+      if (manifest.kind.texture != proto::TextureFormat::kNone) extent_.texture = manifest.kind.texture;
+      return;
+    }
+    extent_.normals = manifest.kind.normals;
+    extent_.water_mask = manifest.kind.water_mask;
+    if (manifest.kind.metadata) extent_.metadata_levels = dataset.metadata_levels;
+  }
+
+  const std::vector<std::shared_ptr<const Archive>> archives_;
+  tiler::BakedExtent extent_;
+};
+
+}  // namespace
+
+std::shared_ptr<const tiler::BakedTiles> MakeBakedTiles(std::vector<std::shared_ptr<const Archive>> archives) {
+  return std::make_shared<const Baked>(std::move(archives));
+}
+
+}  // namespace terrace::archive

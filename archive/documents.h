@@ -1,0 +1,19 @@
+// The documents of archives that are read without a server: what an archive holds, in the words of other programs.
+#pragma once
+
+#include <string>
+
+#include "archive/manifest.h"
+
+namespace terrace::archive {
+
+// layer.json of an archive of terrain tiles. Equal to the server's, if the whole dataset was baked with all extensions.
+std::string LayerJson(const Manifest& manifest);
+
+// TileJSON of an archive of height tiles, with a template relative to itself.
+std::string TileJson(const Manifest& manifest);
+
+// The metadata of a single file: layer.json or TileJSON, with the manifest as member kManifestMember.
+std::string SingleMetadata(const Manifest& manifest);
+
+}  // namespace terrace::archive

@@ -1,0 +1,133 @@
+#include "archive/export.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "archive/documents.h"
+#include "archive/files/output_file.h"
+#include "archive/pmtiles/pmtiles_writer.h"
+#include "archive/tile_scheme.h"
+#include "engine/geo/mercator_grid.h"
+
+namespace terrace::archive {
+namespace {
+
+// Counts tiles, and ends after a stop.
+class Counter {
+ public:
+  explicit Counter(const ExportOptions& options) : options_(options) {}
+
+  Result<void> Count() {
+    if (options_.stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
+    ++tiles_;
+    if (options_.progress) options_.progress(tiles_);
+    return {};
+  }
+
+ private:
+  const ExportOptions& options_;
+  std::uint64_t tiles_ = 0;
+};
+
+dem::GeoBounds HeaderBounds(const Manifest& manifest) {
+  dem::GeoBounds bounds = manifest.dataset.bounds;
+  if (bounds.west > bounds.east || bounds.east > 180 || bounds.west < -180) {
+    bounds.west = -180;
+    bounds.east = 180;
+  }
+  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  const double most = is_mercator ? geo::kMercatorLatitude : 90;
+  bounds.south = std::clamp(bounds.south, -most, most);
+  bounds.north = std::clamp(bounds.north, -most, most);
+  return bounds;
+}
+
+Result<void> WriteText(const std::string& path, std::string_view text) {
+  Result<OutputFile> out = OutputFile::Create(path);
+  if (!out) return tl::unexpected(std::move(out.error()));
+  if (Result<void> written = out->Write(text); !written) return written;
+  return out->Finish();
+}
+
+Result<void> CheckFree(const std::string& out) {
+  std::error_code error;
+  if (!std::filesystem::exists(out, error)) return {};
+  if (std::filesystem::is_directory(out, error) && std::filesystem::is_empty(out, error) &&
+      std::filesystem::remove(out, error)) {
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{} exists already; remove it or choose another place", out);
+}
+
+// A folder that is removed unless it is renamed.
+class PartialFolder {
+ public:
+  explicit PartialFolder(std::string path) : path_(std::move(path)), partial_(path_ + std::string(kPartial)) {
+    std::filesystem::remove_all(partial_, ignored_);
+  }
+  ~PartialFolder() { std::filesystem::remove_all(partial_, ignored_); }
+  PartialFolder(const PartialFolder&) = delete;
+  PartialFolder& operator=(const PartialFolder&) = delete;
+
+  const std::string& partial() const { return partial_; }
+  Result<void> Finish() {
+    std::error_code error;
+    std::filesystem::rename(partial_, path_, error);
+    if (error) return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", path_, error.message());
+    return {};
+  }
+
+ private:
+  const std::string path_, partial_;
+  std::error_code ignored_;
+};
+
+}  // namespace
+
+Result<void> WriteSingle(const Archive& archive, const std::string& out, const ExportOptions& options) {
+  const Manifest& manifest = archive.manifest();
+  Result<PmtilesOptions> file_options = PmtilesOptionsOf(manifest.kind, std::nullopt);
+  if (!file_options) return tl::unexpected(std::move(file_options.error()));
+  file_options->bounds = HeaderBounds(manifest);
+  Result<PmtilesWriter> writer = PmtilesWriter::Create(out, *file_options);
+  if (!writer) return tl::unexpected(std::move(writer.error()));
+  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  Counter counter(options);
+  const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
+    if (Result<void> goes_on = counter.Count(); !goes_on) return goes_on;
+    return writer->Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile.tile, tile.range);
+  });
+  if (!copied) return copied;
+  const Result<UnitSummary> written = writer->Finish(SingleMetadata(manifest));
+  if (!written) return tl::unexpected(written.error());
+  return {};
+}
+
+Result<void> WriteFolder(const Archive& archive, const std::string& out, const ExportOptions& options) {
+  const Manifest& manifest = archive.manifest();
+  if (manifest.kind.format == tiler::TileFormat::kGlb) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "GLB tiles have no folder form; bake chunks, and serve them with 'terrace serve'");
+  }
+  if (Result<void> is_free = CheckFree(out); !is_free) return is_free;
+  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  PartialFolder folder(out);
+  Counter counter(options);
+  const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
+    if (Result<void> goes_on = counter.Count(); !goes_on) return goes_on;
+    const std::string path =
+        fmt::format("{}/{}.{}", folder.partial(), geo::ToString(key), is_mercator ? "png" : "terrain");
+    return WriteUnsynced(path, tile.tile.bytes);
+  });
+  if (!copied) return copied;
+  const Result<void> described = is_mercator ? WriteText(folder.partial() + "/tiles.json", TileJson(manifest))
+                                             : WriteText(folder.partial() + "/layer.json", LayerJson(manifest));
+  if (!described) return described;
+  return folder.Finish();
+}
+
+}  // namespace terrace::archive

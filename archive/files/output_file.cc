@@ -1,0 +1,186 @@
+#include "archive/files/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+#include <xxhash.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <new>
+#include <system_error>
+#include <utility>
+
+namespace terrace::archive {
+namespace {
+
+constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+constexpr int kMode = 0644;
+
+tl::unexpected<Error> CannotWrite(const std::string& path, int error) {
+  return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; free space or choose another place", path,
+                   std::strerror(error));
+}
+
+Result<void> WriteAll(int descriptor, std::string_view bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return CannotWrite(path, written < 0 ? errno : EIO);
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  return {};
+}
+
+std::string FolderOf(const std::string& path) {
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return folder.empty() ? "." : folder;
+}
+
+Result<void> MakeFolder(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(FolderOf(path), error);
+  if (error) return CannotWrite(FolderOf(path), error.value());
+  return {};
+}
+
+}  // namespace
+
+struct OutputFile::Impl {
+  explicit Impl(std::string p) : path(std::move(p)), partial(path + std::string(kPartial)), hash(XXH3_createState()) {
+    if (hash == nullptr) throw std::bad_alloc();
+    XXH3_128bits_reset(hash);
+  }
+  ~Impl() {
+    XXH3_freeState(hash);
+    if (descriptor < 0) return;
+    ::close(descriptor);
+    ::unlink(partial.c_str());
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  Result<void> Flush() {
+    Result<void> written = WriteAll(descriptor, waiting, partial);
+    waiting.clear();
+    return written;
+  }
+
+  const std::string path, partial;
+  XXH3_state_t* const hash;
+  int descriptor = -1;
+  std::uint64_t size = 0;
+  std::string waiting;
+};
+
+OutputFile::OutputFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+OutputFile::OutputFile(OutputFile&&) noexcept = default;
+OutputFile::~OutputFile() = default;
+
+Result<OutputFile> OutputFile::Create(const std::string& path) {
+  if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
+  auto impl = std::make_unique<Impl>(path);
+  impl->descriptor = ::open(impl->partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
+  return OutputFile(std::move(impl));
+}
+
+Result<void> OutputFile::Write(std::string_view bytes) {
+  XXH3_128bits_update(impl_->hash, bytes.data(), bytes.size());
+  impl_->size += bytes.size();
+  impl_->waiting += bytes;
+  if (impl_->waiting.size() < kBufferBytes) return {};
+  return impl_->Flush();
+}
+
+Result<void> OutputFile::Finish() {
+  if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
+  if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);
+  if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
+  ::close(std::exchange(impl_->descriptor, -1));
+  // The new name must be on the disk as well. Some file systems do not allow this for folders, and need it not.
+  const int folder = ::open(FolderOf(impl_->path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return {};
+  ::fsync(folder);
+  ::close(folder);
+  return {};
+}
+
+std::uint64_t OutputFile::size() const { return impl_->size; }
+
+std::string OutputFile::xxh3() const {
+  const XXH128_hash_t hash = XXH3_128bits_digest(impl_->hash);
+  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+}
+
+Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {
+  const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode); };
+  int descriptor = open();
+  if (descriptor < 0 && errno == ENOENT) {
+    if (Result<void> made = MakeFolder(path); !made) return made;
+    descriptor = open();
+  }
+  if (descriptor < 0) return CannotWrite(path, errno);
+  Result<void> written = WriteAll(descriptor, bytes, path);
+  if (::close(descriptor) != 0 && written) return CannotWrite(path, errno);
+  return written;
+}
+
+SpoolFile::SpoolFile(int descriptor, std::string folder) : descriptor_(descriptor), folder_(std::move(folder)) {}
+SpoolFile::SpoolFile(SpoolFile&& other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      folder_(std::move(other.folder_)),
+      waiting_(std::move(other.waiting_)),
+      written_(other.written_) {}
+SpoolFile::~SpoolFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+Result<SpoolFile> SpoolFile::Create(const std::string& path) {
+  if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
+  const std::string folder = FolderOf(path);
+  int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
+  if (descriptor < 0) {  // a file system without nameless files
+    std::string name = path + ".spool" + std::string(kPartial);
+    descriptor = ::open(name.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+    if (descriptor < 0) return CannotWrite(name, errno);
+    ::unlink(name.c_str());
+  }
+  return SpoolFile(descriptor, folder);
+}
+
+Result<void> SpoolFile::Flush() {
+  if (Result<void> written = WriteAll(descriptor_, waiting_, folder_); !written) return written;
+  written_ += waiting_.size();
+  waiting_.clear();
+  return {};
+}
+
+Result<std::uint64_t> SpoolFile::Append(std::string_view bytes) {
+  const std::uint64_t offset = written_ + waiting_.size();
+  waiting_ += bytes;
+  if (waiting_.size() >= kBufferBytes) {
+    if (Result<void> flushed = Flush(); !flushed) return tl::unexpected(std::move(flushed.error()));
+  }
+  return offset;
+}
+
+Result<std::string> SpoolFile::Read(std::uint64_t offset, std::size_t size) {
+  if (!waiting_.empty()) {
+    if (Result<void> flushed = Flush(); !flushed) return tl::unexpected(std::move(flushed.error()));
+  }
+  std::string bytes(size, '\0');
+  for (std::size_t done = 0; done < size;) {
+    const ssize_t read = ::pread(descriptor_, bytes.data() + done, size - done, static_cast<off_t>(offset + done));
+    if (read < 0 && errno == EINTR) continue;
+    if (read <= 0) {
+      return MakeError(ErrorCode::kUnavailable, "a temporary file in {} cannot be read: {}", folder_,
+                       std::strerror(read < 0 ? errno : EIO));
+    }
+    done += static_cast<std::size_t>(read);
+  }
+  return bytes;
+}
+
+}  // namespace terrace::archive

@@ -1,0 +1,64 @@
+// Writes a file that is complete or absent: under another name, then renamed.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+
+namespace terrace::archive {
+
+// The end of the names of unfinished files.
+inline constexpr std::string_view kPartial = ".partial";
+
+// kUnavailable: the file cannot be written; the message names it and the reason. Used by one thread at a time.
+class OutputFile {
+ public:
+  // Replaces an unfinished file of the same name. Makes the folders of `path`.
+  static Result<OutputFile> Create(const std::string& path);
+  ~OutputFile();  // removes an unfinished file
+  OutputFile(OutputFile&&) noexcept;
+  OutputFile& operator=(OutputFile&&) = delete;
+
+  Result<void> Write(std::string_view bytes);
+  // Waits until the bytes are on the disk, and renames the file.
+  Result<void> Finish();
+
+  std::uint64_t size() const;
+  // XXH3-128 of what was written, 32 hexadecimal digits.
+  std::string xxh3() const;
+
+ private:
+  struct Impl;
+  explicit OutputFile(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+// Writes a file without waiting for the disk: for many small files. Makes its folder. kUnavailable: as OutputFile.
+Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
+
+// A file without a name beside `path`, for data that wait: it is gone with the process.
+class SpoolFile {
+ public:
+  static Result<SpoolFile> Create(const std::string& path);
+  ~SpoolFile();
+  SpoolFile(SpoolFile&& other) noexcept;
+  SpoolFile& operator=(SpoolFile&&) = delete;
+
+  // Returns where the bytes begin.
+  Result<std::uint64_t> Append(std::string_view bytes);
+  Result<std::string> Read(std::uint64_t offset, std::size_t size);
+
+ private:
+  SpoolFile(int descriptor, std::string folder);
+  Result<void> Flush();
+
+  int descriptor_;
+  std::string folder_;
+  std::string waiting_;  // not yet written
+  std::uint64_t written_ = 0;
+};
+
+}  // namespace terrace::archive

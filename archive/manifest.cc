@@ -1,0 +1,54 @@
+#include "archive/manifest.h"
+
+#include <utility>
+
+#include "archive/files/input_file.h"
+#include "archive/files/output_file.h"
+#include "archive/manifest_json.h"
+#include "archive/pmtiles/pmtiles_file.h"
+
+namespace terrace::archive {
+namespace {
+
+constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{1} << 30;
+
+Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) {
+  if (manifest) return manifest;
+  return MakeError(manifest.error().code, "{}: {}", place, manifest.error().message);
+}
+
+Result<Manifest> ReadSingle(const std::string& path) {
+  const Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path);
+  if (!file) return tl::unexpected(file.error());
+  const Result<std::string> json = ManifestIn((*file)->metadata());
+  if (!json) return MakeError(json.error().code, "{} is no archive of terrace: {}", path, json.error().message);
+  return WithPlace(path, ParseManifest(*json));
+}
+
+}  // namespace
+
+Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
+  Result<OutputFile> out = OutputFile::Create(place + "/" + kManifestFile);
+  if (!out) return tl::unexpected(std::move(out.error()));
+  if (Result<void> written = out->Write(ToJson(manifest)); !written) return written;
+  return out->Finish();
+}
+
+Result<Manifest> ReadManifest(const std::string& place) {
+  if (IsSingleFile(place)) return ReadSingle(place);
+  const std::string path = place + "/" + kManifestFile;
+  const Result<std::string> json = ReadFile(path, kMaxManifestBytes);
+  if (!json && json.error().code == ErrorCode::kNotFound) {
+    if (!IsPlace(place)) {
+      return MakeError(ErrorCode::kNotFound, "there is no {}; give the folder or file that 'terrace bake' wrote",
+                       place);
+    }
+    return MakeError(ErrorCode::kNotFound,
+                     "{} has no {}: it is no archive, or one whose bake has not finished; run the bake again to go on",
+                     place, kManifestFile);
+  }
+  if (!json) return tl::unexpected(json.error());
+  return WithPlace(path, ParseManifest(*json));
+}
+
+}  // namespace terrace::archive

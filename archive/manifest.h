@@ -1,0 +1,96 @@
+// The manifest of an archive: what was baked from what, and which files hold it. docs/formats/archive.md describes the
+// files. An archive without its manifest is an unfinished bake.
+//
+// An archive has tiles of one kind. A bake of several formats writes an archive for each, in the folders FolderOf of
+// its place.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::archive {
+
+// The version of the files' layout. A reader refuses a higher one.
+inline constexpr int kFormatVersion = 1;
+
+// A file of the archive and what it holds.
+struct UnitEntry {
+  std::string name;         // UnitNameOf: "top", "7-12-34"
+  std::uint64_t key = 0;    // hash of everything that the unit's bytes depend on; equal keys: equal files
+  std::uint64_t tiles = 0;  // 0: the unit has no file
+  std::uint64_t bytes = 0;  // of the file
+  std::string xxh3;         // XXH3-128 of the file, 32 hexadecimal digits
+
+  friend bool operator==(const UnitEntry&, const UnitEntry&) = default;
+};
+
+// The dataset as its documents describe it, so that an archive can be served without its sources.
+struct BakedDataset {
+  std::string name;
+  std::string attribution;
+  std::uint64_t generation = 0;
+  double error_fraction = 0.5;
+  proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
+  std::optional<proto::TextureFormat> texture;                            // likewise; nothing: no imagery
+  dem::GeoBounds bounds;                                                  // of the data
+  dem::HeightRange heights;                                               // of the data
+  double floor_m = 0;
+  bool has_datum = true;
+  bool has_water = false;
+  int metadata_levels = 0;
+  int max_level = 0;           // of the dataset, also where the archive ends above it
+  int max_mercator_depth = 1;  // likewise of height tiles
+  std::uint64_t sources = 1;
+};
+
+struct Manifest {
+  std::string product;  // "terrace 0.1.0"
+  std::string encoder;  // tiler::EncoderText()
+  BakedDataset dataset;
+  // What every tile was asked for as: format, coding, extensions, compression, texture, encoding. Its dataset, key and
+  // error_step are not used. Its `metadata` is true if tiles that carry metadata have it.
+  tiler::TileRequest kind;
+  std::vector<int> error_steps;  // by level, 0 .. max_level; empty: 0 at each level
+  int min_level = 0, max_level = 0;
+  // The tiles in the archive by level, 0 .. max_level, as in proto::LayerDescription; of height tiles in the XYZ
+  // scheme. Empty below min_level.
+  std::vector<std::vector<geo::TileRange>> available;
+  std::string options;  // JSON object, as the baker got them; only for people
+  std::vector<UnitEntry> units;
+};
+
+// Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels roots a further unit.
+inline constexpr int kTopLevels = 7;
+
+// "terrain", "glb" or "png".
+std::string FolderOf(tiler::TileFormat format);
+
+// The unit of a tile: "top" or "7-X-Y". UnitRoot is its inverse: the root's key, nothing for "top".
+// kInvalidArgument: no such name.
+std::string UnitNameOf(const geo::TileKey& key);
+Result<std::optional<geo::TileKey>> UnitRoot(std::string_view name);
+
+// Paths relative to the archive's place: "manifest.json"; "top.pmtiles", "units/7-X-Y.pmtiles".
+inline constexpr const char* kManifestFile = "manifest.json";
+std::string UnitPath(std::string_view name);
+
+std::string ToJson(const Manifest& manifest);
+// kInvalidArgument: not a manifest, or one of a newer format; the message names what is wrong.
+Result<Manifest> ParseManifest(std::string_view json);
+
+// Writes manifest.json by rename, so that it is complete or absent. Call it last. kUnavailable: the place cannot be
+// written.
+Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
+// kNotFound: there is no manifest: the place holds an unfinished bake, or something else. kInvalidArgument: see
+// ParseManifest. Also reads the manifest in the metadata of a single file.
+Result<Manifest> ReadManifest(const std::string& place);
+
+}  // namespace terrace::archive

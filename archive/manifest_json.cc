@@ -1,0 +1,292 @@
+#include "archive/manifest_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "tiler/encoder_version.h"
+
+namespace terrace::archive {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kFormatMember = "terrace_archive";
+
+// Values and their names in the manifest. The first is what reading an absent member gives.
+template <typename T>
+using Names = std::vector<std::pair<T, std::string_view>>;
+
+const Names<tiler::TileFormat> kFormats = {{tiler::TileFormat::kQuantizedMesh, "terrain"},
+                                           {tiler::TileFormat::kGlb, "glb"},
+                                           {tiler::TileFormat::kHeightPng, "png"}};
+const Names<tiler::Coding> kCodings = {{tiler::Coding::kIdentity, "identity"}, {tiler::Coding::kGzip, "gzip"}};
+const Names<proto::GlbCompression> kCompressions = {{proto::GlbCompression::kDraco, "draco"},
+                                                    {proto::GlbCompression::kNone, "none"},
+                                                    {proto::GlbCompression::kQuantized, "quantized"},
+                                                    {proto::GlbCompression::kMeshopt, "meshopt"}};
+const Names<proto::TextureFormat> kTextures = {{proto::TextureFormat::kNone, "none"},
+                                               {proto::TextureFormat::kJpeg, "jpeg"},
+                                               {proto::TextureFormat::kWebp, "webp"}};
+const Names<proto::HeightEncoding> kEncodings = {{proto::HeightEncoding::kMapbox, "mapbox"},
+                                                 {proto::HeightEncoding::kTerrarium, "terrarium"}};
+
+// Thrown inside ParseManifest alone.
+struct Wrong : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+template <typename T>
+std::string_view NameOf(const Names<T>& names, T value) {
+  for (const auto& [known, name] : names) {
+    if (known == value) return name;
+  }
+  return names.front().second;
+}
+
+template <typename T>
+T ValueOf(const Names<T>& names, const Json& json) {
+  const auto& text = json.get_ref<const std::string&>();
+  for (const auto& [value, name] : names) {
+    if (name == text) return value;
+  }
+  throw Wrong(fmt::format("'{}' is unknown", text));
+}
+
+std::uint64_t HexOf(const Json& json) {
+  constexpr std::size_t kDigits = 16;
+  const auto& text = json.get_ref<const std::string&>();
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (text.size() != kDigits || error != std::errc() || end != text.data() + text.size()) {
+    throw Wrong(fmt::format("'{}' must have 16 hexadecimal digits", text));
+  }
+  return value;
+}
+
+double NumberOf(const Json& json) {
+  if (!json.is_number()) throw Wrong("a number is missing");
+  const double value = json.get<double>();
+  if (!std::isfinite(value)) throw Wrong("a number is not finite");
+  return value;
+}
+
+template <typename T>
+T WholeOf(const Json& json, T min, T max) {
+  if (!json.is_number_integer()) throw Wrong("a whole number is missing");
+  const bool is_too_large = json.is_number_unsigned() && json.get<std::uint64_t>() > static_cast<std::uint64_t>(max);
+  if (is_too_large) throw Wrong(fmt::format("a number must be {} to {}", min, max));
+  if constexpr (std::is_signed_v<T>) {
+    if (json.get<std::int64_t>() < min || json.get<std::int64_t>() > max) {
+      throw Wrong(fmt::format("a number must be {} to {}", min, max));
+    }
+  } else if (!json.is_number_unsigned()) {
+    throw Wrong("a number must not be negative");
+  }
+  return json.get<T>();
+}
+constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
+
+Json DatasetJson(const BakedDataset& dataset) {
+  const auto& [name, attribution, generation, error_fraction, glb_compression, texture, bounds, heights, floor_m,
+               has_datum, has_water, metadata_levels, max_level, max_mercator_depth, sources] = dataset;
+  Json json;
+  json["name"] = name;
+  json["attribution"] = attribution;
+  json["version"] = tiler::VersionText(generation);
+  json["generation"] = fmt::format("{:016x}", generation);
+  json["error_fraction"] = error_fraction;
+  json["glb_compression"] = NameOf(kCompressions, glb_compression);
+  json["texture"] = texture ? Json(NameOf(kTextures, *texture)) : Json(nullptr);
+  json["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
+  json["heights"] = {heights.min, heights.max};
+  json["floor"] = floor_m;
+  json["has_datum"] = has_datum;
+  json["has_water"] = has_water;
+  json["metadata_levels"] = metadata_levels;
+  json["max_level"] = max_level;
+  json["max_mercator_depth"] = max_mercator_depth;
+  json["sources"] = sources;
+  return json;
+}
+
+BakedDataset ReadDataset(const Json& json) {
+  BakedDataset dataset;
+  dataset.name = json.at("name").get<std::string>();
+  dataset.attribution = json.at("attribution").get<std::string>();
+  dataset.generation = HexOf(json.at("generation"));
+  dataset.error_fraction = NumberOf(json.at("error_fraction"));
+  if (dataset.error_fraction <= 0) throw Wrong("error_fraction must be above 0");
+  dataset.glb_compression = ValueOf(kCompressions, json.at("glb_compression"));
+  if (const Json& texture = json.at("texture"); !texture.is_null()) dataset.texture = ValueOf(kTextures, texture);
+  const Json& bounds = json.at("bounds");
+  dataset.bounds = {NumberOf(bounds.at(0)), NumberOf(bounds.at(1)), NumberOf(bounds.at(2)), NumberOf(bounds.at(3))};
+  dataset.heights = {NumberOf(json.at("heights").at(0)), NumberOf(json.at("heights").at(1))};
+  dataset.floor_m = NumberOf(json.at("floor"));
+  dataset.has_datum = json.at("has_datum").get<bool>();
+  dataset.has_water = json.at("has_water").get<bool>();
+  dataset.metadata_levels = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
+  dataset.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
+  dataset.max_mercator_depth = WholeOf<int>(json.at("max_mercator_depth"), 0, geo::kMaxLevel);
+  dataset.sources = WholeOf<std::uint64_t>(json.at("sources"), 0, kAnyCount);
+  return dataset;
+}
+
+Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_steps) {
+  // All members are named, so that a new one fails to compile until it is added here.
+  const auto& [dataset, key, error_step, format, compression, texture, coding, normals, water_mask, metadata,
+               height_encoding, height_size] = kind;
+  static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
+  Json json;
+  json["format"] = NameOf(kFormats, format);
+  json["coding"] = NameOf(kCodings, coding);
+  json["octvertexnormals"] = normals;
+  json["watermask"] = water_mask;
+  json["metadata"] = metadata;
+  json["compression"] = NameOf(kCompressions, compression);
+  json["texture"] = NameOf(kTextures, texture);
+  json["encoding"] = NameOf(kEncodings, height_encoding);
+  json["size"] = height_size;
+  json["error_steps"] = error_steps;
+  return json;
+}
+
+void ReadKind(const Json& json, Manifest& manifest) {
+  tiler::TileRequest& kind = manifest.kind;
+  kind.format = ValueOf(kFormats, json.at("format"));
+  kind.coding = ValueOf(kCodings, json.at("coding"));
+  kind.normals = json.at("octvertexnormals").get<bool>();
+  kind.water_mask = json.at("watermask").get<bool>();
+  kind.metadata = json.at("metadata").get<bool>();
+  kind.compression = ValueOf(kCompressions, json.at("compression"));
+  kind.texture = ValueOf(kTextures, json.at("texture"));
+  kind.height_encoding = ValueOf(kEncodings, json.at("encoding"));
+  kind.height_size = WholeOf<int>(json.at("size"), 1, 1 << 16);
+  if (std::ranges::find(tiler::kHeightSizes, kind.height_size) == tiler::kHeightSizes.end()) {
+    throw Wrong("size must be 256 or 512");
+  }
+  for (const Json& step : json.at("error_steps")) manifest.error_steps.push_back(WholeOf<int>(step, -1000, 1000));
+  if (!manifest.error_steps.empty() &&
+      manifest.error_steps.size() != static_cast<std::size_t>(manifest.max_level) + 1) {
+    throw Wrong("error_steps must have an entry for each level");
+  }
+}
+
+Json AvailableJson(const std::vector<std::vector<geo::TileRange>>& available) {
+  Json levels = Json::array();
+  for (const auto& ranges : available) {
+    Json& level = levels.emplace_back(Json::array());
+    for (const geo::TileRange& range : ranges)
+      level.push_back({range.start_x, range.start_y, range.end_x, range.end_y});
+  }
+  return levels;
+}
+
+void ReadAvailable(const Json& json, Manifest& manifest) {
+  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  for (const Json& ranges : json) {
+    const int level = static_cast<int>(manifest.available.size());
+    if (level > manifest.max_level) break;
+    const std::int64_t rows = geo::TileRows(level), columns = is_mercator ? rows : geo::TileColumns(level);
+    auto& of_level = manifest.available.emplace_back();
+    for (const Json& range : ranges) {
+      const auto number = [&](std::size_t i, std::int64_t end) {
+        return WholeOf<std::int64_t>(range.at(i), 0, end - 1);
+      };
+      of_level.push_back({number(0, columns), number(1, rows), number(2, columns), number(3, rows)});
+      if (of_level.back().start_x > of_level.back().end_x || of_level.back().start_y > of_level.back().end_y) {
+        throw Wrong("a range of tiles is empty");
+      }
+    }
+  }
+  if (manifest.available.size() != static_cast<std::size_t>(manifest.max_level) + 1 ||
+      json.size() != manifest.available.size()) {
+    throw Wrong("available must have an entry for each level");
+  }
+}
+
+UnitEntry ReadUnit(const Json& json) {
+  UnitEntry unit;
+  unit.name = json.at("name").get<std::string>();
+  if (const auto root = UnitRoot(unit.name); !root) throw Wrong(root.error().message);
+  unit.key = HexOf(json.at("key"));
+  unit.tiles = WholeOf<std::uint64_t>(json.at("tiles"), 0, kAnyCount);
+  unit.bytes = WholeOf<std::uint64_t>(json.at("bytes"), 0, kAnyCount);
+  unit.xxh3 = json.at("xxh3").get<std::string>();
+  return unit;
+}
+
+Manifest Read(const Json& json) {
+  const int format = WholeOf<int>(json.at(kFormatMember), 1, 1 << 30);
+  if (format > kFormatVersion) {
+    throw Wrong(fmt::format("it has format {}, and this program reads formats up to {}; serve it with a newer terrace",
+                            format, kFormatVersion));
+  }
+  Manifest manifest;
+  manifest.product = json.at("product").get<std::string>();
+  manifest.encoder = json.at("encoder").get<std::string>();
+  manifest.dataset = ReadDataset(json.at("dataset"));
+  manifest.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
+  manifest.min_level = WholeOf<int>(json.at("min_level"), 0, manifest.max_level);
+  ReadKind(json.at("tiles"), manifest);
+  ReadAvailable(json.at("available"), manifest);
+  manifest.options = json.at("options").dump();
+  std::set<std::string> names;
+  for (const Json& unit : json.at("units")) {
+    manifest.units.push_back(ReadUnit(unit));
+    if (!names.insert(manifest.units.back().name).second) throw Wrong("a unit is named twice");
+  }
+  return manifest;
+}
+
+}  // namespace
+
+std::string ToJson(const Manifest& manifest) {
+  Json json;
+  json[kFormatMember] = kFormatVersion;
+  json["product"] = manifest.product;
+  json["encoder"] = manifest.encoder;
+  json["dataset"] = DatasetJson(manifest.dataset);
+  json["tiles"] = KindJson(manifest.kind, manifest.error_steps);
+  json["min_level"] = manifest.min_level;
+  json["max_level"] = manifest.max_level;
+  json["available"] = AvailableJson(manifest.available);
+  const Json options = Json::parse(manifest.options, nullptr, /*allow_exceptions=*/false);
+  json["options"] = options.is_object() ? options : Json::object();
+  Json& units = json["units"] = Json::array();
+  for (const UnitEntry& unit : manifest.units) {
+    units.push_back({{"name", unit.name},
+                     {"key", fmt::format("{:016x}", unit.key)},
+                     {"tiles", unit.tiles},
+                     {"bytes", unit.bytes},
+                     {"xxh3", unit.xxh3}});
+  }
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Result<Manifest> ParseManifest(std::string_view text) {
+  try {
+    return Read(Json::parse(text));
+  } catch (const Wrong& wrong) {
+    return MakeError(ErrorCode::kInvalidArgument, "the manifest is wrong: {}", wrong.what());
+  } catch (const nlohmann::json::exception& exception) {
+    return MakeError(ErrorCode::kInvalidArgument, "this is no manifest of an archive ({})", exception.what());
+  }
+}
+
+Result<std::string> ManifestIn(std::string_view metadata) {
+  const Json json = Json::parse(metadata, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object() || !json.contains(kManifestMember)) {
+    return MakeError(ErrorCode::kInvalidArgument, "it holds no manifest, so that another program wrote it");
+  }
+  return json.at(kManifestMember).dump();
+}
+
+}  // namespace terrace::archive

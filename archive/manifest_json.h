@@ -1,0 +1,17 @@
+// The manifest as JSON. Also part of the metadata of a single file.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "archive/manifest.h"
+#include "engine/core/result.h"
+
+namespace terrace::archive {
+
+// JSON with the manifest as its member kManifestMember: metadata of a single file.
+inline constexpr const char* kManifestMember = "terrace";
+// kInvalidArgument: the text is no JSON object or has no such member.
+Result<std::string> ManifestIn(std::string_view metadata);
+
+}  // namespace terrace::archive

@@ -1,0 +1,58 @@
+// The header and the directories of PMTiles version 3
+// (https://github.com/protomaps/PMTiles/blob/main/spec/v3/spec.md). Decoding accepts any bytes.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+
+namespace terrace::archive {
+
+inline constexpr std::size_t kHeaderBytes = 127;
+// Header and root directory lie within the first 16 KiB, so that clients read both in one request.
+inline constexpr std::size_t kHeadBytes = 16'384;
+
+enum class PmtilesCompression : std::uint8_t { kUnknown, kNone, kGzip, kBrotli, kZstd };
+enum class PmtilesType : std::uint8_t { kOther, kVector, kPng };
+
+struct Section {
+  std::uint64_t offset = 0, length = 0;
+
+  std::uint64_t end() const { return offset + length; }
+};
+
+struct PmtilesHeader {
+  Section root, metadata, leaves, data;
+  std::uint64_t tiles = 0, entries = 0, contents = 0;
+  PmtilesCompression tile_compression = PmtilesCompression::kNone;
+  PmtilesType type = PmtilesType::kOther;
+  int min_zoom = 0, max_zoom = 0;
+  dem::GeoBounds bounds;  // west < east
+};
+
+std::string EncodeHeader(const PmtilesHeader& header);
+// Accepts what EncodeHeader writes: the sections follow each other without gaps up to `file_bytes`. kInvalidArgument:
+// anything else.
+Result<PmtilesHeader> DecodeHeader(std::string_view bytes, std::uint64_t file_bytes);
+
+struct DirectoryEntry {
+  std::uint64_t tile_id = 0;
+  std::uint64_t offset = 0;
+  std::uint32_t length = 0;
+  std::uint32_t run = 0;  // tiles with these bytes, from tile_id; 0: a leaf directory
+
+  friend bool operator==(const DirectoryEntry&, const DirectoryEntry&) = default;
+};
+
+// Compressed. Precondition: at least one entry, in the order of their ids.
+std::string EncodeDirectory(const std::vector<DirectoryEntry>& entries);
+// Ids rise, runs do not overlap, lengths are above 0, and every entry lies within `leaves` or `data` bytes, as its run
+// says. kInvalidArgument: otherwise.
+Result<std::vector<DirectoryEntry>> DecodeDirectory(std::string_view compressed, std::uint64_t leaves,
+                                                    std::uint64_t data);
+
+}  // namespace terrace::archive

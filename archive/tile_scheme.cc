@@ -1,0 +1,119 @@
+#include "archive/tile_scheme.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "archive/manifest.h"
+#include "archive/manifest_json.h"
+#include "engine/geo/mercator_grid.h"
+#include "proto/documents/tile_json.h"
+
+namespace terrace::archive {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+dem::GeoBounds BoundsOf(const geo::TileKey& key, bool is_mercator) {
+  const auto x = static_cast<double>(key.x), y = static_cast<double>(key.y);
+  if (!is_mercator) {
+    const double side = std::ldexp(180, -key.level);
+    return {x * side - 180, y * side - 90, (x + 1) * side - 180, (y + 1) * side - 90};
+  }
+  const double share = std::ldexp(1, -key.level);
+  return {x * share * 360 - 180, geo::MercatorLatitude((y + 1) * share), (x + 1) * share * 360 - 180,
+          geo::MercatorLatitude(y * share)};
+}
+
+}  // namespace
+
+bool IsInScheme(const geo::TileKey& key, bool is_mercator) {
+  if (!geo::IsValid(key)) return false;
+  return !is_mercator || key.x < geo::TileRows(key.level);
+}
+
+PmtilesKey PmtilesKeyOf(const geo::TileKey& key, bool is_mercator) {
+  return {key.level + (is_mercator ? 0 : 1), static_cast<std::uint64_t>(key.x), static_cast<std::uint64_t>(key.y)};
+}
+
+std::optional<geo::TileKey> TileKeyOf(std::uint64_t tile_id, bool is_mercator) {
+  const std::optional<PmtilesKey> found = KeyOf(tile_id);
+  if (!found) return std::nullopt;
+  const geo::TileKey key{found->zoom - (is_mercator ? 0 : 1), static_cast<std::int64_t>(found->x),
+                         static_cast<std::int64_t>(found->y)};
+  if (!IsInScheme(key, is_mercator)) return std::nullopt;
+  return key;
+}
+
+Result<PmtilesOptions> PmtilesOptionsOf(const tiler::TileRequest& kind, const std::optional<geo::TileKey>& root) {
+  const bool is_mercator = kind.format == tiler::TileFormat::kHeightPng;
+  PmtilesOptions options;
+  if (kind.coding == tiler::Coding::kGzip) {
+    options.compression = PmtilesCompression::kGzip;
+  } else if (kind.coding != tiler::Coding::kIdentity) {
+    return MakeError(ErrorCode::kInvalidArgument, "an archive holds tiles as they are or in gzip, not in {}",
+                     tiler::NameOf(kind.coding));
+  }
+  if (is_mercator) options.type = PmtilesType::kPng;
+  if (root) {
+    options.bounds = BoundsOf(*root, is_mercator);
+  } else if (is_mercator) {
+    options.bounds = BoundsOf({0, 0, 0}, is_mercator);
+  }
+  return options;
+}
+
+std::string_view FormatName(tiler::TileFormat format) {
+  switch (format) {
+    case tiler::TileFormat::kQuantizedMesh:
+      return "quantized-mesh-1.0";
+    case tiler::TileFormat::kGlb:
+      return "glb";
+    case tiler::TileFormat::kHeightPng:
+      return "png";
+  }
+  return "";
+}
+
+std::string_view MediaTypeOf(tiler::TileFormat format) {
+  switch (format) {
+    case tiler::TileFormat::kQuantizedMesh:
+      return "application/vnd.quantized-mesh";
+    case tiler::TileFormat::kGlb:
+      return "model/gltf-binary";
+    case tiler::TileFormat::kHeightPng:
+      return "image/png";
+  }
+  return "";
+}
+
+std::string UnitMetadata(const tiler::TileRequest& kind, std::uint64_t key) {
+  const bool is_mercator = kind.format == tiler::TileFormat::kHeightPng;
+  Json json;
+  json["format"] = FormatName(kind.format);
+  json["media_type"] = MediaTypeOf(kind.format);
+  json["scheme"] = is_mercator ? "xyz" : "tms";
+  json["projection"] = is_mercator ? "EPSG:3857" : "EPSG:4326";
+  if (is_mercator) json["encoding"] = proto::ToString(kind.height_encoding);
+  if (is_mercator) json["tileSize"] = kind.height_size;
+  json[kManifestMember] = {{"terrace_archive", kFormatVersion}, {"key", fmt::format("{:016x}", key)}};
+  return json.dump();
+}
+
+std::optional<std::uint64_t> UnitKeyIn(std::string_view metadata) {
+  const Json json = Json::parse(metadata, nullptr, /*allow_exceptions=*/false);
+  if (!json.is_object()) return std::nullopt;
+  const auto own = json.find(kManifestMember);
+  if (own == json.end() || !own->is_object()) return std::nullopt;
+  const auto key = own->find("key");
+  if (key == own->end() || !key->is_string()) return std::nullopt;
+  const auto& text = key->get_ref<const std::string&>();
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+}  // namespace terrace::archive

@@ -1,0 +1,57 @@
+// Writes one unit of an archive: one PMTiles file.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "archive/manifest.h"
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::archive {
+
+struct UnitSummary {
+  std::uint64_t tiles = 0;
+  std::uint64_t bytes = 0;  // of the file
+  std::string xxh3;         // XXH3-128 of the file, 32 hexadecimal digits
+
+  friend bool operator==(const UnitSummary&, const UnitSummary&) = default;
+};
+
+// Used by one thread at a time. The same tiles make the same bytes, in whatever order they were added.
+// Destroyed without Finish: removes what it wrote. A process that is killed leaves files that end with ".partial",
+// which the next writer of the same unit replaces, and which readers ignore.
+class TileWriter {
+ public:
+  virtual ~TileWriter() = default;
+
+  // `tile`: in the coding of the archive's kind. Its bytes, errors and counts are stored. `range`:
+  // DemSource::RangeBound of the tile; not used for height tiles. kInvalidArgument: the tile lies outside the unit.
+  // kUnavailable: the disk cannot be written, for example because it is full.
+  virtual Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange& range) = 0;
+
+  // Writes the file and renames it. Call it once, last; the file is complete and on the disk afterwards. Without tiles
+  // no file is written, and an old one is removed. kUnavailable: as Add.
+  // kInvalidArgument: a tile was added twice.
+  virtual Result<UnitSummary> Finish() = 0;
+};
+
+struct UnitOptions {
+  tiler::TileRequest kind;  // Manifest::kind
+  std::uint64_t key = 0;    // UnitEntry::key; kept in the file
+};
+
+// Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 60 bytes for
+// each.
+Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const std::string& name,
+                                               const UnitOptions& options);
+
+// Reads a finished file in full: every checksum, and whether it has this key. For going on with a bake. kNotFound: no
+// file. kInvalidArgument: another key, or damaged: bake it again.
+Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, std::uint64_t key);
+
+}  // namespace terrace::archive

@@ -1,0 +1,339 @@
+#include "bake/baker.h"
+
+#include <xxhash.h>
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <list>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "archive/tile_writer.h"
+#include "bake/copy_unit.h"
+#include "bake/order.h"
+#include "bake/unit_key.h"
+
+namespace terrace::bake {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int kMaxAttempts = 3;
+
+double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
+// A unit that is being baked.
+class OpenUnit {
+ public:
+  struct Output {
+    std::size_t target = 0;
+    std::uint64_t key = 0;
+    std::unique_ptr<archive::TileWriter> writer = {};
+    std::unique_ptr<std::mutex> mutex = std::make_unique<std::mutex>();  // of the writer
+  };
+
+  std::size_t index = 0;  // in the plan
+  std::vector<Output> outputs;
+  Clock::time_point start = Clock::now();
+  // Of the scheduler's mutex.
+  std::deque<Part> parts;  // not begun
+  int under_way = 0;       // parts
+  std::optional<Error> error;
+};
+
+class Run {
+ public:
+  Run(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets, const UnitPlan& plan,
+      const BakeOptions& options, Counters& counters)
+      : pipeline_(pipeline),
+        dataset_(pipeline.datasets().front()),
+        targets_(targets),
+        plan_(plan),
+        options_(options),
+        counters_(counters),
+        reports_(plan.units.size()),
+        attempts_(plan.units.size()) {
+    for (std::size_t i = 0; i < plan.units.size(); ++i) pending_.push_back(i);
+  }
+
+  std::vector<UnitReport> Do() {
+    {
+      const std::stop_callback wake(options_.stop, [this] {
+        const std::lock_guard lock(mutex_);
+        changed_.notify_all();
+      });
+      std::vector<std::jthread> threads;
+      for (unsigned i = 0; i < options_.threads; ++i) threads.emplace_back([this] { Work(); });
+    }
+    std::vector<UnitReport> all;
+    for (auto& of_unit : reports_) std::ranges::move(of_unit, std::back_inserter(all));
+    return all;
+  }
+
+ private:
+  using UnitPtr = std::shared_ptr<OpenUnit>;
+
+  // A thread opens units of its own as long as there are any, so that threads do not decode the same blocks. Then it
+  // takes parts of the others' units.
+  void Work() {
+    UnitPtr own;
+    while (!options_.stop.stop_requested()) {
+      std::unique_lock lock(mutex_);
+      if (own && own->parts.empty()) own = nullptr;
+      UnitPtr unit = own;
+      if (!unit && !pending_.empty()) {
+        const std::size_t index = pending_.front();
+        pending_.pop_front();
+        ++opening_;
+        lock.unlock();
+        own = Open(index);
+        lock.lock();
+        --opening_;
+        if (own) open_.push_back(own);
+        changed_.notify_all();
+        continue;
+      }
+      if (!unit) unit = UnitToHelp();
+      if (!unit) {
+        if (open_.empty() && opening_ == 0 && pending_.empty()) return;
+        changed_.wait(lock);
+        continue;
+      }
+      // The owner begins at the front, helpers at the back: far from each other.
+      Part part;
+      if (unit == own) {
+        part = unit->parts.front();
+        unit->parts.pop_front();
+      } else {
+        part = unit->parts.back();
+        unit->parts.pop_back();
+      }
+      ++unit->under_way;
+      lock.unlock();
+      const Result<void> done = BakePart(*unit, part);
+      lock.lock();
+      --unit->under_way;
+      if (!done) {
+        unit->parts.clear();
+        if (!unit->error) unit->error = done.error();
+      }
+      if (!unit->parts.empty() || unit->under_way > 0) continue;
+      lock.unlock();
+      Close(*unit);
+      lock.lock();
+      open_.remove(unit);
+      changed_.notify_all();
+    }
+  }
+
+  UnitPtr UnitToHelp() const {
+    const auto most = std::ranges::max_element(open_, {}, [](const UnitPtr& unit) { return unit->parts.size(); });
+    return most == open_.end() || (*most)->parts.empty() ? nullptr : *most;
+  }
+
+  // Finds which files of the unit are there; creates the others. Null: nothing is left to do, or it failed.
+  UnitPtr Open(std::size_t index) {
+    const UnitPlan::Of& of = plan_.units[index];
+    WaitBefore(attempts_[index]);
+    auto unit = std::make_shared<OpenUnit>();
+    unit->index = index;
+    for (const std::size_t target : of.targets) {
+      if (options_.stop.stop_requested()) return nullptr;
+      if (HasReport(index, target)) continue;
+      const Target& to = targets_[target];
+      const std::uint64_t key = UnitKey(dataset_, to.manifest, of.unit);
+      if (TakeFinished(index, target, key)) continue;
+      if (options_.only_verify) {
+        Report(index, {target, {of.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
+        continue;
+      }
+      auto writer = archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
+      if (!writer) {
+        unit->outputs.push_back({target, key});
+        unit->error = writer.error();
+        continue;
+      }
+      unit->outputs.push_back({target, key, *std::move(writer)});
+    }
+    if (unit->error) {
+      Close(*unit);
+      return nullptr;
+    }
+    if (unit->outputs.empty()) return nullptr;
+    for (const Part& part : PartsOf(of.unit)) unit->parts.push_back(part);
+    return unit;
+  }
+
+  // Disks that are full and file servers that are away may come back.
+  void WaitBefore(int attempt) {
+    if (attempt == 0) return;
+    constexpr std::chrono::milliseconds kPause{500};
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any().wait_for(lock, options_.stop, kPause * attempt, [] { return false; });
+  }
+
+  // A file that is there with this key, or a copy from the old archive.
+  bool TakeFinished(std::size_t index, std::size_t target, std::uint64_t key) {
+    const Clock::time_point start = Clock::now();
+    const Target& to = targets_[target];
+    const std::string& name = plan_.units[index].unit.name;
+    UnitOutcome outcome = UnitOutcome::kKept;
+    auto summary = archive::VerifyUnit(to.place, name, key);
+    const auto old = to.old_units.find(name);
+    if (!summary && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
+      outcome = UnitOutcome::kCopied;
+      summary = CopyUnit(to.old_place, to.place, old->second);
+    }
+    if (!summary) return false;
+    counters_.passed += summary->tiles;
+    Report(index,
+           {target, {name, key, summary->tiles, summary->bytes, summary->xxh3}, outcome, SecondsSince(start), {}});
+    return true;
+  }
+
+  Result<void> BakePart(OpenUnit& unit, const Part& part) {
+    Result<void> done;
+    Walk(plan_.units[unit.index].unit.tiles, part, [&](const geo::TileKey& key) {
+      done = BakeTile(unit, key);
+      return done.has_value();
+    });
+    return done;
+  }
+
+  Result<void> BakeTile(OpenUnit& unit, const geo::TileKey& key) {
+    std::optional<dem::HeightRange> range;
+    for (OpenUnit::Output& output : unit.outputs) {
+      const tiler::TileRequest request = RequestOf(targets_[output.target].manifest, key);
+      const Result<tiler::EncodedTile> tile = pipeline_.Build(request, options_.stop);
+      if (!tile) return tl::unexpected(tile.error());
+      if (!range) {
+        range = request.format == tiler::TileFormat::kHeightPng ? dem::HeightRange() : dataset_.source->RangeBound(key);
+      }
+      {
+        const std::lock_guard lock(*output.mutex);
+        if (auto added = output.writer->Add(key, *tile, *range); !added) return added;
+      }
+      ++counters_.tiles;
+      counters_.bytes += tile->bytes.size();
+      counters_.read += static_cast<std::uint64_t>(tile->times.read.count());
+      counters_.refine += static_cast<std::uint64_t>(tile->times.refine.count());
+      counters_.encode += static_cast<std::uint64_t>(tile->times.encode.count());
+      counters_.compress += static_cast<std::uint64_t>(tile->times.compress.count());
+    }
+    return {};
+  }
+
+  // After the last part: finishes the files, or drops them.
+  void Close(OpenUnit& unit) {
+    const std::string& name = plan_.units[unit.index].unit.name;
+    for (OpenUnit::Output& output : unit.outputs) {
+      if (unit.error || options_.stop.stop_requested()) {
+        output.writer = nullptr;  // removes its file
+        continue;
+      }
+      auto summary = output.writer->Finish();
+      output.writer = nullptr;
+      if (!summary) {
+        unit.error = summary.error();
+        continue;
+      }
+      Report(unit.index, {output.target,
+                          {name, output.key, summary->tiles, summary->bytes, summary->xxh3},
+                          UnitOutcome::kBaked,
+                          SecondsSince(unit.start),
+                          {}});
+    }
+    if (!unit.error || options_.stop.stop_requested()) return;
+    const std::lock_guard lock(mutex_);
+    // A changed file stays changed for this process: it fails a second time.
+    const int limit = unit.error->code == ErrorCode::kChanged ? kMaxAttempts - 1 : kMaxAttempts;
+    if (++attempts_[unit.index] < limit) {
+      pending_.push_back(unit.index);
+      return;
+    }
+    for (OpenUnit::Output& output : unit.outputs) {
+      if (HasReportLocked(unit.index, output.target)) continue;
+      ReportLocked(unit.index, {output.target,
+                                {name, output.key, 0, 0, {}},
+                                UnitOutcome::kFailed,
+                                SecondsSince(unit.start),
+                                unit.error->message});
+    }
+  }
+
+  bool HasReportLocked(std::size_t index, std::size_t target) const {
+    return std::ranges::find(reports_[index], target, &UnitReport::target) != reports_[index].end();
+  }
+  bool HasReport(std::size_t index, std::size_t target) {
+    const std::lock_guard lock(mutex_);
+    return HasReportLocked(index, target);
+  }
+  void ReportLocked(std::size_t index, UnitReport report) {
+    ++counters_.units;
+    if (options_.on_unit) options_.on_unit(report);
+    reports_[index].push_back(std::move(report));
+  }
+  void Report(std::size_t index, UnitReport report) {
+    const std::lock_guard lock(mutex_);
+    ReportLocked(index, std::move(report));
+  }
+
+  const tiler::TilePipeline& pipeline_;
+  const tiler::Dataset& dataset_;
+  const std::vector<Target>& targets_;
+  const UnitPlan& plan_;
+  const BakeOptions& options_;
+  Counters& counters_;
+
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<std::size_t> pending_;  // units that no thread has opened
+  std::list<UnitPtr> open_;
+  int opening_ = 0;
+  std::vector<std::vector<UnitReport>> reports_;  // by unit
+  std::vector<int> attempts_;                     // that failed, by unit
+};
+
+}  // namespace
+
+bool Shard::Has(const std::string& unit) const {
+  return count <= 1 || XXH3_64bits(unit.data(), unit.size()) % count == index;
+}
+
+UnitPlan UnitPlan::Make(const std::vector<Target>& targets, const Shard& shard) {
+  UnitPlan plan;
+  std::vector<bool> is_planned(targets.size());
+  for (std::size_t first = 0; first < targets.size(); ++first) {
+    if (is_planned[first]) continue;
+    const archive::Manifest& manifest = targets[first].manifest;
+    const auto is_mercator = [](const archive::Manifest& of) {
+      return of.kind.format == tiler::TileFormat::kHeightPng;
+    };
+    std::vector<std::size_t> together;
+    for (std::size_t i = first; i < targets.size(); ++i) {
+      const archive::Manifest& other = targets[i].manifest;
+      if (is_planned[i] || is_mercator(other) != is_mercator(manifest) || other.available != manifest.available)
+        continue;
+      is_planned[i] = true;
+      together.push_back(i);
+    }
+    for (Unit& unit : UnitsOf(manifest.available)) {
+      if (!shard.Has(unit.name)) continue;
+      plan.tiles += CountTiles(unit.tiles) * together.size();
+      plan.files += together.size();
+      plan.units.push_back({std::move(unit), together});
+    }
+  }
+  return plan;
+}
+
+std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
+                             const UnitPlan& plan, const BakeOptions& options, Counters& counters) {
+  return Run(pipeline, targets, plan, options, counters).Do();
+}
+
+}  // namespace terrace::bake

@@ -1,0 +1,93 @@
+// Bakes the units of archives on several threads.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "archive/manifest.h"
+#include "bake/units.h"
+#include "engine/core/result.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::bake {
+
+// An archive to be made.
+struct Target {
+  std::string place;
+  archive::Manifest manifest;  // without units
+  // The archive that units with equal keys are taken from; its folder and its units by name.
+  std::string old_place = {};
+  std::map<std::string, archive::UnitEntry> old_units = {};
+};
+
+// One process of several that share a bake.
+struct Shard {
+  std::uint32_t index = 0, count = 1;
+
+  // By a hash of the name, so that the units of a region are dealt out evenly.
+  bool Has(const std::string& unit) const;
+};
+
+enum class UnitOutcome : std::uint8_t {
+  kBaked,
+  kKept,    // its file was there already
+  kCopied,  // taken from the old archive
+  kFailed,
+  kMissing,  // not there, and not to be baked
+};
+
+// A unit of one archive, done or given up.
+struct UnitReport {
+  std::size_t target = 0;
+  archive::UnitEntry entry;  // of a failed unit only name and key
+  UnitOutcome outcome = UnitOutcome::kBaked;
+  double seconds = 0;
+  std::string message;  // of a failed unit: why
+};
+
+// What is done so far, for a display. Of all archives.
+struct Counters {
+  std::atomic<std::uint64_t> tiles{0};   // built by this process
+  std::atomic<std::uint64_t> bytes{0};   // of these tiles
+  std::atomic<std::uint64_t> passed{0};  // tiles of units that were kept or copied
+  std::atomic<std::uint64_t> units{0};   // done or given up
+  // Microseconds of all threads, by stage.
+  std::atomic<std::uint64_t> read{0}, refine{0}, encode{0}, compress{0};
+};
+
+struct BakeOptions {
+  unsigned threads = 1;
+  Shard shard = {};
+  bool only_verify = false;  // bake nothing: units that are not there are kMissing
+  // Called for each unit, one call at a time. May be empty.
+  std::function<void(const UnitReport&)> on_unit = {};
+  std::stop_token stop = {};
+};
+
+// Units by the trees that they share: formats with the same scheme and tiles are baked together, so that each tile is
+// read and refined once.
+struct UnitPlan {
+  struct Of {
+    Unit unit;
+    std::vector<std::size_t> targets;
+  };
+  std::vector<Of> units;
+  std::uint64_t tiles = 0, files = 0;  // of all archives
+
+  static UnitPlan Make(const std::vector<Target>& targets, const Shard& shard);
+};
+
+// Bakes every unit that is not there yet. A unit that fails is tried again later, and given up after the third time;
+// the others are baked. Returns the reports in the order of the plan. Stopped: the units that were not finished leave
+// no files and have no reports. The files do not depend on the number of threads, nor on interruptions.
+std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
+                             const UnitPlan& plan, const BakeOptions& options, Counters& counters);
+
+}  // namespace terrace::bake

@@ -1,0 +1,36 @@
+// What a bake will take, from a few tiles of its own.
+#pragma once
+
+#include <cstdint>
+#include <stop_token>
+#include <vector>
+
+#include "bake/baker.h"
+#include "engine/core/result.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::bake {
+
+struct LevelEstimate {
+  int level = 0;
+  std::uint64_t tiles = 0;    // of all archives
+  double bytes_per_tile = 0;  // mean of the samples, or assumed
+  double milliseconds_per_tile = 0;
+};
+
+struct Estimate {
+  std::vector<LevelEstimate> levels;
+  std::uint64_t tiles = 0, files = 0;
+  std::uint64_t units = 0;    // of these the top and those that reach below their first level
+  std::uint64_t sampled = 0;  // tiles that were built for it
+  double bytes = 0, core_hours = 0;
+};
+
+// Builds some tiles of each level, in groups of neighbours as the bake does. kCancelled: stopped. Errors of tiles.
+Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
+                              const UnitPlan& plan, const std::stop_token& stop);
+
+// From figures that are the same for every tile.
+Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double milliseconds_per_tile);
+
+}  // namespace terrace::bake

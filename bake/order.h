@@ -1,0 +1,41 @@
+// What a bake is asked for, and the archives that it makes: their kinds, levels and tiles.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "archive/manifest.h"
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "proto/media_type.h"
+#include "tiler/requested_error.h"
+#include "tiler/tile_pipeline.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::bake {
+
+struct Order {
+  std::vector<tiler::TileFormat> formats = {tiler::TileFormat::kQuantizedMesh};
+  std::optional<std::pair<int, int>> levels = {};  // first and last; nothing: all
+  std::optional<dem::GeoBounds> bbox = {};         // tiles that overlap it, and their siblings; nothing: all
+  tiler::RequestedError requested = {};
+  // Of quantized-mesh. Nothing: normals, and the water mask where the dataset has one.
+  std::optional<proto::TileExtensions> extensions = {};
+};
+
+// The manifests of the archives, one for each format, without units. `product`: name and version of the program.
+// kInvalidArgument: levels that the dataset does not have, an empty area, extensions that it does not have; the message
+// names what would be right.
+Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const Order& order,
+                                                    const std::string& product);
+
+// Restricts the tiles of a dataset to those that overlap `bbox` and their siblings. Both roots stay.
+std::vector<std::vector<geo::TileRange>> TilesWithin(const std::vector<std::vector<geo::TileRange>>& available,
+                                                     const dem::GeoBounds& bbox);
+
+// How one tile of an archive is asked for.
+tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileKey& key);
+
+}  // namespace terrace::bake

@@ -1,0 +1,54 @@
+// The place of a bake: a folder that holds this bake, finished or not, or nothing.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "archive/manifest.h"
+#include "engine/core/result.h"
+
+namespace terrace::bake {
+
+// The folder of an archive: the place itself if it is the only one, else archive::FolderOf below it.
+std::string ArchivePlace(const std::string& place, const archive::Manifest& manifest, bool is_only);
+
+// The place is for this process until the object is destroyed.
+class PlaceLock {
+ public:
+  // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. kUnavailable: it cannot be
+  // created or written. kOverloaded: another bake works there; the message says which and what to do. The lock of a
+  // process of this host that has ended is taken over.
+  static Result<PlaceLock> Take(const std::string& place, const std::string& shard);
+  PlaceLock(PlaceLock&& other) noexcept;
+  PlaceLock& operator=(PlaceLock&&) = delete;
+  ~PlaceLock();
+
+ private:
+  explicit PlaceLock(std::string file) : file_(std::move(file)) {}
+
+  std::string file_;  // empty: moved away
+};
+
+// What a bake is of, as far as it must not change between its runs. Sources may: their units are made again.
+struct BakeIdentity {
+  struct Field {
+    std::string what, value;
+  };
+  std::vector<Field> fields;  // "dataset", "format", "levels" ...
+};
+
+// As Manifest::options.
+std::string ToJson(const BakeIdentity& identity);
+
+// Whether the place can take this bake: it is empty, holds an unfinished bake of the same identity, or is this very
+// bake
+// (`generation`), finished. Notes the identity there. kInvalidArgument: it holds something else, or another bake; the
+// message says what differs and what to do. kUnavailable: it cannot be read or written.
+Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
+
+// Removes what only an unfinished bake needs: the identity, and leftovers of units that were interrupted.
+void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
+
+}  // namespace terrace::bake

@@ -1,0 +1,91 @@
+#include "bake/unit_key.h"
+
+#include <algorithm>
+
+#include "bake/order.h"
+#include "engine/dem/common/content_hash.h"
+#include "engine/dem/planned_tiles.h"
+#include "engine/geo/mercator_grid.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::bake {
+namespace {
+
+// A layout of the units' files or of this key that differs from an older one.
+constexpr int kKeyVersion = 1;
+
+void AddRanges(dem::ContentHasher& hasher, const std::vector<geo::TileRange>& ranges) {
+  hasher.Add(std::uint64_t{ranges.size()});
+  for (const geo::TileRange& range : ranges) {
+    for (const std::int64_t edge : {range.start_x, range.start_y, range.end_x, range.end_y}) hasher.Add(edge);
+  }
+}
+
+void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
+  for (const int value :
+       {static_cast<int>(kind.format), static_cast<int>(kind.compression), static_cast<int>(kind.texture),
+        static_cast<int>(kind.coding), static_cast<int>(kind.height_encoding), kind.height_size}) {
+    hasher.Add(value);
+  }
+  for (const bool value : {kind.normals, kind.water_mask, kind.metadata}) hasher.Add(value);
+}
+
+// The sources of height tiles. A geodetic tile of the level above the unit's is as wide as the unit, and is read at
+// least as coarsely.
+void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source, const geo::TileKey& root) {
+  const double tiles = static_cast<double>(std::int64_t{1} << root.level);
+  const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / tiles; };
+  // A pixel more on each side, which interpolation may need.
+  const double slack = 360 / tiles / 256;
+  const dem::GeoBounds box{share(root.x) * 360 - 180, std::max(-90.0, geo::MercatorLatitude(share(root.y + 1)) - slack),
+                           share(root.x + 1) * 360 - 180, std::min(90.0, geo::MercatorLatitude(share(root.y)) + slack)};
+  const int level = root.level - 1;
+  for (const geo::TileRange& range : dem::TilesOverlapping(box, level)) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x - 1; x <= range.end_x + 1; ++x) {
+        hasher.Add(source.ContentBelow({level, dem::FloorMod(x, geo::TileColumns(level)), y}, level));
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& manifest, const Unit& unit) {
+  const dem::DemSource& source = *dataset.source;
+  dem::ContentHasher hasher;
+  hasher.Add(kKeyVersion);
+  hasher.Add(archive::kFormatVersion);
+  hasher.AddText(manifest.encoder);
+  hasher.Add(dataset.options);
+  AddKind(hasher, manifest.kind);
+  const int last = static_cast<int>(unit.tiles.size()) - 1;
+  for (int level = 0; level <= last; ++level) {
+    const auto& ranges = unit.tiles[static_cast<std::size_t>(level)];
+    AddRanges(hasher, ranges);
+    if (!ranges.empty()) hasher.Add(RequestOf(manifest, {level, 0, 0}).error_step);
+  }
+  if (!unit.root) {
+    hasher.Add(source.fingerprint());
+  } else if (manifest.kind.format == tiler::TileFormat::kHeightPng) {
+    AddMercatorContent(hasher, source, *unit.root);
+  } else {
+    hasher.Add(source.ContentBelow(*unit.root, last));
+    if (manifest.kind.metadata) {
+      // Metadata lists the dataset's tiles below a tile.
+      for (int level = unit.root->level; level <= source.max_level(); ++level) {
+        const int down = level - unit.root->level;
+        const geo::TileRange below{unit.root->x << down, unit.root->y << down, ((unit.root->x + 1) << down) - 1,
+                                   ((unit.root->y + 1) << down) - 1};
+        std::vector<geo::TileRange> parts;
+        for (const geo::TileRange& range : source.Available(level)) {
+          if (const auto common = geo::Common(range, below); !geo::IsEmpty(common)) parts.push_back(common);
+        }
+        AddRanges(hasher, parts);
+      }
+    }
+  }
+  return hasher.Hash().low;
+}
+
+}  // namespace terrace::bake

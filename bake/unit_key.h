@@ -1,0 +1,17 @@
+// The keys of units: equal keys mean equal files.
+#pragma once
+
+#include <cstdint>
+
+#include "archive/manifest.h"
+#include "bake/units.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::bake {
+
+// Hashes all that the bytes of a unit's file depend on: the contents of the sources within reach of its tiles
+// (DemSource::ContentBelow), the options of the dataset, the encoders, the kind of tiles, their errors, and which tiles
+// there are. The top unit depends on all sources.
+std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& manifest, const Unit& unit);
+
+}  // namespace terrace::bake

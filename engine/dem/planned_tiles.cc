@@ -1,0 +1,37 @@
+#include "engine/dem/planned_tiles.h"
+
+#include <algorithm>
+
+#include "engine/dem/crs/footprint.h"
+#include "engine/dem/crs/level_plan.h"
+#include "engine/dem/mosaic/availability.h"
+
+namespace terrace::dem {
+
+std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level) {
+  return TilesTouching(Footprint::Of(box), level);
+}
+
+std::optional<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {
+  const Footprint first = Footprint::Of(a), second = Footprint::Of(b);
+  const double south = std::max(first.south, second.south), north = std::min(first.north, second.north);
+  if (south >= north) return std::nullopt;
+  for (const double turn : {0.0, -360.0, 360.0}) {
+    const double west = std::max(first.west, second.west + turn), east = std::min(first.east, second.east + turn);
+    if (west >= east) continue;
+    return GeoBounds{west > 180 ? west - 360 : west, south, east > 180 ? east - 360 : east, north};
+  }
+  return std::nullopt;
+}
+
+std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRaster> rasters, double error_fraction) {
+  std::vector<Reach> reaches;
+  for (const PlannedRaster& raster : rasters) {
+    SourceSpacing spacing;
+    spacing.finer = std::min(raster.east, raster.north);
+    reaches.push_back({Footprint::Of(raster.bounds), DeepestLevel(spacing, error_fraction, std::nullopt)});
+  }
+  return AvailableTiles(reaches);
+}
+
+}  // namespace terrace::dem

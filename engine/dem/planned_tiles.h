@@ -1,0 +1,29 @@
+// The tiles of areas, and of sources that are only planned. Opens no rasters.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::dem {
+
+// The tiles of a level that overlap a box, as one range, or two across the antimeridian. Sharing only an edge is no
+// overlap.
+std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level);
+
+// The intersection of two boxes that do not surround each other's gap; nothing if they do not overlap.
+std::optional<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
+
+// A raster as far as it decides which tiles exist.
+struct PlannedRaster {
+  GeoBounds bounds;
+  double east = 0, north = 0;  // metres on the ground between samples
+};
+
+// DemSource::Availability of a dataset of these rasters. Precondition: not empty.
+std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRaster> rasters, double error_fraction);
+
+}  // namespace terrace::dem

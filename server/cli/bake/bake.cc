@@ -1,0 +1,163 @@
+// terrace bake: builds all tiles of a dataset ahead of requests.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/options/options.h"
+#include "server/cli/bake/bake_arguments.h"
+#include "server/cli/bake/bake_run.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/option_flags.h"
+
+namespace terrace::cli {
+namespace {
+
+constexpr const char* kWhat = "What is baked";
+constexpr const char* kHow = "How it is baked";
+constexpr const char* kPlanning = "Planning";
+
+CLI::Validator NumberAbove0(const std::string& what) {
+  const auto check = [=](const std::string& text) {
+    double number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number > 0 && number <= 1e9;
+    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", what, text);
+  };
+  return CLI::Validator(check, "");
+}
+
+CLI::Validator OneForm() {
+  const auto check = [](const std::string& text) {
+    const bool valid = text == kChunks || text == kFolder || text == kSingle;
+    return valid ? std::string() : fmt::format("must be chunks, folder or single, not \"{}\"", text);
+  };
+  return CLI::Validator(check, "");
+}
+
+void AddWhat(CLI::App& command, BakeArguments& arguments) {
+  command.add_option("DEM", arguments.dems,
+                     "Rasters that GDAL can read, or folders of them; together they are one dataset, and where they "
+                     "overlap, the first that has a height counts");
+  command.add_option("--config", arguments.config, "A configuration as for terrace serve, instead of DEMs")
+      ->type_name("FILE");
+  command.add_option("--dataset", arguments.dataset, "The dataset of the configuration that is baked")
+      ->type_name("NAME");
+  command.add_option("-o,--out", arguments.out, "Where the bake goes: a folder, or for --form single a file")
+      ->type_name("PLACE");
+  command
+      .add_option("--form", arguments.form,
+                  "chunks: files of a few thousand tiles, for terrace serve and updates; folder: a file a tile, for "
+                  "static hosts; single: one PMTiles file")
+      ->check(OneForm())
+      ->type_name("chunks|folder|single")
+      ->capture_default_str()
+      ->group(kWhat);
+  command.add_option("--format", arguments.format, "terrain, glb or png; several with commas share the work")
+      ->type_name("FORMAT")
+      ->capture_default_str()
+      ->group(kWhat);
+  command.add_option("--levels", arguments.levels, "The first and the last level; by default all")
+      ->type_name("A-B")
+      ->group(kWhat);
+  command.add_option("--bbox", arguments.bbox, "Only tiles that overlap this area, in degrees, and their siblings")
+      ->type_name("W,S,E,N")
+      ->group(kWhat);
+  command
+      .add_option("--error", arguments.error,
+                  "The error of deep levels; shallow levels keep their larger default (?error=M&atleast=1)")
+      ->check(NumberAbove0("a number of metres above 0"))
+      ->type_name("METRES")
+      ->group(kWhat);
+  command
+      .add_option("--fraction", arguments.fraction, "The error of every level, as a share of what clients assume there")
+      ->check(NumberAbove0("a number above 0"))
+      ->type_name("SHARE")
+      ->group(kWhat);
+  command
+      .add_option("--extensions", arguments.extensions,
+                  "Of terrain tiles: octvertexnormals, watermask, metadata, several with commas, or none; by default "
+                  "normals, and the water mask where the dataset has one")
+      ->type_name("NAMES")
+      ->group(kWhat);
+}
+
+void AddHow(CLI::App& command, BakeArguments& arguments) {
+  const auto whole = [](const std::string& text) {
+    unsigned number = 0;
+    const bool valid = CLI::detail::lexical_cast(text, number) && number >= 1 && number <= 1024;
+    return valid ? std::string() : fmt::format("must be a number from 1 to 1024, not \"{}\"", text);
+  };
+  command.add_option("--threads", arguments.threads, "By default one for each processor; the files are the same")
+      ->check(CLI::Validator(whole, ""))
+      ->type_name("N")
+      ->group(kHow);
+  command.add_option("--shard", arguments.shard, "Bakes one of N parts, 0 to N-1, into the same place as the others")
+      ->type_name("I/N")
+      ->group(kHow);
+  command
+      .add_flag("--finish", arguments.finish, "Bakes nothing: checks all files, and writes the manifest after shards")
+      ->group(kHow);
+  command
+      .add_option("--update", arguments.update,
+                  "An older bake in chunks: what did not change is copied from it, the rest is baked")
+      ->type_name("PLACE")
+      ->group(kHow);
+  command.add_flag("--json", arguments.json, "Prints one line of JSON for each file, and a summary")->group(kHow);
+  command.add_flag("--yes", arguments.yes, "Bakes more than 1,000,000,000 tiles without asking")->group(kHow);
+  command
+      .add_flag("--dry-run", arguments.dry_run,
+                "Bakes nothing: tells levels, tiles, files, bytes and core-hours, from a few tiles that are built")
+      ->group(kPlanning);
+  command
+      .add_option("--catalogue", arguments.catalogue,
+                  "With --dry-run, instead of DEMs: a list of one-degree cells such as N46E008, one a line")
+      ->type_name("FILE")
+      ->group(kPlanning);
+  command.add_option("--arc-seconds", arguments.arc_seconds, "Of the catalogue: between samples, from south to north")
+      ->check(NumberAbove0("a number above 0"))
+      ->capture_default_str()
+      ->type_name("S")
+      ->group(kPlanning);
+  command.add_option("--bytes-per-tile", arguments.bytes_per_tile, "Assumed for the catalogue")
+      ->check(NumberAbove0("a number above 0"))
+      ->capture_default_str()
+      ->type_name("N")
+      ->group(kPlanning);
+  command.add_option("--ms-per-tile", arguments.milliseconds_per_tile, "Assumed for the catalogue")
+      ->check(NumberAbove0("a number above 0"))
+      ->capture_default_str()
+      ->type_name("MS")
+      ->group(kPlanning);
+}
+
+}  // namespace
+
+void AddBake(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<BakeArguments>();
+  CLI::App* command = app.add_subcommand("bake", "Builds all tiles of a dataset ahead, for static hosts and archives")
+                          ->group(kCommands);
+  command->footer(
+      "Examples:\n"
+      "  terrace bake alps.tif --out alps\n"
+      "  terrace bake alps.tif --out alps-static --form folder --levels 0-12\n"
+      "  terrace bake --config terrace.json --dataset maui --out maui --format terrain,glb\n"
+      "  terrace bake alps.tif --out alps-2 --update alps\n"
+      "  terrace bake alps.tif --dry-run\n\n"
+      "A bake that was interrupted goes on when the same command is run again: finished files are checked and\n"
+      "kept. The manifest is written last. Exit codes: 0 complete; 1 files failed or are missing, and are listed;\n"
+      "2 wrong arguments; 130 or 143 stopped by a signal.");
+  AddWhat(*command, *arguments);
+  AddHow(*command, *arguments);
+  std::vector<config::OptionInfo> about_dataset = config::DatasetOptions();
+  std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked"; });
+  AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);
+  std::vector<config::OptionInfo> about_cache = config::ServerOptions();
+  std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
+  AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
+  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Bake(*arguments)); });
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,44 @@
+// The arguments of `terrace bake`, and what they mean.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "bake/baker.h"
+#include "bake/order.h"
+#include "config/config.h"
+#include "engine/core/result.h"
+
+namespace terrace::cli {
+
+inline constexpr const char* kChunks = "chunks";
+inline constexpr const char* kFolder = "folder";
+inline constexpr const char* kSingle = "single";
+
+struct BakeArguments {
+  std::vector<std::string> dems;
+  std::string config, dataset;
+  std::string out, form = kChunks, update;
+  std::string format = "terrain", levels, bbox, extensions;  // as written; empty: not given
+  double error = 0, fraction = 0;                            // 0: not given
+  unsigned threads = 0;                                      // 0: one for each processor
+  std::string shard;
+  bool finish = false, dry_run = false, json = false, yes = false;
+  std::string catalogue;
+  double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
+  std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
+};
+
+// kInvalidArgument: the message names the flag and what would be right. Checks what needs no source.
+Result<bake::Order> OrderOf(const BakeArguments& arguments);
+Result<bake::Shard> ShardOf(const std::string& text);
+
+// The dataset, and the configuration of the program: of a file, or of DEMs that form one dataset. All errors.
+struct BakeInput {
+  config::Config config;
+  config::DatasetConfig dataset;
+};
+Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::ConfigError>& errors);
+
+}  // namespace terrace::cli

@@ -1,0 +1,19 @@
+// The forms of a bake other than chunks.
+#pragma once
+
+#include <stop_token>
+#include <string>
+
+#include "engine/core/result.h"
+#include "server/cli/bake/bake_arguments.h"
+
+namespace terrace::cli {
+
+// kInvalidArgument: something is there.
+Result<void> CheckExportPlace(const std::string& out);
+
+// Writes the form that the arguments name to their `out`, from a finished bake, and removes the bake. kUnavailable: the
+// place cannot be written. kCancelled: stopped.
+Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop);
+
+}  // namespace terrace::cli

@@ -1,0 +1,335 @@
+#include "server/cli/bake/bake_run.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <sstream>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "bake/catalogue.h"
+#include "bake/estimate.h"
+#include "bake/place.h"
+#include "engine/core/plain_number.h"
+#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "engine/dem/statistics/cache_folder.h"
+#include "server/cli/bake/bake_display.h"
+#include "server/cli/bake/bake_export.h"
+#include "server/cli/bake/stop_signals.h"
+#include "server/cli/common/command.h"
+#include "server/cli/common/open_cache.h"
+#include "server/cli/common/open_dataset.h"
+#include "server/cli/common/progress.h"
+#include "server/cli/common/source_files.h"
+#include "tiler/encoder_version.h"
+
+namespace terrace::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+int Fail(const Error& error) {
+  return cli::Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
+}
+
+int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
+
+std::string ReadText(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+// Only ranges of tiles are made: no raster is opened.
+int PlanFromCatalogue(const BakeArguments& arguments, const bake::Order& order) {
+  if (!std::ifstream(arguments.catalogue)) {
+    return cli::Fail(arguments.catalogue + ": cannot be read; give a file with a cell such as N46E008 on each line",
+                     kExitFailure);
+  }
+  constexpr double kErrorFraction = 0.5;
+  auto tiles = bake::PlanCatalogue(ReadText(arguments.catalogue), arguments.arc_seconds, kErrorFraction);
+  if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
+  const int deepest = static_cast<int>(tiles->size()) - 1;
+  if (order.levels && (order.levels->first > 0 || order.levels->second > deepest)) {
+    return cli::Fail(fmt::format("--levels {}: the catalogue has levels 0 to {}", arguments.levels, deepest),
+                     kExitUsage);
+  }
+  if (order.bbox) *tiles = bake::TilesWithin(*tiles, *order.bbox);
+  if (order.levels) tiles->resize(static_cast<std::size_t>(order.levels->second) + 1);
+  const bake::Estimate estimate = bake::EstimateWith(*tiles, arguments.bytes_per_tile, arguments.milliseconds_per_tile);
+  fmt::print("{}", arguments.json ? EstimateJson(estimate) + "\n" : EstimateText(estimate));
+  return kExitOk;
+}
+
+Result<tiler::Dataset> OpenDataset(const BakeInput& input, const StopSignals& signals) {
+  const Result<void> policy = input.config.datasets.empty()
+                                  ? dem::AllowVrts()
+                                  : dem::SetSourcePolicy({input.config.data_roots, input.config.allowed_prefixes,
+                                                          input.config.allowed_drivers});
+  if (!policy) return tl::unexpected(policy.error());
+  if (const auto readable = CheckReadable(input.dataset); !readable) return tl::unexpected(readable.error());
+  if (const auto allowed = CheckSourcePolicy(input.dataset); !allowed) return tl::unexpected(allowed.error());
+  dem::SetGdalCache(input.config.gdal_cache_bytes);
+  const dem::RasterCache cache = OpenCache(input.config);
+  Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(input.dataset.sources),
+                    FileCount(input.dataset.sources));
+  auto dataset = cli::OpenDataset(input.dataset, cache, TERRACE_VERSION, progress.Callback(), signals.token());
+  if (cache.folder && dataset) cache.folder->Trim();
+  return dataset;
+}
+
+bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Dataset& dataset,
+                              const std::vector<bake::Target>& targets) {
+  const archive::Manifest& first = targets.front().manifest;
+  const tiler::TileRequest& kind = first.kind;
+  std::string error = "default";
+  if (arguments.error > 0) error = PlainNumber(arguments.error) + " m";
+  if (arguments.fraction > 0) error = PlainNumber(arguments.fraction) + " of the level's";
+  std::string extensions;
+  for (const auto& [is_on, name] : {std::pair(kind.normals, "octvertexnormals"),
+                                    std::pair(kind.water_mask, "watermask"), std::pair(kind.metadata, "metadata")}) {
+    if (is_on) extensions += (extensions.empty() ? "" : ",") + std::string(name);
+  }
+  return {{{"dataset", dataset.name},
+           {"format", arguments.format},
+           {"levels", arguments.levels.empty() ? "all" : arguments.levels},
+           {"bbox", arguments.bbox.empty() ? "none" : arguments.bbox},
+           {"error", error},
+           {"extensions", extensions.empty() ? "none" : extensions},
+           {"options of the dataset and program", fmt::format("{:016x}", dataset.options)}}};
+}
+
+Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
+  for (bake::Target& target : targets) {
+    const std::string folder = bake::ArchivePlace(place, target.manifest, false);
+    std::error_code ignored;
+    target.old_place = std::filesystem::exists(folder + "/" + archive::kManifestFile, ignored) ? folder : place;
+    auto manifest = archive::ReadManifest(target.old_place);
+    if (!manifest) return MakeError(manifest.error().code, "--update: {}", manifest.error().message);
+    for (const archive::UnitEntry& unit : manifest->units) target.old_units.emplace(unit.name, unit);
+  }
+  return {};
+}
+
+// Writes the manifests of a bake of which all units are there.
+Result<void> Finish(std::vector<bake::Target>& targets, const std::vector<bake::UnitReport>& reports,
+                    const std::string& place, const bake::BakeIdentity& identity) {
+  for (const bake::UnitReport& report : reports) {
+    targets[report.target].manifest.units.push_back(report.entry);
+  }
+  std::vector<archive::Manifest> manifests;
+  for (bake::Target& target : targets) {
+    target.manifest.options = bake::ToJson(identity);
+    if (auto written = archive::WriteManifest(target.place, target.manifest); !written) return written;
+    manifests.push_back(target.manifest);
+  }
+  bake::TidyPlace(place, manifests);
+  return {};
+}
+
+BakeSummary Summarize(const std::vector<bake::UnitReport>& reports, const bake::Counters& counters,
+                      const std::string& place, double seconds) {
+  BakeSummary summary;
+  summary.place = place;
+  summary.built_tiles = counters.tiles;
+  summary.seconds = seconds;
+  for (const bake::UnitReport& report : reports) {
+    summary.tiles += report.entry.tiles;
+    summary.bytes += report.entry.bytes;
+    summary.baked += report.outcome == bake::UnitOutcome::kBaked;
+    summary.kept += report.outcome == bake::UnitOutcome::kKept;
+    summary.copied += report.outcome == bake::UnitOutcome::kCopied;
+    summary.failed += report.outcome == bake::UnitOutcome::kFailed;
+    summary.missing += report.outcome == bake::UnitOutcome::kMissing;
+  }
+  return summary;
+}
+
+void ListFailures(const std::vector<bake::UnitReport>& reports, const std::vector<bake::Target>& targets) {
+  for (const bake::UnitReport& report : reports) {
+    const bool is_missing = report.outcome == bake::UnitOutcome::kMissing;
+    if (!is_missing && report.outcome != bake::UnitOutcome::kFailed) continue;
+    std::fprintf(stderr, "terrace: unit %s of %s %s%s\n", report.entry.name.c_str(),
+                 archive::FolderOf(targets[report.target].manifest.kind.format).c_str(),
+                 is_missing ? "is missing" : "failed: ", report.message.c_str());
+  }
+}
+
+// From the plan to the end.
+int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets,
+             const bake::Shard& shard, const StopSignals& signals) {
+  const tiler::Dataset& dataset = pipeline.datasets().front();
+  const bool is_chunked = arguments.form == kChunks;
+  if (!is_chunked) {
+    if (const auto free = CheckExportPlace(arguments.out); !free) return Fail(free.error());
+  }
+  const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
+  for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
+  const auto lock =
+      bake::PlaceLock::Take(place, shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string());
+  if (!lock) return Fail(lock.error());
+  const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
+  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed)
+    return Fail(claimed.error());
+  if (!arguments.update.empty()) {
+    if (const auto read = ReadOld(arguments.update, targets); !read) return Fail(read.error());
+  }
+  const bake::UnitPlan plan = bake::UnitPlan::Make(targets, shard);
+  bake::Counters counters;
+  bake::BakeOptions options;
+  options.threads = arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
+  options.shard = shard;
+  options.only_verify = arguments.finish;
+  options.stop = signals.token();
+  if (arguments.json) {
+    options.on_unit = [&targets](const bake::UnitReport& report) {
+      fmt::print("{}\n", UnitJson(report, targets));
+      std::fflush(stdout);
+    };
+  }
+  const Clock::time_point start = Clock::now();
+  std::vector<bake::UnitReport> reports;
+  {
+    const BakeDisplay display(dataset.name, plan.tiles, plan.files, counters);
+    reports = bake::Bake(pipeline, targets, plan, options, counters);
+  }
+  BakeSummary summary =
+      Summarize(reports, counters, place, std::chrono::duration<double>(Clock::now() - start).count());
+  const std::uint64_t done = summary.baked + summary.kept + summary.copied;
+  if (signals.signal() != 0) {
+    std::fprintf(stderr, "terrace: stopped: %s of %s files are done; run the same command again to go on\n",
+                 Grouped(done).c_str(), Grouped(plan.files).c_str());
+    return StopCode(signals);
+  }
+  ListFailures(reports, targets);
+  const bool is_whole = done == plan.files;
+  if (is_whole && shard.count == 1) {
+    if (const auto finished = Finish(targets, reports, place, identity); !finished) return Fail(finished.error());
+    summary.is_complete = true;
+    if (!is_chunked) {
+      summary.place = arguments.out;
+      if (const auto exported = Export(arguments, place, signals.token()); !exported) {
+        if (signals.signal() != 0) return StopCode(signals);
+        return Fail(exported.error());
+      }
+    }
+  }
+  fmt::print("{}\n", arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
+  if (!is_whole) {
+    std::fprintf(
+        stderr,
+        "terrace: the bake is not complete: %s of %s files are missing, and there is no manifest; run %s to go "
+        "on\n",
+        Grouped(plan.files - done).c_str(), Grouped(plan.files).c_str(),
+        arguments.finish ? "the shards that baked them again" : "the same command again");
+    return kExitFailure;
+  }
+  if (shard.count > 1) {
+    std::fprintf(
+        stderr,
+        "terrace: shard %u of %u is done; when all are, run the same command with --finish instead of --shard\n",
+        shard.index, shard.count);
+  }
+  return kExitOk;
+}
+
+// 10^9 tiles are the planet at 30 m a few times over: more is likely a mistake.
+constexpr std::uint64_t kManyTiles = 1'000'000'000;
+
+int Report(const std::vector<config::ConfigError>& errors) {
+  for (const config::ConfigError& error : errors) {
+    std::fprintf(stderr, "terrace: %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ",
+                 error.message.c_str());
+  }
+  return kExitUsage;
+}
+
+// Combinations that make no sense; empty: none.
+std::string WrongTogether(const BakeArguments& arguments) {
+  const auto given = [](const std::string& text) { return !text.empty(); };
+  if (given(arguments.catalogue)) {
+    if (!arguments.dry_run) return "--catalogue plans without sources: give --dry-run with it";
+    if (!arguments.dems.empty() || given(arguments.config)) return "--catalogue stands for the sources; give no DEM";
+    return {};
+  }
+  if (arguments.dems.empty() == arguments.config.empty()) {
+    return arguments.dems.empty()
+               ? "there is nothing to bake; name a DEM ('terrace bake dem.tif --out PLACE') or --config"
+               : "give DEMs, or a configuration with --config, not both";
+  }
+  if (!arguments.dry_run && !given(arguments.out)) return "--out PLACE is missing: where the bake goes";
+  if (arguments.out.starts_with("/vsi")) {
+    return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
+  }
+  if (given(arguments.shard) && arguments.finish) return "--finish is for all shards together: leave --shard out";
+  if (given(arguments.shard) && arguments.form != kChunks) {
+    return fmt::format("--form {} is written from all units: bake shards with --form chunks", arguments.form);
+  }
+  if (given(arguments.update)) {
+    std::error_code ignored;
+    if (std::filesystem::equivalent(arguments.update, arguments.out, ignored) || arguments.update == arguments.out) {
+      return "--update and --out name the same place: a finished bake is not changed, give a new one with --out";
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+int Bake(const BakeArguments& arguments) {
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
+  const StopSignals signals;
+  spdlog::set_level(spdlog::level::warn);
+  if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) return cli::Fail(wrong, kExitUsage);
+  const auto order = OrderOf(arguments);
+  if (!order) return Fail(order.error());
+  const auto shard = ShardOf(arguments.shard);
+  if (!shard) return Fail(shard.error());
+  if (!arguments.catalogue.empty()) return PlanFromCatalogue(arguments, *order);
+
+  std::vector<config::ConfigError> errors;
+  const auto input = InputOf(arguments, errors);
+  if (!errors.empty()) return Report(errors);
+  if (!input) return Fail(input.error());
+  auto dataset = OpenDataset(*input, signals);
+  if (signals.signal() != 0) return StopCode(signals);
+  if (!dataset) return cli::Fail(dataset.error().message, kExitFailure);
+  const auto manifests = bake::PlanArchives(*dataset, *order, "terrace " TERRACE_VERSION);
+  if (!manifests) return Fail(manifests.error());
+  std::vector<bake::Target> targets;
+  std::uint64_t tiles = 0;
+  for (const archive::Manifest& manifest : *manifests) {
+    targets.push_back({{}, manifest});
+    tiles += bake::CountTiles(manifest.available);
+  }
+  // A tile's refinement is needed only by the tile's other formats.
+  constexpr std::size_t kRefinementBytes = std::size_t{64} << 20;
+  const tiler::TilePipeline pipeline({*std::move(dataset)}, targets.size() > 1 ? kRefinementBytes : 0);
+  if (arguments.dry_run) {
+    const auto estimate = bake::EstimateBake(pipeline, targets, bake::UnitPlan::Make(targets, *shard), signals.token());
+    if (signals.signal() != 0) return StopCode(signals);
+    if (!estimate) return Fail(estimate.error());
+    fmt::print("{}", arguments.json ? EstimateJson(*estimate) + "\n" : EstimateText(*estimate));
+    return kExitOk;
+  }
+  if (tiles > kManyTiles && !arguments.yes) {
+    return cli::Fail(fmt::format("{} tiles would be baked; add --yes if that is meant, or limit --levels or --bbox "
+                                 "(--dry-run tells what it takes)",
+                                 Grouped(tiles)),
+                     kExitUsage);
+  }
+  return BakeInto(arguments, pipeline, std::move(targets), *shard, signals);
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,112 @@
+#include "server/cli/common/open_baked.h"
+
+#include <spdlog/spdlog.h>
+
+#include <filesystem>
+#include <memory>
+#include <system_error>
+#include <utility>
+
+#include "archive/archive.h"
+#include "archive/baked_tiles.h"
+#include "archive/manifest.h"
+#include "engine/dem/gdal/source_policy.h"
+#include "tiler/encoder_version.h"
+
+namespace terrace::cli {
+namespace {
+
+using Archives = std::vector<std::shared_ptr<const archive::Archive>>;
+
+constexpr tiler::TileFormat kFormats[] = {tiler::TileFormat::kQuantizedMesh, tiler::TileFormat::kGlb,
+                                          tiler::TileFormat::kHeightPng};
+
+bool IsFile(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::is_regular_file(path, ignored);
+}
+
+Result<Archives> OpenArchives(const std::string& place) {
+  for (const std::string& file : FilesOfBaked(place)) {
+    if (Result<void> allowed = dem::CheckPlainFile(file); !allowed) return tl::unexpected(std::move(allowed.error()));
+  }
+  Result<Archives> archives = archive::Archive::OpenAll(place);
+  if (!archives) return archives;
+  for (const auto& opened : *archives) {
+    if (opened->manifest().dataset.generation == archives->front()->manifest().dataset.generation) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} and {} were baked from different versions of the dataset; bake the older one again",
+                     archives->front()->place(), opened->place());
+  }
+  return archives;
+}
+
+}  // namespace
+
+std::vector<std::string> FilesOfBaked(const std::string& place) {
+  if (IsFile(place)) return {place};
+  std::vector<std::string> files;
+  const auto add = [&](const std::string& folder) {
+    const std::string manifest = folder + "/" + archive::kManifestFile;
+    if (IsFile(manifest)) files.push_back(manifest);
+  };
+  add(place);
+  for (const tiler::TileFormat format : kFormats) add(place + "/" + archive::FolderOf(format));
+  return files;
+}
+
+bool IsArchive(const std::string& path) {
+  if (IsFile(path)) return path.ends_with(".pmtiles");
+  return !FilesOfBaked(path).empty();
+}
+
+Result<std::string> NameOfBaked(const std::string& place) {
+  for (const std::string& file : FilesOfBaked(place)) {
+    const std::string of = IsFile(place) ? place : std::filesystem::path(file).parent_path().string();
+    Result<archive::Manifest> manifest = archive::ReadManifest(of);
+    if (!manifest) return tl::unexpected(std::move(manifest.error()));
+    return manifest->dataset.name;
+  }
+  return MakeError(ErrorCode::kNotFound, "{} is no archive; give the folder or file that 'terrace bake' wrote", place);
+}
+
+void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
+  if (wanted.baked.empty()) return;
+  dataset.baked_files = FilesOfBaked(wanted.baked);
+  Result<Archives> archives = OpenArchives(wanted.baked);
+  if (!archives) {
+    spdlog::warn("dataset {}: its archive is not used, and tiles are built: {}", wanted.name, archives.error().message);
+    return;
+  }
+  const std::uint64_t generation = archives->front()->manifest().dataset.generation;
+  if (generation != dataset.generation) {
+    spdlog::warn(
+        "dataset {}: its archive {} is not used, and tiles are built: it has version {}, and the sources with these "
+        "options have version {}; bake it again with --update",
+        wanted.name, wanted.baked, tiler::VersionText(generation), tiler::VersionText(dataset.generation));
+    return;
+  }
+  dataset.baked = archive::MakeBakedTiles(*std::move(archives));
+}
+
+Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
+  Result<Archives> archives = OpenArchives(wanted.baked);
+  if (!archives) return tl::unexpected(std::move(archives.error()));
+  const archive::BakedDataset& baked = archives->front()->manifest().dataset;
+  tiler::Dataset dataset;
+  dataset.name = wanted.name;
+  dataset.attribution = baked.attribution;
+  dataset.error_fraction = baked.error_fraction;
+  dataset.glb.compression = baked.glb_compression;
+  for (const auto& opened : *archives) {
+    const tiler::TileRequest& kind = opened->manifest().kind;
+    if (kind.format == tiler::TileFormat::kGlb) dataset.glb.compression = kind.compression;
+  }
+  dataset.metadata_levels = baked.metadata_levels;
+  dataset.generation = baked.generation;
+  dataset.baked_files = FilesOfBaked(wanted.baked);
+  dataset.baked = archive::MakeBakedTiles(*std::move(archives));
+  return dataset;
+}
+
+}  // namespace terrace::cli

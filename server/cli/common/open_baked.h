@@ -1,0 +1,28 @@
+// Opens the archive of a dataset.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/config.h"
+#include "engine/core/result.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::cli {
+
+// Adds the dataset's archive, if the configuration names one. An archive that cannot be opened or is of another version
+// is not used; the log says why. `dataset`: complete otherwise.
+void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset);
+
+// A dataset without sources: of its archive alone. Errors name the place and the remedy.
+Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted);
+
+// Whether `path` is an archive: a folder with a manifest, or a .pmtiles file.
+bool IsArchive(const std::string& path);
+// The name of the dataset that was baked.
+Result<std::string> NameOfBaked(const std::string& place);
+
+// The files that change when an archive is baked again.
+std::vector<std::string> FilesOfBaked(const std::string& place);
+
+}  // namespace terrace::cli

@@ -1,0 +1,57 @@
+#include "server/store/baked_store.h"
+
+#include <spdlog/spdlog.h>
+
+#include <mutex>
+#include <utility>
+
+namespace terrace::server {
+
+void BakedStore::Use(const std::vector<tiler::Dataset>& datasets) {
+  std::map<std::uint64_t, std::shared_ptr<const tiler::BakedTiles>> baked;
+  for (const tiler::Dataset& dataset : datasets) {
+    if (dataset.baked) baked.emplace(dataset.generation, dataset.baked);
+  }
+  const std::unique_lock lock(mutex_);
+  baked_.swap(baked);
+  reported_.clear();
+}
+
+std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {
+  std::shared_ptr<const tiler::BakedTiles> baked;
+  {
+    const std::shared_lock lock(mutex_);
+    const auto found = baked_.find(key.generation);
+    if (found == baked_.end()) return std::nullopt;
+    baked = found->second;
+  }
+  Result<std::optional<tiler::EncodedTile>> tile = baked->Find(key.request);
+  if (!tile) {
+    ++errors_;
+    Report(tile.error().message);
+    return std::nullopt;
+  }
+  ++(*tile ? hits_ : misses_);
+  return *std::move(tile);
+}
+
+void BakedStore::Report(const std::string& fault) {
+  constexpr std::size_t kMaxReported = 1000;
+  {
+    const std::unique_lock lock(mutex_);
+    if (reported_.size() >= kMaxReported || !reported_.insert(fault).second) return;
+  }
+  spdlog::error("archive: {}; tiles are built where the dataset has sources", fault);
+}
+
+tiler::StoreStats BakedStore::stats() const {
+  tiler::StoreStats stats;
+  stats.hits = hits_;
+  stats.misses = misses_;
+  stats.errors = errors_;
+  const std::shared_lock lock(mutex_);
+  stats.on = !baked_.empty();
+  return stats;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,43 @@
+// The tier between the caches and building: tiles of the datasets' archives.
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <shared_mutex>
+#include <string>
+#include <vector>
+
+#include "tiler/store/baked_tiles.h"
+#include "tiler/store/tile_store.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::server {
+
+// Thread-safe. Keeps nothing itself: Insert does nothing.
+class BakedStore final : public tiler::TileStore {
+ public:
+  // Uses the archives of these datasets from now on, and no others.
+  void Use(const std::vector<tiler::Dataset>& datasets);
+
+  const char* name() const override { return "archive"; }
+  tiler::StoreStats stats() const override;
+  void Abandon() override {}
+
+  // Also nothing if a file is damaged. The log names each such fault once.
+  std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override;
+  void Insert(const tiler::CacheKey&, std::shared_ptr<const tiler::EncodedTile>) override {}
+
+ private:
+  void Report(const std::string& fault);
+
+  mutable std::shared_mutex mutex_;
+  std::map<std::uint64_t, std::shared_ptr<const tiler::BakedTiles>> baked_;  // by generation; guarded by mutex_
+  std::set<std::string> reported_;                                           // likewise
+  std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0};
+};
+
+}  // namespace terrace::server

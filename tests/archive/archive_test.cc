@@ -1,0 +1,145 @@
+#include "archive/archive.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <set>
+
+#include "archive/tile_writer.h"
+#include "tests/archive/small_archive.h"
+#include "tests/support/scratch_directory.h"
+
+namespace terrace::archive {
+namespace {
+
+class ArchiveTest : public ::testing::Test {
+ protected:
+  std::string Place() const { return (scratch_.path() / "baked").string(); }
+
+  void Bake() {
+    manifest_ = WriteUnits(Place(), InventedKeys());
+    ASSERT_TRUE(WriteManifest(Place(), manifest_));
+  }
+  std::shared_ptr<const Archive> OpenBaked() const {
+    Result<std::shared_ptr<const Archive>> archive = Archive::Open(Place());
+    EXPECT_TRUE(archive) << archive.error().message;
+    return *std::move(archive);
+  }
+
+  test_support::ScratchDirectory scratch_;
+  Manifest manifest_;
+};
+
+TEST_F(ArchiveTest, TilesComeBackAsTheyWereAdded) {
+  Bake();
+  const auto archive = OpenBaked();
+  for (const geo::TileKey& key : InventedKeys()) {
+    const Result<std::optional<ArchivedTile>> found = archive->Find(key);
+    ASSERT_TRUE(found && *found) << geo::ToString(key);
+    const tiler::EncodedTile wanted = InventedTile(key);
+    EXPECT_EQ((*found)->tile.bytes, wanted.bytes);
+    EXPECT_EQ((*found)->tile.etag, wanted.etag);
+    EXPECT_EQ((*found)->tile.max_error_m, wanted.max_error_m);
+    EXPECT_EQ((*found)->tile.certified_error_m, wanted.certified_error_m);
+    EXPECT_EQ((*found)->tile.vertices, wanted.vertices);
+    EXPECT_EQ((*found)->tile.triangles, wanted.triangles);
+    EXPECT_EQ((*found)->range.min, InventedRange(key).min);
+    EXPECT_EQ(archive->FindRange(key)->max, InventedRange(key).max);
+  }
+}
+
+TEST_F(ArchiveTest, OtherTilesAreAbsent) {
+  Bake();
+  const auto archive = OpenBaked();
+  for (const geo::TileKey& key :
+       {geo::TileKey{5, 1, 1}, {7, 100, 51}, {8, 201, 101}, {9, 0, 0}, {10, 800, 400}, {3, -1, 0}, {24, 1, 1}}) {
+    const Result<std::optional<ArchivedTile>> found = archive->Find(key);
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_FALSE(*found) << geo::ToString(key);
+  }
+}
+
+TEST_F(ArchiveTest, EveryTileIsVisitedOnce) {
+  Bake();
+  std::set<std::string> seen;
+  const Result<void> read =
+      OpenBaked()->ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
+        EXPECT_EQ(tile.tile.bytes, InventedTile(key).bytes);
+        EXPECT_TRUE(seen.insert(geo::ToString(key)).second);
+        return {};
+      });
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(seen.size(), InventedKeys().size());
+}
+
+TEST_F(ArchiveTest, WithoutManifestItIsUnfinished) {
+  WriteUnits(Place(), InventedKeys());
+  const auto archive = Archive::Open(Place());
+  ASSERT_FALSE(archive);
+  EXPECT_EQ(archive.error().code, ErrorCode::kNotFound);
+  EXPECT_NE(archive.error().message.find("has not finished"), std::string::npos) << archive.error().message;
+}
+
+TEST_F(ArchiveTest, OtherPlacesAreRefusedWithTheReason) {
+  EXPECT_EQ(Archive::Open(Place()).error().code, ErrorCode::kNotFound);
+  std::filesystem::create_directories(Place());
+  WriteText(Place() + "/manifest.json", R"({"name":"an application"})");
+  EXPECT_EQ(Archive::Open(Place()).error().code, ErrorCode::kInvalidArgument);
+  WriteText(Place() + "/other.bin", "something else");
+  EXPECT_FALSE(Archive::Open(Place() + "/other.bin"));
+}
+
+TEST_F(ArchiveTest, UnitOfAnotherBakeIsNotUsed) {
+  Bake();
+  // The same tiles and sizes, another key.
+  ASSERT_EQ(WriteUnits(Place(), InventedKeys(), 8).units.front().bytes, manifest_.units.front().bytes);
+  const auto found = OpenBaked()->Find({0, 0, 0});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::kUnavailable);
+  EXPECT_NE(found.error().message.find("another bake"), std::string::npos);
+}
+
+TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {
+  Bake();
+  std::filesystem::remove(Place() + "/units/7-100-50.pmtiles");
+  const auto archive = OpenBaked();
+  EXPECT_TRUE(archive->Find({0, 0, 0}));
+  const auto found = archive->Find({7, 100, 50});
+  ASSERT_FALSE(found);
+  EXPECT_NE(found.error().message.find("units/7-100-50.pmtiles"), std::string::npos);
+}
+
+TEST_F(ArchiveTest, VerifiedUnitEqualsItsSummary) {
+  Bake();
+  for (const UnitEntry& unit : manifest_.units) {
+    const Result<UnitSummary> summary = VerifyUnit(Place(), unit.name, unit.key);
+    ASSERT_TRUE(summary) << summary.error().message;
+    EXPECT_EQ(*summary, (UnitSummary{unit.tiles, unit.bytes, unit.xxh3}));
+    EXPECT_EQ(VerifyUnit(Place(), unit.name, unit.key + 1).error().code, ErrorCode::kInvalidArgument);
+  }
+  EXPECT_EQ(VerifyUnit(Place(), "7-1-1", 7).error().code, ErrorCode::kNotFound);
+}
+
+TEST_F(ArchiveTest, TileOfAnotherUnitIsRefused) {
+  const auto writer = CreateUnit(Place(), "7-100-50", {manifest_.kind, 1});
+  ASSERT_TRUE(writer);
+  EXPECT_FALSE((*writer)->Add({7, 101, 50}, InventedTile({7, 101, 50}), {}));
+  EXPECT_FALSE((*writer)->Add({0, 0, 0}, InventedTile({0, 0, 0}), {}));
+  EXPECT_FALSE(CreateUnit(Place(), "7-256-0", {manifest_.kind, 1})) << "beyond the last column";
+  EXPECT_FALSE(CreateUnit(Place(), "../x", {manifest_.kind, 1}));
+}
+
+TEST_F(ArchiveTest, ArchivesOfSeveralFormatsInOnePlace) {
+  for (const char* folder : {"/terrain", "/glb"}) {
+    const Manifest manifest = WriteUnits(Place() + folder, InventedKeys());
+    ASSERT_TRUE(WriteManifest(Place() + folder, manifest));
+  }
+  const auto archives = Archive::OpenAll(Place());
+  ASSERT_TRUE(archives) << archives.error().message;
+  EXPECT_EQ(archives->size(), 2U);
+  EXPECT_EQ(Archive::OpenAll(Place() + "/glb")->size(), 1U);
+  EXPECT_FALSE(Archive::OpenAll(scratch_.path().string()));
+}
+
+}  // namespace
+}  // namespace terrace::archive

@@ -1,0 +1,95 @@
+#include "archive/manifest.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/archive/small_archive.h"
+#include "tests/support/scratch_directory.h"
+
+namespace terrace::archive {
+namespace {
+
+Manifest FullManifest() {
+  Manifest manifest;
+  manifest.product = "terrace 0.1.0";
+  manifest.encoder = "1 GDAL 3.6.2";
+  manifest.dataset.name = "alps";
+  manifest.dataset.attribution = "© swisstopo \"x\"";
+  manifest.dataset.generation = 0xfedcba9876543210;
+  manifest.dataset.error_fraction = 0.1;
+  manifest.dataset.glb_compression = proto::GlbCompression::kMeshopt;
+  manifest.dataset.texture = proto::TextureFormat::kWebp;
+  manifest.dataset.bounds = {7.999583333333333, 46, 9.1, 47.3};
+  manifest.dataset.heights = {-12.3456789, 4634.1};
+  manifest.dataset.floor_m = 0.1;
+  manifest.dataset.metadata_levels = 5;
+  manifest.dataset.max_level = 13;
+  manifest.dataset.max_mercator_depth = 12;
+  manifest.dataset.sources = 4;
+  manifest.kind.coding = tiler::Coding::kGzip;
+  manifest.kind.normals = manifest.kind.metadata = true;
+  manifest.error_steps = {0, -2, 4};
+  manifest.max_level = 2;
+  manifest.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{4, 2, 5, 3}, {7, 0, 7, 0}}};
+  manifest.options = R"({"bbox":[1,2,3,4]})";
+  manifest.units = {{"top", 0x8000000000000001, 9, 1234, "00"}, {"7-12-34", 5, 0, 0, ""}};
+  return manifest;
+}
+
+TEST(ManifestTest, GoesBothWays) {
+  const std::string json = ToJson(FullManifest());
+  const Result<Manifest> read = ParseManifest(json);
+  ASSERT_TRUE(read) << read.error().message;
+  EXPECT_EQ(ToJson(*read), json);
+  EXPECT_EQ(read->kind, FullManifest().kind);
+  EXPECT_EQ(read->available, FullManifest().available);
+  EXPECT_EQ(read->units, FullManifest().units);
+  EXPECT_EQ(read->error_steps, FullManifest().error_steps);
+  EXPECT_EQ(read->dataset.bounds.west, FullManifest().dataset.bounds.west);
+  EXPECT_EQ(read->dataset.heights.min, FullManifest().dataset.heights.min);
+  EXPECT_EQ(read->dataset.texture, proto::TextureFormat::kWebp);
+}
+
+TEST(ManifestTest, NewerFormatIsNamed) {
+  std::string json = ToJson(FullManifest());
+  const std::string wanted = "\"terrace_archive\": 1";
+  ASSERT_NE(json.find(wanted), std::string::npos);
+  json.replace(json.find(wanted), wanted.size(), "\"terrace_archive\": 2");
+  const Result<Manifest> read = ParseManifest(json);
+  ASSERT_FALSE(read);
+  EXPECT_NE(read.error().message.find("format 2"), std::string::npos) << read.error().message;
+}
+
+TEST(ManifestTest, NonsenseIsRefused) {
+  const std::string json = ToJson(FullManifest());
+  const auto with = [&](std::string_view from, std::string_view to) {
+    std::string changed = json;
+    const std::size_t at = changed.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    return changed.replace(at, from.size(), to);
+  };
+  for (const std::string& bad :
+       {with("\"7-12-34\"", "\"../../etc/passwd\""), with("\"7-12-34\"", "\"top\""),
+        with("\"max_level\": 2", "\"max_level\": 25"), with("\"max_level\": 2", "\"max_level\": 1"),
+        with("\"min_level\": 0", "\"min_level\": 3"), with("\"error_fraction\": 0.1", "\"error_fraction\": -1"),
+        with("\"gzip\"", "\"br\""), with("\"tiles\": 9", "\"tiles\": -9"), with("\"size\": 256", "\"size\": 300"),
+        with("fedcba9876543210", "fedcba"), std::string(), std::string("[]"), std::string(100'000, '[')}) {
+    EXPECT_FALSE(ParseManifest(bad)) << bad.substr(0, 200);
+  }
+}
+
+TEST(ManifestTest, UnitNames) {
+  EXPECT_EQ(UnitNameOf({6, 127, 63}), "top");
+  EXPECT_EQ(UnitNameOf({7, 255, 127}), "7-255-127");
+  EXPECT_EQ(UnitNameOf({10, 2047, 1023}), "7-255-127");
+  EXPECT_EQ(UnitPath("top"), "top.pmtiles");
+  EXPECT_EQ(UnitPath("7-1-2"), "units/7-1-2.pmtiles");
+  EXPECT_EQ(UnitRoot("7-1-2").value(), (geo::TileKey{7, 1, 2}));
+  EXPECT_EQ(UnitRoot("top").value(), std::nullopt);
+  for (const char* name :
+       {"", "7", "7-1", "7-1-", "7-1-2-3", "8-1-2", "7-01-2", "7--1-2", "7-256-0", "7-0-128", "top/.."}) {
+    EXPECT_FALSE(UnitRoot(name)) << name;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::archive

@@ -1,0 +1,392 @@
+"""The baker as a user runs it: bake_test.py BINARY [--long]. --long: 200 kills instead of 20."""
+import contextlib
+import filecmp
+import http.client
+import json
+import os
+import pathlib
+import random
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
+from pmtiles import archive, tiles_of  # noqa: E402
+from srtm import write_hgt  # noqa: E402
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+KILLS = 200 if "--long" in sys.argv else 20
+sys.argv = [argument for argument in sys.argv if argument != "--long"]
+CELLS = ("N46E006", "N46E007", "N46E012", "N30E012")
+
+
+def files_of(place):
+    return sorted(path.relative_to(place).as_posix() for path in pathlib.Path(place).rglob("*") if path.is_file())
+
+
+class Bake(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.scratch = pathlib.Path(scratch.name)
+        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
+        cls.config = cls.make_sources("dems", (0, 0, 0, 0))
+        cls.reference = cls.scratch / "reference"
+        begun = time.monotonic()
+        done = cls.run_bake("--out", cls.reference, "--threads", 2)
+        assert done.returncode == 0, done.stderr
+        cls.seconds = time.monotonic() - begun
+
+    @classmethod
+    def make_sources(cls, folder, phases):
+        (cls.scratch / folder).mkdir()
+        for cell, phase in zip(CELLS, phases):
+            write_hgt(cls.scratch / folder / f"{cell}.hgt", phase)
+        config = cls.scratch / folder / "terrace.json"
+        # Without a stated floor, the lowest height of all sources is part of every unit.
+        config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
+        return config
+
+    @classmethod
+    def command(cls, *arguments, config=None, levels="0-11"):
+        return [str(part) for part in (BINARY, "bake", "--config", config or cls.config, "--levels", levels, *arguments)]
+
+    @classmethod
+    def run_bake(cls, *arguments, config=None, levels="0-11", **options):
+        return subprocess.run(cls.command(*arguments, config=config, levels=levels), env=cls.environment, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, **options)
+
+    def start(self, *arguments, config=None):
+        process = subprocess.Popen(self.command(*arguments, config=config), env=self.environment, text=True,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+        def end():
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        self.addCleanup(end)
+        return process
+
+    def place(self, name):
+        place = self.scratch / f"{self.id().rpartition('.')[2]}-{name}"
+        self.addCleanup(shutil.rmtree, place, ignore_errors=True)
+        return place
+
+    def expect_equal(self, place, reference=None):
+        reference = reference or self.reference
+        names = files_of(reference)
+        self.assertEqual(files_of(place), names)
+        _, different, unreadable = filecmp.cmpfiles(reference, place, names, shallow=False)
+        self.assertEqual((different, unreadable), ([], []))
+
+    def units(self, done):
+        """{unit: outcome} of the lines of --json."""
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        return {line["unit"]: line["outcome"] for line in lines if "unit" in line}
+
+    @contextlib.contextmanager
+    def server(self):
+        process = subprocess.Popen([BINARY, "serve", "--config", self.config, "--listen", "127.0.0.1:0"], env=self.environment,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        try:
+            port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stdout.readline())[1])
+            connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
+
+            def get(path, headers):
+                connection.request("GET", f"/cells/{path}", headers=headers)
+                reply = connection.getresponse()
+                return reply.status, reply.read()
+            yield get
+            connection.close()
+        finally:
+            process.kill()
+            process.communicate()
+
+    def test_every_tile_equals_the_live_one(self):
+        place = self.place("formats")
+        done = self.run_bake("--out", place, "--format", "terrain,glb,png", levels="0-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        accept = {"Accept": "application/vnd.quantized-mesh;extensions=octvertexnormals", "Accept-Encoding": "gzip"}
+        with self.server() as get:
+            for folder, path, headers in (("terrain", "{}/{}/{}.terrain", accept), ("glb", "{}/{}/{}.glb", {}),
+                                          ("png", "{}/{}/{}.png", {})):
+                manifest, tiles = archive(place / folder, geodetic=folder != "png")
+                self.assertEqual(len(tiles), sum(unit["tiles"] for unit in manifest["units"]))
+                self.assertGreater(len(tiles), 50)
+                for key, tile in tiles.items():
+                    if folder == "glb":
+                        status, body = get(self.glb_path(get, key), headers)
+                    else:
+                        status, body = get(path.format(*key), headers)
+                    self.assertEqual((status, body == tile), (200, True), (folder, key))
+
+    def glb_path(self, get, key):
+        if not hasattr(self, "roots"):
+            tileset = json.loads(get("tileset.json", {})[1])
+            uris = re.findall(r'"([^"]*\{level\}[^"]*\.glb[^"]*)"', json.dumps(tileset))
+            self.roots = [uri.split("?")[0] for uri in uris]
+        level, x, y = key
+        for uri in self.roots:
+            root_level, root_x, root_y = (int(number) for number in re.search(r"3dtiles/(\d+)-(\d+)-(\d+)/", uri).groups())
+            down = level - root_level
+            if down >= 0 and x >> down == root_x and y >> down == root_y:
+                return (uri.replace("{level}", str(down)).replace("{x}", str(x - (root_x << down)))
+                        .replace("{y}", str(y - (root_y << down))))
+        return f"{level}/{x}/{y}.glb"
+
+    def test_threads_do_not_matter(self):
+        for threads in (1, 4):
+            place = self.place(threads)
+            self.assertEqual(self.run_bake("--out", place, "--threads", threads).returncode, 0)
+            self.expect_equal(place)
+
+    def test_killed_at_any_moment_it_goes_on_to_the_same_files(self):
+        place, kept = self.place("killed"), 0
+        dice = random.Random(7)
+        for kill in range(KILLS):
+            if (place / "manifest.json").exists():
+                self.expect_equal(place)
+                shutil.rmtree(place)
+            process = self.start("--out", place, "--threads", dice.choice((1, 2)), "--json")
+            time.sleep(dice.uniform(0, self.seconds))
+            process.kill()
+            kept += process.communicate()[0].count('"kept"')
+        self.assertGreater(kept, 0, "no kill left a finished unit: the sleeps do not fit the machine")
+        done = self.run_bake("--out", place)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.expect_equal(place)
+
+    def test_signals_drop_the_unit_and_say_how_to_go_on(self):
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            place = self.place(code)
+            process = self.start("--out", place, "--json", "--threads", 1)
+            process.stdout.readline()  # the first unit
+            process.send_signal(number)
+            _, errors = process.communicate(timeout=60)
+            self.assertEqual(process.returncode, code)
+            self.assertIn("run the same command again to go on", errors)
+            self.assertFalse((place / "manifest.json").exists())
+            self.assertEqual([name for name in files_of(place) if name.endswith((".partial", ".lock"))], [])
+            done = self.run_bake("--out", place, "--json")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("kept", self.units(done).values())
+            self.expect_equal(place)
+
+    def test_a_unit_that_fails_is_listed_and_the_others_are_baked(self):
+        place = self.place("limit")
+        sizes = {unit["name"]: unit["bytes"] for unit in json.loads((self.reference / "manifest.json").read_text())["units"]}
+        limit = max(sizes.values()) - 1
+        done = self.run_bake("--out", place, "--json",
+                             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
+        self.assertEqual(done.returncode, 1, done.stderr)
+        failed = [unit for unit, outcome in self.units(done).items() if outcome == "failed"]
+        self.assertIn(max(sizes, key=sizes.get), failed)
+        self.assertLess(len(failed), len(sizes))
+        for unit in failed:
+            self.assertIn(f"unit {unit} of terrain failed", done.stderr)
+        self.assertFalse((place / "manifest.json").exists())
+        self.assertEqual(self.run_bake("--out", place).returncode, 0)
+        self.expect_equal(place)
+
+    def test_damaged_and_foreign_units_are_baked_again(self):
+        place = self.place("damaged")
+        shutil.copytree(self.reference, place)
+        (place / "manifest.json").unlink()
+        units = sorted((place / "units").glob("*.pmtiles"))
+        data = bytearray(units[0].read_bytes())
+        data[len(data) // 2] ^= 1
+        units[0].write_bytes(data)
+        units[1].write_bytes(units[1].read_bytes()[:-1])
+        shutil.copy(units[3], units[2])
+        done = self.run_bake("--out", place, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual({unit for unit, outcome in self.units(done).items() if outcome == "baked"},
+                         {unit.stem for unit in units[:3]})
+        self.expect_equal(place)
+
+    def test_update_bakes_the_units_that_a_source_touches(self):
+        config = self.make_sources("changed", (0, 0, 0, 1))
+        fresh, updated = self.place("fresh"), self.place("updated")
+        self.assertEqual(self.run_bake("--out", fresh, config=config).returncode, 0)
+        done = self.run_bake("--out", updated, "--update", self.reference, "--json", config=config)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        baked = {unit for unit, outcome in self.units(done).items() if outcome == "baked"}
+        self.assertIn("top", baked)
+        for unit in baked - {"top"}:
+            south = int(unit.split("-")[2]) * 180 / 128 - 90
+            self.assertTrue(27 < south < 32, unit)  # around N30E012; the other cells lie 15 degrees to the north
+        self.assertGreater(len(baked), 2)
+        self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
+        self.expect_equal(updated, fresh)
+
+    def test_shards_and_finish_make_the_same_files(self):
+        place = self.place("shards")
+        for shard in range(3):
+            done = self.run_bake("--out", place, "--shard", f"{shard}/3")
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertFalse((place / "manifest.json").exists())
+            if shard == 1:
+                early = self.run_bake("--out", place, "--finish")
+                self.assertEqual(early.returncode, 1)
+                self.assertIn("is missing", early.stderr)
+                self.assertFalse((place / "manifest.json").exists())
+        self.assertEqual(self.run_bake("--out", place, "--finish").returncode, 0)
+        self.expect_equal(place)
+
+    def test_sources_that_change_meanwhile_are_listed(self):
+        config = self.make_sources("moving", (0, 0, 0, 0))
+        place, fresh = self.place("moving"), self.place("fresh")
+        process = self.start("--out", place, "--json", "--threads", 1, config=config)
+        process.stdout.readline()
+        process.send_signal(signal.SIGSTOP)
+        for cell in CELLS:
+            write_hgt(config.parent / f"{cell}.hgt", 2)
+        process.send_signal(signal.SIGCONT)
+        _, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, 1, errors)
+        self.assertIn("of terrain failed", errors)
+        self.assertFalse((place / "manifest.json").exists())
+        done = self.run_bake("--out", place, config=config)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.run_bake("--out", fresh, config=config).returncode, 0)
+        self.expect_equal(place, fresh)
+
+    def test_one_bake_at_a_time(self):
+        place = self.place("locked")
+        first = self.start("--out", place, "--json", "--threads", 1)
+        first.stdout.readline()
+        first.send_signal(signal.SIGSTOP)
+        second = self.run_bake("--out", place)
+        self.assertEqual(second.returncode, 1)
+        self.assertIn(f"process {first.pid}", second.stderr)
+        self.assertIn("--shard", second.stderr)
+        first.kill()
+        first.communicate()
+        self.assertEqual(self.run_bake("--out", place).returncode, 0)
+        self.expect_equal(place)
+
+    def test_a_finished_bake_is_kept(self):
+        place = self.place("finished")
+        shutil.copytree(self.reference, place)
+        done = self.run_bake("--out", place, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(set(self.units(done).values()), {"kept"})
+        self.expect_equal(place)
+        config = self.make_sources("newer", (3, 0, 0, 0))
+        newer = self.run_bake("--out", place, config=config)
+        self.assertEqual(newer.returncode, 2)
+        self.assertIn("--update", newer.stderr)
+        self.expect_equal(place)
+
+    def test_what_makes_no_sense_is_refused(self):
+        other = self.place("other")
+        other.mkdir()
+        (other / "photo.jpg").write_text("x")
+        file = self.scratch / "a-file"
+        file.write_text("x")
+        shutil.copytree(self.reference, self.place("reference"))
+        reference = self.place("reference")
+        for arguments, levels, said in (
+                (("--out", other), "0-11", "photo.jpg"),
+                (("--out", file), "0-11", "is a file"),
+                (("--out", reference), "0-10", 'levels "0-11", not "0-10"'),
+                (("--out", reference, "--error", "5"), "0-11", 'error "default", not "5 m"'),
+                (("--out", other), "0-30", "from 0 to 24"),
+                (("--out", other), "5-3", "--levels 5-3"),
+                (("--out", other), "0-20", "has levels 0 to"),
+                (("--out", other), "3-9", "--levels 0-9"),
+                (("--out", other, "--bbox", "1,2,3"), "0-9", "WEST,SOUTH,EAST,NORTH"),
+                (("--out", other, "--bbox", "100,-20,110,-10"), "0-9", "lies outside"),
+                (("--out", other, "--form", "tar"), "0-9", "chunks, folder or single"),
+                (("--out", other, "--form", "single", "--format", "terrain,png"), "0-9", "one file of one format"),
+                (("--out", other, "--format", "obj"), "0-9", "terrain, glb, png"),
+                (("--out", other, "--shard", "3/3"), "0-9", "I from 0 to N-1"),
+                (("--out", other, "--error", "1", "--fraction", "1"), "0-9", "exclude each other"),
+                (("--out", other, "--extensions", "watermask"), "0-9", "no water"),
+                (("--out", other, "--update", other), "0-9", "same place"),
+                (("--out", "/vsis3/bucket/place"), "0-9", "a folder of this machine"),
+                ((), "0-9", "--out PLACE"),
+        ):
+            with self.subTest(arguments=arguments, levels=levels):
+                done = self.run_bake(*arguments, levels=levels)
+                self.assertEqual(done.returncode, 2, done.stderr)
+                self.assertIn(said, done.stderr)
+        self.assertEqual(files_of(other), ["photo.jpg"])
+        self.expect_equal(reference)
+
+    def test_billions_of_tiles_need_consent(self):
+        place = self.place("many")
+        done = subprocess.run([BINARY, "bake", self.scratch / "dems" / "N30E012.hgt", "--finest-error", "0.002", "--out", place],
+                              env=self.environment, text=True, stderr=subprocess.PIPE, timeout=60)
+        self.assertEqual(done.returncode, 2)
+        self.assertRegex(done.stderr, r"\d,\d{3},\d{3},\d{3} tiles would be baked; add --yes")
+        self.assertFalse(place.exists())
+
+    def test_a_box_has_its_tiles_and_their_ancestors(self):
+        place = self.place("box")
+        done = self.run_bake("--out", place, "--bbox", "6.2,46.2,6.4,46.4")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        manifest, tiles = archive(place)
+        _, all_tiles = archive(self.reference)
+        self.assertLess(len(tiles), len(all_tiles) // 4)
+        for (level, x, y), tile in tiles.items():
+            self.assertEqual(tile, all_tiles[level, x, y])
+            if level > 0:
+                self.assertIn((level - 1, x // 2, y // 2), tiles)
+                self.assertIn((level, x ^ 1, y), tiles)
+        self.assertIn((11, int(186.3 / 180 * 2048), int(136.3 / 180 * 2048)), tiles)
+
+    def test_the_other_forms_hold_the_same_tiles(self):
+        _, tiles = archive(self.reference)
+        folder, single = self.place("folder"), self.place("single.pmtiles")
+        for form, place in (("folder", folder), ("single", single)):
+            done = self.run_bake("--out", place, "--form", form)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertFalse(place.with_name(place.name + ".bake").exists())
+            again = self.run_bake("--out", place, "--form", form)
+            self.assertEqual(again.returncode, 2)
+            self.assertIn("is there already", again.stderr)
+        written = {tuple(int(part) for part in path.relative_to(folder).with_suffix("").parts): path.read_bytes()
+                   for path in folder.rglob("*.terrain")}
+        self.assertEqual(written, tiles)
+        layer = json.loads((folder / "layer.json").read_text())
+        promised = {(level, x, y) for level, ranges in enumerate(layer["available"]) for box in ranges
+                    for x in range(box["startX"], box["endX"] + 1) for y in range(box["startY"], box["endY"] + 1)}
+        self.assertEqual(promised, set(tiles))
+        self.assertEqual({(zoom - 1, x, y): tile for (zoom, x, y), tile in tiles_of(single).items()}, tiles)
+
+    def test_dry_run_counts_the_tiles(self):
+        manifest, tiles = archive(self.reference)
+        done = self.run_bake("--dry-run", "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        estimate = json.loads(done.stdout)
+        self.assertEqual(estimate["tiles"], len(tiles))
+        self.assertEqual(estimate["files"], len(manifest["units"]))
+        written = sum(unit["bytes"] for unit in manifest["units"])
+        self.assertTrue(0.5 < estimate["bytes"] / written < 2, (estimate["bytes"], written))
+
+    def test_a_catalogue_is_planned_without_rasters(self):
+        catalogue = self.scratch / "cells.txt"
+        catalogue.write_text("".join(f"N{south:02}E{west:03}\n" for south in range(60) for west in range(180)))
+        done = subprocess.run([BINARY, "bake", "--dry-run", "--json", "--catalogue", catalogue, "--levels", "0-14"],
+                              env=self.environment, text=True, stdout=subprocess.PIPE, timeout=60)
+        estimate = json.loads(done.stdout)
+        expected = 180 * 60 / 180 ** 2 * 4 ** 14  # tiles of level 14 on 180 by 60 degrees
+        self.assertAlmostEqual(estimate["levels"][14]["tiles"] / expected, 1, delta=0.01)
+        self.assertEqual(estimate["bytes"], 2000 * estimate["tiles"])
+        bad = self.scratch / "bad.txt"
+        bad.write_text("N46E008\nhello\n")
+        done = subprocess.run([BINARY, "bake", "--dry-run", "--catalogue", bad], text=True, stderr=subprocess.PIPE, timeout=60)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn('line 2: "hello"', done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,20 @@
+// The geometric error that is asked for, by a client or for a bake, and the step of the ladder that it means at a
+// level.
+#pragma once
+
+#include <optional>
+
+namespace terrace::tiler {
+
+// The geometric error that a client requests; all members are optional.
+struct RequestedError {
+  std::optional<double> error_m;   // finite, > 0
+  std::optional<double> fraction;  // of the level's error; finite, > 0
+  bool at_least = false;           // the larger of error_m and the level's default error is used
+};
+
+// The step on the level's ladder for a requested error; 0 if none is requested. `is_deepest`: the level is the deepest
+// of the dataset. No finer level follows it, so `atleast` does not limit its tiles to their default error.
+int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction);
+
+}  // namespace terrace::tiler

@@ -1,0 +1,55 @@
+// Tiles that were made ahead and are kept in an archive. archive/ implements it.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+#include "proto/gltf/texture.h"
+#include "tiler/coding.h"
+#include "tiler/encoded_tile.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::tiler {
+
+// The extent of a dataset without sources: what its documents say instead of dem::DemInfo.
+struct BakedExtent {
+  std::vector<TileFormat> formats;  // what there are tiles of
+  std::vector<std::vector<geo::TileRange>> available;
+  dem::GeoBounds bounds;
+  dem::HeightRange heights;
+  double floor_m = 0;
+  bool has_datum = true;
+  std::size_t sources = 0;                      // that it was baked from
+  int deepest_level = 0;                        // of the sources' dataset, also if the archive ends above it
+  int max_mercator_depth = 0;                   // of the height tiles in the archive
+  bool normals = false, water_mask = false;     // extensions that the tiles of quantized-mesh have
+  int metadata_levels = 0;                      // likewise; 0: none
+  std::vector<int> error_steps;                 // of tiles with a mesh, by level; empty: 0
+  std::optional<proto::TextureFormat> texture;  // of GLB tiles
+};
+
+// Thread-safe. Functions block on a disk or a network.
+class BakedTiles {
+ public:
+  virtual ~BakedTiles() = default;
+
+  // The coding that most tiles are kept in; other codings cost a decompression and perhaps a compression.
+  virtual Coding coding() const = 0;
+  virtual const BakedExtent& extent() const = 0;
+
+  // The bytes that TilePipeline::Build gives for the request. Nothing: they were not baked. kUnavailable: a file is
+  // damaged or cannot be read; the message names it.
+  virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
+
+  // DemSource::RangeBound of a tile that was baked; of others the range of the dataset.
+  virtual dem::HeightRange RangeBound(const geo::TileKey& key) const = 0;
+
+  // Why Find finds nothing for a request: kNotFound.
+  virtual Error WhyAbsent(const TileRequest& request) const = 0;
+};
+
+}  // namespace terrace::tiler
