@@ -1,27 +1,18 @@
-// The encoder of each tile format, one row each; server/api/tile_formats.cc has one row for the requests of each
-// format.
+// The tile formats and the encoder of each, one row each; server/api/tile_formats.cc has one row for the requests of
+// each format.
 #pragma once
 
+#include <cstdint>
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "proto/lattice_view.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/store/refined_tile.h"
-#include "tiler/tile_pipeline.h"
-#include "tiler/tile_request.h"
 
 namespace terrace::tiler {
 
-// What a tile is made from.
-struct EncoderInput {
-  proto::LatticeView lattice() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
+struct EncodedTile;   // encoded_tile.h
+struct EncoderInput;  // tile_pipeline.h
 
-  const Dataset& dataset;
-  const TileRequest& request;
-  const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
-  double error_m = 0;                    // the bound that the mesh keeps
-};
+enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
 
 // Sets all of `encoded` except the ETag, the compression and the times of the refinement.
 struct Encoder {

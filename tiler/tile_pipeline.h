@@ -15,10 +15,12 @@
 #include "engine/dem/image/water_raster.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
+#include "proto/lattice_view.h"
 #include "tiler/area/area_mesh.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/baked_tiles.h"
+#include "tiler/store/refined_tile.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/tile_request.h"
 
@@ -57,6 +59,16 @@ struct Dataset {
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
   std::uint64_t options = 0;     // the same without what only heights depend on (DemSource::fingerprint)
+};
+
+// What an encoder (encoders.h) makes a tile from.
+struct EncoderInput {
+  proto::LatticeView lattice() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
+
+  const Dataset& dataset;
+  const TileRequest& request;
+  const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
+  double error_m = 0;                    // the bound that the mesh keeps
 };
 
 // Heights of a dataset at points, NaN where it has none.

@@ -10,10 +10,9 @@
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "tiler/coding.h"
+#include "tiler/encoders.h"
 
 namespace terrace::tiler {
-
-enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
 
 // Pixels along an edge of a height tile; the first is the default.
 inline constexpr std::array<int, 2> kHeightSizes = {256, 512};

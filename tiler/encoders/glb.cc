@@ -15,6 +15,7 @@
 #include "tiler/encoders.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
 namespace {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "tiler/encoders.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
 namespace {

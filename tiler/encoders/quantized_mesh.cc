@@ -8,6 +8,7 @@
 #include "proto/mesh/water_mask.h"
 #include "tiler/encoders.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
 namespace {
