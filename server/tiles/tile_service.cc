@@ -78,12 +78,13 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
   const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
   // An earlier flight may have ended between the look-up in the cache and the start of this one.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
-  for (const auto& store : stores_) {
-    std::optional<tiler::EncodedTile> kept = store->Find(key);
+  for (auto store = stores_.begin(); store != stores_.end(); ++store) {
+    std::optional<tiler::EncodedTile> kept = (*store)->Find(key);
     if (!kept) continue;
-    kept->store = store->name();
+    kept->store = (*store)->name();
     tiler::TilePtr tile = Finish(request, *std::move(kept));
     cache_.Insert(key, tile);
+    for (auto above = stores_.begin(); above != store; ++above) (*above)->Insert(key, tile);
     return tile;
   }
   const Work<tiler::EncodedTile> work = [&](std::stop_token token) {

@@ -9,6 +9,8 @@
 #include <new>
 #include <optional>
 #include <thread>
+#include <unordered_map>
+#include <utility>
 
 #include "tests/server/fake_pipeline.h"
 
@@ -65,6 +67,45 @@ TEST(TileService, FindsWhatIsCachedAndBuildsNothing) {
   EXPECT_EQ(builds, 1);
   EXPECT_EQ(service.stats().hits, 1u);
   EXPECT_EQ(service.stats().misses, 1u);
+}
+
+// A tier in memory.
+class FakeStore final : public tiler::TileStore {
+ public:
+  explicit FakeStore(const char* name) : name_(name) {}
+
+  const char* name() const override { return name_; }
+  tiler::StoreStats stats() const override { return {}; }
+  void Abandon() override {}
+  std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override {
+    const auto kept = kept_.find(key);
+    return kept == kept_.end() ? std::nullopt : std::optional(*kept->second);
+  }
+  void Insert(const tiler::CacheKey& key, tiler::TilePtr tile) override { kept_[key] = std::move(tile); }
+
+  std::size_t size() const { return kept_.size(); }
+  void Clear() { kept_.clear(); }
+
+ private:
+  const char* name_;
+  std::unordered_map<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> kept_;
+};
+
+TEST(TileService, AsksTiersInOrderAndFillsThoseAbove) {
+  const auto first = std::make_shared<FakeStore>("first"), second = std::make_shared<FakeStore>("second");
+  TileServiceOptions options;
+  options.worker_threads = 1;
+  options.cache_bytes = 0;
+  options.stores = {first, second};
+  TileService service(std::move(options));
+  const CatalogPtr catalog = CatalogOf(BuildEmpty);
+  EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(first->size(), 1u);
+  EXPECT_EQ(second->size(), 1u);
+  EXPECT_STREQ(Get(service, catalog)->tile->store, "first");
+  first->Clear();
+  EXPECT_STREQ(Get(service, catalog)->tile->store, "second");
+  EXPECT_STREQ(Get(service, catalog)->tile->store, "first");
 }
 
 TEST(TileService, KeepsNoFailure) {
