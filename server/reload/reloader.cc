@@ -27,7 +27,7 @@ constexpr std::chrono::milliseconds kMinPause{50};
 constexpr std::ptrdiff_t kMaxOpenings = 2;
 
 // `started`: the configuration at the start.
-void WarnOfRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
+void WarnAboutRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
   const std::vector<std::string> differ = config::ChangedServerOptions(started, next);
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
     if (!config::TakesRestart(key)) continue;
@@ -44,7 +44,7 @@ std::map<std::string_view, bool> PublicByName(const config::Config& config) {
 }
 
 // Access to a dataset is determined at the start by its name: a new dataset with a name that was public then is public.
-void WarnOfAccess(const config::Config& started, const config::Config& now, const config::Config& next) {
+void WarnAboutAccess(const config::Config& started, const config::Config& now, const config::Config& next) {
   if (started.tokens.empty()) return;
   const auto at_start = PublicByName(started), until_now = PublicByName(now);
   for (const config::DatasetConfig& dataset : next.datasets) {
@@ -177,9 +177,9 @@ void Reloader::CheckConfigFile(bool asked) {
 
 // Datasets with an unchanged configuration are kept. The others serve their old data until the new is open.
 void Reloader::Apply(config::Config next) {
-  WarnOfRestart(started_, config_, next);
+  WarnAboutRestart(started_, config_, next);
   const bool is_rewritten = AsWritten(config_) != AsWritten(next);
-  WarnOfAccess(started_, config_, next);
+  WarnAboutAccess(started_, config_, next);
   std::map<std::string, DatasetSlot> left;
   for (DatasetSlot& slot : slots_) left.emplace(slot.wanted().name, std::move(slot));
   std::vector<DatasetSlot> slots;
