@@ -25,13 +25,13 @@ std::optional<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {
 }
 
 std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRaster> rasters, double error_fraction) {
-  std::vector<Reach> reaches;
+  std::vector<SourceExtent> extents;
   for (const PlannedRaster& raster : rasters) {
     SourceSpacing spacing;
     spacing.finer = std::min(raster.east, raster.north);
-    reaches.push_back({Footprint::Of(raster.bounds), DeepestLevel(spacing, error_fraction, std::nullopt)});
+    extents.push_back({Footprint::Of(raster.bounds), DeepestLevel(spacing, error_fraction, std::nullopt)});
   }
-  return AvailableTiles(reaches);
+  return AvailableTiles(extents);
 }
 
 }  // namespace terrace::dem

@@ -11,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "tiler/store/baked_tiles.h"
+#include "tiler/store/tile_selection.h"
 #include "tiler/store/tile_store.h"
 #include "tiler/tile_pipeline.h"
 
@@ -25,6 +27,8 @@ class BakedStore final : public tiler::TileStore {
 
   const char* name() const override { return "archive"; }
   tiler::StoreStats stats() const override;
+  // An archive is not a cache: nothing is erased.
+  Result<std::size_t> Erase(const tiler::TileSelection&) override { return std::size_t{0}; }
   void Abandon() override {}
 
   // Also nothing if a file is damaged. The log names each such fault once.

@@ -315,9 +315,10 @@ int Serve(const ServeArguments& arguments) {
   Result<server::DiskCache> disk;
   if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
-  if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
+  // Archives first: the disk cache then keeps no copies of their tiles.
   const auto baked = std::make_shared<server::BakedStore>();
   options.tile_stores.push_back(baked);
+  if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
   options.refinements =
       std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
   const auto refinements = options.refinements;

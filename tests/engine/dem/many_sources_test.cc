@@ -77,8 +77,9 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
 std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
   const GridStatistics tables(grid, trace);
   std::size_t most = 0;
-  for (std::size_t n = 0; n < trace.positions.columns() * trace.positions.rows(); ++n) {
-    const Position p = trace.positions.At(n % trace.positions.columns(), n / trace.positions.columns());
+  for (std::size_t n = 0; n < trace.cells.positions().columns() * trace.cells.positions().rows(); ++n) {
+    const Position p =
+        trace.cells.positions().At(n % trace.cells.positions().columns(), n / trace.cells.positions().columns());
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
     const std::size_t before = tables.members_visited();
     const BlockRange found = tables.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
@@ -127,9 +128,10 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
                             static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
   GridTrace trace = TraceOf(grid, lattice, corner);
   // Positions of nodes far from a raster grid and outside its projection.
-  std::vector<Position> nodes(trace.positions.nodes().begin(), trace.positions.nodes().end());
+  std::vector<Position> nodes(trace.cells.positions().nodes().begin(), trace.cells.positions().nodes().end());
   std::fill_n(nodes.begin(), 40, kNowhere);
-  trace.positions = NodePositions(trace.positions.window(), std::move(nodes));
+  const GridAxes axes = trace.cells.axes();
+  trace.cells = NodeCells(NodePositions(trace.cells.positions().window(), std::move(nodes)), axes);
   const auto [most, all] = LookAround(grid, trace);
   EXPECT_GT(all, 0U);
   EXPECT_LE(most, 8U);
