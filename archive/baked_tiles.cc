@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "proto/compress.h"
+#include "proto/mesh/quantized_mesh.h"
 #include "proto/mesh/tile_metadata.h"
 #include "tiler/strong_etag.h"
 
@@ -21,10 +22,21 @@ int StepAt(const std::vector<int>& steps, int level) {
   return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
 }
 
-// Whether the archive's tiles, but for their coding, are what the request asks for.
+proto::QuantizedMeshOptions ExtensionsOf(const TileRequest& request) {
+  return {request.normals, request.water_mask, request.metadata};
+}
+
+// The extensions that the archive's tile has.
+proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, int level) {
+  const BakedDataset& dataset = manifest.dataset;
+  return {manifest.kind.normals, manifest.kind.water_mask,
+          manifest.kind.metadata && proto::CarriesMetadata(level, dataset.metadata_levels, dataset.max_level)};
+}
+
+// Whether the archive's tiles, but for their coding and for extensions that can be removed, are what the request asks
+// for.
 bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   const TileRequest& kind = manifest.kind;
-  const BakedDataset& dataset = manifest.dataset;
   const int level = request.key.level;
   if (request.format != kind.format) return false;
   if (request.format == TileFormat::kHeightPng) {
@@ -34,20 +46,29 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   if (request.format == TileFormat::kGlb) {
     return request.compression == kind.compression && request.texture == kind.texture;
   }
-  const bool has_metadata = kind.metadata && proto::CarriesMetadata(level, dataset.metadata_levels, dataset.max_level);
-  return request.normals == kind.normals && request.water_mask == kind.water_mask && request.metadata == has_metadata;
+  const proto::QuantizedMeshOptions extensions = ExtensionsIn(manifest, level);
+  return request.normals <= extensions.normals && request.water_mask <= extensions.water_mask &&
+         request.metadata <= extensions.metadata;
 }
 
-// Nothing: the bytes are not in `from`.
-std::optional<std::string> InCoding(std::string bytes, tiler::Coding from, tiler::Coding to) {
+// The bytes of the archive's tile as the request asks for them: without extensions that it does not name, and in its
+// coding. Nothing: they are not what the manifest says.
+std::optional<std::string> AsRequested(std::string bytes, const Manifest& manifest, const TileRequest& request) {
   constexpr std::size_t kMaxTileBytes = std::size_t{1} << 30;
-  if (from == to) return bytes;
-  if (from == tiler::Coding::kGzip) {
+  const bool is_smaller = request.format == TileFormat::kQuantizedMesh &&
+                          ExtensionsOf(request) != ExtensionsIn(manifest, request.key.level);
+  if (!is_smaller && request.coding == manifest.kind.coding) return bytes;
+  if (manifest.kind.coding == tiler::Coding::kGzip) {
     std::optional<std::string> plain = proto::Gunzip(bytes, kMaxTileBytes);
     if (!plain) return std::nullopt;
     bytes = *std::move(plain);
   }
-  return tiler::Compress(std::move(bytes), to);
+  if (is_smaller) {
+    std::optional<std::string> kept = proto::KeepExtensions(bytes, ExtensionsOf(request));
+    if (!kept) return std::nullopt;
+    bytes = *std::move(kept);
+  }
+  return tiler::Compress(std::move(bytes), request.coding);
 }
 
 class Baked final : public tiler::BakedTiles {
@@ -69,11 +90,10 @@ class Baked final : public tiler::BakedTiles {
       if (!found) return tl::unexpected(std::move(found.error()));
       if (!*found) continue;
       tiler::EncodedTile tile = std::move((*found)->tile);
-      if (request.coding == manifest.kind.coding) return tile;
-      std::optional<std::string> bytes = InCoding(std::move(tile.bytes), manifest.kind.coding, request.coding);
+      std::optional<std::string> bytes = AsRequested(std::move(tile.bytes), manifest, request);
       if (!bytes) {
-        return MakeError(ErrorCode::kUnavailable, "{}: tile {} cannot be decompressed; bake it again", archive->place(),
-                         geo::ToString(request.key));
+        return MakeError(ErrorCode::kUnavailable, "{}: tile {} is not what the manifest says; bake it again",
+                         archive->place(), geo::ToString(request.key));
       }
       tile.bytes = *std::move(bytes);
       tile.etag = tiler::StrongETag(tile.bytes);
@@ -98,8 +118,8 @@ class Baked final : public tiler::BakedTiles {
     return {ErrorCode::kNotFound,
             is_of_a_kind
                 ? std::string("the dataset comes from an archive, which does not have this tile")
-                : fmt::format("the dataset comes from an archive ({}) with one error, one set of extensions and one "
-                              "compression; leave these parameters out",
+                : fmt::format("the dataset comes from an archive ({}) with one error and one compression; leave these "
+                              "parameters out",
                               formats)};
   }
 

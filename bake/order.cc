@@ -90,14 +90,14 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& or
       kind.normals = wanted.octvertexnormals;
       kind.water_mask = wanted.watermask;
       kind.metadata = wanted.metadata;
-      kind.coding = tiler::Coding::kGzip;
+      if (order.compress) kind.coding = tiler::Coding::kGzip;
       break;
     }
     case tiler::TileFormat::kGlb:
       kind.compression = dataset.glb.compression;
       if (dataset.imagery.image) kind.texture = dataset.imagery.texture;
       // Draco output is entropy-coded already.
-      if (kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
+      if (order.compress && kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
       break;
     case tiler::TileFormat::kHeightPng:
       break;

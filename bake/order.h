@@ -23,6 +23,7 @@ struct Order {
   tiler::RequestedError requested = {};
   // Of quantized-mesh. Nothing: normals, and the water mask where the dataset has one.
   std::optional<proto::TileExtensions> extensions = {};
+  bool compress = true;  // with gzip, where that makes tiles smaller
 };
 
 // The manifests of the archives, one for each format, without units. `product`: name and version of the program.

@@ -1,6 +1,7 @@
 #include "proto/mesh/quantized_mesh.h"
 
 #include <algorithm>
+#include <optional>
 #include <string_view>
 
 #include "engine/core/bytes.h"
@@ -151,6 +152,35 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
   if (options.water_mask) PutWaterMask(out, tile.water_mask);
   if (options.metadata) PutMetadata(out, tile.metadata);
   return out.Take();
+}
+
+std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options) {
+  ByteReader in(encoded);
+  const auto skip_indices = [&](std::size_t per_element) {
+    const std::size_t count = in.Get<std::uint32_t>();
+    in.GetBytes(count * per_element * sizeof(std::uint16_t));
+  };
+  in.GetBytes(kHeaderBytes);
+  skip_indices(3);  // u, v, h of the vertices
+  skip_indices(3);  // triangles
+  for (int edge = 0; edge < 4; ++edge) skip_indices(1);
+  if (!in.ok()) return std::nullopt;
+
+  const auto at = [&] { return encoded.size() - in.remaining(); };
+  std::string kept(encoded.substr(0, at()));
+  int missing = (options.normals ? 1 : 0) + (options.water_mask ? 1 : 0) + (options.metadata ? 1 : 0);
+  while (in.remaining() > 0) {
+    const std::size_t start = at();
+    const auto id = in.Get<std::uint8_t>();
+    in.GetBytes(in.Get<std::uint32_t>());
+    const bool is_wanted = (id == kOctVertexNormals && options.normals) || (id == kWaterMask && options.water_mask) ||
+                           (id == kMetadata && options.metadata);
+    if (!in.ok() || !is_wanted) continue;
+    kept.append(encoded.substr(start, at() - start));
+    --missing;
+  }
+  if (!in.ok() || missing != 0) return std::nullopt;
+  return kept;
 }
 
 }  // namespace terrace::proto

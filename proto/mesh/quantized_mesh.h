@@ -3,7 +3,9 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/geo/tile_key.h"
@@ -33,11 +35,17 @@ struct QuantizedMeshOptions {
   bool normals = false;     // extension 1, octvertexnormals
   bool water_mask = false;  // extension 2, watermask
   bool metadata = false;    // extension 4, metadata
+
+  friend bool operator==(const QuantizedMeshOptions&, const QuantizedMeshOptions&) = default;
 };
 
 // Renumbers the vertices in order of first use, as high-water-mark coding requires, and lists the edges. Computes
 // centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
 // at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
+
+// Removes the extensions that `options` does not name. The result is what EncodeQuantizedMesh returns for these
+// options. Nothing: `encoded` is no tile of EncodeQuantizedMesh, or lacks an extension that the options name.
+std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options);
 
 }  // namespace terrace::proto

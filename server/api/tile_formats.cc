@@ -40,12 +40,8 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
   tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
   tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
-  proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
-  if (dataset.baked_alone) {  // clients pass over extensions that they did not ask for
-    const tiler::BakedExtent& baked = dataset.baked_alone->extent();
-    wanted = {baked.normals, baked.water_mask, baked.metadata_levels > 0};
-  }
-  tile.normals = wanted.octvertexnormals;
+  const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
+  tile.normals = wanted.octvertexnormals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
   tile.water_mask = wanted.watermask && dataset.has_water;
   tile.metadata =
       wanted.metadata && proto::CarriesMetadata(tile.key.level, dataset.metadata_levels, dataset.deepest_level());

@@ -188,6 +188,29 @@ TEST(QuantizedMesh, ExtensionsAreTheseBytesInOrderOfTheirIds) {
   EXPECT_EQ(decoded.extensions[1].bytes, "\xff");
 }
 
+TEST(QuantizedMesh, ExtensionsCanBeRemoved) {
+  QuantizedTile tile = SmallTile();
+  tile.water_mask = {255};
+  tile.metadata = R"({"available":[]})";
+  const auto options = [](unsigned bits) {
+    return QuantizedMeshOptions{.normals = (bits & 1) != 0, .water_mask = (bits & 2) != 0, .metadata = (bits & 4) != 0};
+  };
+  for (unsigned from = 0; from < 8; ++from) {
+    const std::string encoded = EncodeQuantizedMesh(tile, options(from));
+    for (unsigned to = 0; to < 8; ++to) {
+      const std::optional<std::string> kept = KeepExtensions(encoded, options(to));
+      ASSERT_EQ(kept.has_value(), (to & ~from) == 0) << from << ' ' << to;
+      if (kept) {
+        EXPECT_EQ(*kept, EncodeQuantizedMesh(tile, options(to))) << from << ' ' << to;
+      }
+    }
+    for (std::size_t size = 0; size < encoded.size(); ++size) {
+      const std::optional<std::string> kept = KeepExtensions(encoded.substr(0, size), options(from));
+      ASSERT_FALSE(kept) << from << ' ' << size;
+    }
+  }
+}
+
 TEST(QuantizedMesh, AWholeWaterMaskKeepsItsRows) {
   QuantizedTile tile = SmallTile();
   for (int i = 0; i < 65536; ++i) tile.water_mask.push_back(static_cast<std::uint8_t>(i / 256));

@@ -59,6 +59,9 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->type_name("FORMAT")
       ->capture_default_str()
       ->group(kWhat);
+  command
+      .add_flag("--no-gzip", arguments.no_gzip, "Tiles as they are, for static hosts that cannot send Content-Encoding")
+      ->group(kWhat);
   command.add_option("--levels", arguments.levels, "The first and the last level; by default all")
       ->type_name("A-B")
       ->group(kWhat);

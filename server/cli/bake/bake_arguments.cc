@@ -153,6 +153,7 @@ Result<bake::Order> OrderOf(const BakeArguments& arguments) {
   }
   if (arguments.error > 0) order.requested = {arguments.error, std::nullopt, /*at_least=*/true};
   if (arguments.fraction > 0) order.requested = {std::nullopt, arguments.fraction, false};
+  order.compress = !arguments.no_gzip;
   if (arguments.form == kSingle && order.formats.size() > 1) {
     return MakeError(ErrorCode::kInvalidArgument, "--form single is one file of one format; --format names {}",
                      order.formats.size());

@@ -24,7 +24,7 @@ struct BakeArguments {
   double error = 0, fraction = 0;                            // 0: not given
   unsigned threads = 0;                                      // 0: one for each processor
   std::string shard;
-  bool finish = false, dry_run = false, json = false, yes = false;
+  bool finish = false, dry_run = false, json = false, yes = false, no_gzip = false;
   std::string catalogue;
   double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
   std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
