@@ -29,7 +29,8 @@ Result<archive::UnitSummary> CopyUnit(const std::string& from, const std::string
   if (!fs::exists(source, error)) return MakeError(ErrorCode::kNotFound, "{}: is missing", source.string());
   const fs::path partial = target.string() + ".partial";
   fs::create_directories(target.parent_path(), error);
-  if (!error) fs::copy_file(source, partial, fs::copy_options::overwrite_existing, error);
+  if (!error) fs::remove(partial, error);  // of an earlier run, perhaps with other permissions
+  if (!error) fs::copy_file(source, partial, error);
   if (!error && !Sync(partial)) error = std::error_code(errno, std::generic_category());
   if (!error) fs::rename(partial, target, error);
   if (error) {

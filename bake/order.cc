@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 
 #include "engine/core/plain_number.h"
 #include "engine/dem/planned_tiles.h"
@@ -47,14 +48,14 @@ std::pair<std::int64_t, std::int64_t> MercatorRows(double south, double north, s
 // Height tiles exist wherever they touch the dataset's bounds (server/tiles/catalog).
 Ranges HeightTiles(const dem::GeoBounds& bounds, int level) {
   const std::int64_t tiles = std::int64_t{1} << level;
-  const auto [first_row, last_row] = MercatorRows(bounds.south, bounds.north, tiles);
-  if (first_row > last_row) return {};
+  const auto rows = MercatorRows(bounds.south, bounds.north, tiles);
+  if (rows.first > rows.second) return {};
   const auto column = [&](double degrees) { return (degrees + 180) / 360 * static_cast<double>(tiles); };
   const auto columns = [&](double west, double east) {
     const auto first = static_cast<std::int64_t>(std::ceil(column(west))) - 1;
     const auto last = static_cast<std::int64_t>(std::floor(column(east)));
-    return geo::TileRange{std::clamp<std::int64_t>(first, 0, tiles - 1), first_row,
-                          std::clamp<std::int64_t>(last, 0, tiles - 1), last_row};
+    return geo::TileRange{std::clamp<std::int64_t>(first, 0, tiles - 1), rows.first,
+                          std::clamp<std::int64_t>(last, 0, tiles - 1), rows.second};
   };
   if (bounds.west <= bounds.east) return {columns(bounds.west, bounds.east)};
   return geo::Disjoint({columns(bounds.west, 180), columns(-180, bounds.east)});
@@ -152,7 +153,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
                                                     const std::string& product) {
   const dem::DemSource& source = *dataset.source;
   const dem::GeoBounds& data = source.info().bounds;
-  if (order.bbox && !dem::CommonBounds(data, *order.bbox)) {
+  if (order.bbox && dem::CommonBounds(data, *order.bbox).empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--bbox lies outside dataset {}, which covers {},{},{},{} (west, south, east, north)",
                      dataset.name, PlainNumber(data.west, 4), PlainNumber(data.south, 4), PlainNumber(data.east, 4),
@@ -182,9 +183,13 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.min_level = first;
     manifest.max_level = last;
     if (is_mercator) {
-      const dem::GeoBounds area = order.bbox ? *dem::CommonBounds(data, *order.bbox) : data;
+      const auto areas = order.bbox ? dem::CommonBounds(data, *order.bbox) : std::vector<dem::GeoBounds>{data};
       for (int level = 0; level <= last; ++level) {
-        manifest.available.push_back(level < first ? Ranges() : HeightTiles(area, level));
+        Ranges tiles;
+        for (const dem::GeoBounds& area : areas) {
+          if (level >= first) std::ranges::copy(HeightTiles(area, level), std::back_inserter(tiles));
+        }
+        manifest.available.push_back(tiles.empty() ? tiles : geo::Disjoint(std::move(tiles)));
       }
       continue;
     }

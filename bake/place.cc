@@ -52,18 +52,39 @@ std::string StartOf(long pid) {
   return field;
 }
 
-// The owner as the lock file has it: host, process, its start.
+// The name of a file of this process that becomes `file`.
+std::string OwnPartial(const std::string& file) {
+  return fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
+}
+
+// Names the space of process numbers: those of a container are other than those of its host.
+std::string NumberSpace() {
+  std::error_code error;
+  const std::string space = fs::read_symlink("/proc/self/ns/pid", error).string();
+  return error ? "unknown" : space;
+}
+
+// The boot of the kernel.
+std::string BootOf() {
+  std::string boot;
+  std::istringstream(ReadText("/proc/sys/kernel/random/boot_id")) >> boot;
+  return boot.empty() ? "unknown" : boot;
+}
+
+// The owner as the lock file has it: host, process, its start, boot, space of process numbers.
 struct Owner {
-  std::string host, pid, start;
+  std::string host, pid, start, boot, space;
 
   static Owner Parse(const std::string& text) {
     Owner owner;
-    std::istringstream(text) >> owner.host >> owner.pid >> owner.start;
+    std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space;
     return owner;
   }
-  // Whether the process has surely ended. Of other hosts nothing is known.
+  // Whether the process has surely ended. Of other hosts and of other containers nothing is known.
   bool HasEnded() const {
     if (host != HostName()) return false;
+    if (boot != BootOf()) return true;
+    if (space != NumberSpace()) return false;
     long number = 0;
     const auto [end, error] = std::from_chars(pid.data(), pid.data() + pid.size(), number);
     if (error != std::errc() || number <= 0) return false;
@@ -91,12 +112,12 @@ Result<void> MakeFolder(const std::string& place) {
   return {};
 }
 
-// Creates the lock file with its content at once, so that no one sees it empty. Returns errno.
-int CreateLock(const std::string& file) {
-  const std::string own = fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
+// Creates a file that does not exist yet, with its content at once, so that no one sees it empty. Returns errno.
+int CreateFile(const std::string& file, const std::string& content) {
+  const std::string own = OwnPartial(file);
   {
     std::ofstream out(own, std::ios::binary);
-    out << HostName() << ' ' << ::getpid() << ' ' << StartOf(::getpid()) << '\n';
+    out << content << '\n';
     out.flush();
     if (!out) {
       const int error = errno != 0 ? errno : EIO;
@@ -104,15 +125,52 @@ int CreateLock(const std::string& file) {
       return error;
     }
   }
-  const int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
+  int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
+  if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links
+    const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    error = made < 0 ? errno : 0;
+    if (made >= 0) ::close(made);
+    if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) error = errno;
+  }
   ::unlink(own.c_str());
   return error;
+}
+
+// Creates the lock file. Returns errno.
+int CreateLock(const std::string& file) {
+  return CreateFile(
+      file, fmt::format("{} {} {} {} {}", HostName(), ::getpid(), StartOf(::getpid()), BootOf(), NumberSpace()));
+}
+
+bool IsLock(const std::string& name) { return name.starts_with("bake") && name.ends_with(".lock"); }
+
+// A file that was not finished, of a lock, an identity, a manifest or a unit.
+bool IsPartial(const std::string& name) {
+  const bool is_ours = name.starts_with("bake") || name.starts_with(archive::kManifestFile) ||
+                       name.find(".pmtiles.") != std::string::npos;
+  return is_ours && name.ends_with(".partial");
+}
+
+// A lock in `place` that excludes `own`, of a process that may be running; empty: none. The shards of one division
+// exclude all but one another.
+std::string OtherLock(const std::string& place, const std::string& own) {
+  const auto division = [](const std::string& name) {
+    const std::size_t of = name.rfind("-of-");
+    return of == std::string::npos ? name : name.substr(of);
+  };
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(place, error)) {
+    const std::string name = entry.path().filename().string();
+    if (!IsLock(name) || name == own || (division(name) == division(own) && name != "bake.lock")) continue;
+    if (!Owner::Parse(ReadText(entry.path())).HasEnded()) return entry.path().string();
+  }
+  return {};
 }
 
 bool IsOurs(const std::string& name) {
   static const std::set<std::string> kNames = {
       kIdentityFile, archive::kManifestFile, "top.pmtiles", "units", "terrain", "glb", "png", "lost+found"};
-  return kNames.contains(name) || name.ends_with(".lock") || name.ends_with(".partial");
+  return kNames.contains(name) || IsLock(name) || IsPartial(name);
 }
 
 // The differences between a noted identity and this one, as one sentence; empty: none.
@@ -159,7 +217,16 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
   constexpr int kTries = 3;
   for (int i = 0; i < kTries; ++i) {
     const int error = CreateLock(file);
-    if (error == 0) return PlaceLock(file);
+    if (error == 0) {
+      PlaceLock lock(file);
+      const std::string other = OtherLock(place, fs::path(file).filename().string());
+      if (other.empty()) return lock;
+      const Owner owner = Owner::Parse(ReadText(other));
+      return MakeError(ErrorCode::kOverloaded,
+                       "{}: process {} on host {} is baking there, all of it or another division into shards; wait for "
+                       "it, or remove {} if that process has ended",
+                       place, owner.pid, owner.host, other);
+    }
     if (error != EEXIST) {
       return MakeError(ErrorCode::kUnavailable,
                        "{}: cannot be written: {}; give a folder with room that can be written", file, WhyOf(error));
@@ -168,12 +235,11 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
     const Owner owner = Owner::Parse(text);
     if (!owner.HasEnded()) {
       return MakeError(ErrorCode::kOverloaded,
-                       "{}: process {} on host {} is baking there; wait for it, give each process a part with --shard, "
-                       "or remove {} if that process has ended",
+                       "{}: process {} on host {} is baking there; wait for it, or remove {} if that process has ended",
                        place, owner.pid, owner.host, file);
     }
     // Another process may have taken it over meanwhile: only the lock that was read is removed.
-    const std::string stale = fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
+    const std::string stale = OwnPartial(file);
     if (::rename(file.c_str(), stale.c_str()) != 0) continue;
     if (ReadText(stale) != text) ::link(stale.c_str(), file.c_str());
     ::unlink(stale.c_str());
@@ -197,10 +263,14 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   }
   if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", place, error.message());
   const fs::path file = fs::path(place) / kIdentityFile;
-  if (fs::exists(file, error)) return CheckSame(place, ReadText(file), identity, file.string());
+  bool is_known = fs::exists(file, error);
+  if (is_known) {
+    if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
+  }
   for (const char* folder : {"", "/terrain", "/glb", "/png"}) {
     const std::string archive = place + folder;
     if (!fs::exists(fs::path(archive) / archive::kManifestFile, error)) continue;
+    is_known = true;
     const auto manifest = archive::ReadManifest(archive);
     if (!manifest) return tl::unexpected(manifest.error());
     if (auto same = CheckSame(place, manifest->options, identity, archive); !same) return same;
@@ -211,19 +281,18 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
                        place, tiler::VersionText(manifest->dataset.generation), tiler::VersionText(generation), place);
     }
   }
-  const std::string partial = file.string() + ".partial";
-  {
-    std::ofstream out(partial, std::ios::binary);
-    out << ToJson(identity) << '\n';
-    out.flush();
-    if (!out) {
-      const int why = errno;
-      ::unlink(partial.c_str());
-      return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), WhyOf(why));
+  if (!is_known) {
+    for (const char* name : {"top.pmtiles", "units", "terrain", "glb", "png"}) {
+      if (!fs::exists(fs::path(place) / name, error)) continue;
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
+                       place, name);
     }
   }
-  fs::rename(partial, file, error);
-  if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), error.message());
+  if (fs::exists(file, error)) return {};
+  const int why = CreateFile(file.string(), ToJson(identity));
+  if (why == EEXIST) return CheckSame(place, ReadText(file), identity, file.string());  // of another shard
+  if (why != 0) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), WhyOf(why));
   return {};
 }
 
@@ -240,7 +309,7 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
       for (const auto& entry : fs::directory_iterator(within, ignored)) {
         const std::string name = entry.path().filename().string();
         const bool is_unit = name.ends_with(".pmtiles");
-        if ((is_unit && !wanted.contains(name)) || name.ends_with(".partial")) leftovers.push_back(entry.path());
+        if ((is_unit && !wanted.contains(name)) || IsPartial(name)) leftovers.push_back(entry.path());
       }
     }
     for (const fs::path& file : leftovers) fs::remove(file, ignored);

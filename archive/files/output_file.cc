@@ -81,6 +81,7 @@ OutputFile::~OutputFile() = default;
 Result<OutputFile> OutputFile::Create(const std::string& path) {
   if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
   auto impl = std::make_unique<Impl>(path);
+  ::unlink(impl->partial.c_str());  // of an earlier run, perhaps with other permissions
   impl->descriptor = ::open(impl->partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
   if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
   return OutputFile(std::move(impl));

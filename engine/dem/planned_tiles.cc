@@ -12,16 +12,17 @@ std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level) {
   return TilesTouching(Footprint::Of(box), level);
 }
 
-std::optional<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {
+std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {
   const Footprint first = Footprint::Of(a), second = Footprint::Of(b);
   const double south = std::max(first.south, second.south), north = std::min(first.north, second.north);
-  if (south >= north) return std::nullopt;
+  std::vector<GeoBounds> common;
+  if (south >= north) return common;
   for (const double turn : {0.0, -360.0, 360.0}) {
     const double west = std::max(first.west, second.west + turn), east = std::min(first.east, second.east + turn);
     if (west >= east) continue;
-    return GeoBounds{west > 180 ? west - 360 : west, south, east > 180 ? east - 360 : east, north};
+    common.push_back({west > 180 ? west - 360 : west, south, east > 180 ? east - 360 : east, north});
   }
-  return std::nullopt;
+  return common;
 }
 
 std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRaster> rasters, double error_fraction) {

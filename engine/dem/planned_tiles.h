@@ -1,7 +1,6 @@
 // The tiles of areas, and of sources that are only planned. Opens no rasters.
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,8 +13,8 @@ namespace terrace::dem {
 // overlap.
 std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level);
 
-// The intersection of two boxes that do not surround each other's gap; nothing if they do not overlap.
-std::optional<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
+// The intersection of two boxes: none, one, or two boxes if one of them surrounds the gap of the other.
+std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
 
 // A raster as far as it decides which tiles exist.
 struct PlannedRaster {

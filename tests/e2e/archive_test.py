@@ -282,7 +282,7 @@ class ArchiveTest(unittest.TestCase):
         reader = SOURCE_DIR / "docs/formats/read_archive.py"
         with self.serve_alone() as server:
             for suffix, level, x, y in (("terrain", 0, 1, 0), ("terrain", 9, 532, 387), ("glb", 5, 33, 24), ("png", 8, 132, 90)):
-                status, _, wanted = server.get(f"/cell/{level}/{x}/{y}.{suffix}", {"Accept-Encoding": "identity"})
+                status, _, wanted = server.get(f"/cell/{level}/{x}/{y}.{suffix}", {"Accept-Encoding": "identity", **QUANTIZED})
                 self.assertEqual(status, 200, (suffix, level, x, y))
                 read = subprocess.run([sys.executable, reader, self.place / suffix, str(level), str(x), str(y)],
                                       capture_output=True, check=True).stdout

@@ -142,7 +142,7 @@ class Purge(unittest.TestCase):
                 erased = server.purge(f"dataset=alps&bbox={west},{south},{east},{north}&levels=8-9")
                 a_round()
                 self.assertEqual(server.builds(), len(targets) + len(chosen), "built again: what was chosen")
-                self.assertEqual(erased["tiles"], {"memory": len(chosen), "disk": len(chosen)})
+                self.assertEqual(erased["tiles"], {"memory": len(chosen), "archive": 0, "disk": len(chosen)})
                 server.purge("dataset=alps")
                 a_round()
                 self.assertEqual(server.builds(), 2 * len(targets) + len(chosen), "built again: all")
@@ -165,7 +165,7 @@ class Purge(unittest.TestCase):
             server.get(target)
             self.assertEqual(server.builds(), 0, "from disk")
             self.assertEqual(server.purge("dataset=alps&levels=9"),
-                             {"tiles": {"memory": 1, "disk": 1}, "refinements": {"memory": 0, "disk": 1}})
+                             {"tiles": {"memory": 1, "archive": 0, "disk": 1}, "refinements": {"memory": 0, "disk": 1}})
         with Server(config, self.folder) as server:
             server.get(target)
             self.assertEqual(server.builds(), 1)

@@ -160,7 +160,10 @@ void AddBake(CLI::App& app, int& exit_code) {
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
   AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
-  command->callback([arguments, &exit_code] { exit_code = FinishOutput(Bake(*arguments)); });
+  command->callback([arguments, &exit_code] {
+    while (arguments->out.size() > 1 && arguments->out.ends_with('/')) arguments->out.pop_back();
+    exit_code = FinishOutput(Bake(*arguments));
+  });
 }
 
 }  // namespace terrace::cli

@@ -291,7 +291,9 @@ int Bake(const BakeArguments& arguments) {
   std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
   const StopSignals signals;
   spdlog::set_level(spdlog::level::warn);
-  if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) return cli::Fail(wrong, kExitUsage);
+  if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) {
+    return cli::Fail(wrong + "\nRun 'terrace bake --help' for what is accepted.", kExitUsage);
+  }
   const auto order = OrderOf(arguments);
   if (!order) return Fail(order.error());
   const auto shard = ShardOf(arguments.shard);

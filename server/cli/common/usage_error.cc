@@ -75,15 +75,16 @@ std::string ExplainFlag(const CLI::App& command, const CLI::App& program, const 
   for (const CLI::App* other : program.get_subcommands({})) {
     if (other != &command) others.push_back(other);
   }
+  const auto meant = NearestFlags(command, flag);
   for (const CLI::App* other : others) {
-    if (other->get_option_no_throw(flag) == nullptr) continue;
+    if (!meant.empty() || other->get_option_no_throw(flag) == nullptr) continue;
     return fmt::format("{}{}; it is one of 'terrace {}'", unknown, &command == &program ? " before the command" : "",
                        other->get_name());
   }
   if (const std::string_view key = KeyWithoutFlag(flag); !key.empty()) {
     return fmt::format("{}; \"{}\" stands in the configuration alone (terrace serve --config FILE)", unknown, key);
   }
-  if (const auto meant = NearestFlags(command, flag); !meant.empty()) return unknown + DidYouMean(meant);
+  if (!meant.empty()) return unknown + DidYouMean(meant);
   std::vector<std::string> elsewhere;
   for (const CLI::App* other : others) {
     const std::vector<std::string> meant = NearestFlags(*other, flag);
