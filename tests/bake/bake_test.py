@@ -197,8 +197,11 @@ class Bake(unittest.TestCase):
 
     def test_damaged_and_foreign_units_are_baked_again(self):
         place = self.place("damaged")
-        shutil.copytree(self.reference, place)
-        (place / "manifest.json").unlink()
+        begun = self.start("--out", place, "--json", "--threads", 1)
+        begun.stdout.readline()
+        begun.kill()
+        begun.communicate()
+        shutil.copytree(self.reference, place, dirs_exist_ok=True, ignore=shutil.ignore_patterns("manifest.json"))
         units = sorted((place / "units").glob("*.pmtiles"))
         data = bytearray(units[0].read_bytes())
         data[len(data) // 2] ^= 1
@@ -266,11 +269,38 @@ class Bake(unittest.TestCase):
         second = self.run_bake("--out", place)
         self.assertEqual(second.returncode, 1)
         self.assertIn(f"process {first.pid}", second.stderr)
-        self.assertIn("--shard", second.stderr)
+        part = self.run_bake("--out", place, "--shard", "0/2")
+        self.assertEqual((part.returncode, f"process {first.pid}" in part.stderr), (1, True), part.stderr)
         first.kill()
         first.communicate()
         self.assertEqual(self.run_bake("--out", place).returncode, 0)
         self.expect_equal(place)
+
+    def test_shards_that_start_together_and_other_divisions(self):
+        place = self.place("together")
+        shards = [self.start("--out", place, "--shard", f"{i}/8") for i in range(8)]
+        for shard in shards:
+            shard.communicate()
+        self.assertEqual([shard.returncode for shard in shards], [0] * 8)
+        held = self.start("--out", place, "--json", "--shard", "0/2")
+        held.send_signal(signal.SIGSTOP)
+        while not (place / "bake-0-of-2.lock").exists() and held.poll() is None:
+            held.send_signal(signal.SIGCONT)
+            time.sleep(0.01)
+            held.send_signal(signal.SIGSTOP)
+        for other in (("--shard", "0/3"), ("--finish",)):
+            done = self.run_bake("--out", place, *other)
+            self.assertEqual((done.returncode, f"process {held.pid}" in done.stderr), (1, True), done.stderr)
+        held.kill()
+        held.communicate()
+
+    def test_files_that_are_not_of_a_bake_stay(self):
+        place = self.place("foreign")
+        (place / "units").mkdir(parents=True)
+        (place / "units/mine.pmtiles").touch()
+        done = self.run_bake("--out", place)
+        self.assertEqual((done.returncode, "holds units" in done.stderr), (2, True), done.stderr)
+        self.assertTrue((place / "units/mine.pmtiles").exists())
 
     def test_a_finished_bake_is_kept(self):
         place = self.place("finished")
