@@ -35,7 +35,10 @@ class ArchiveBase : public Archive {
     if (!file) return tl::unexpected(file.error());
     if (*file == nullptr) return std::nullopt;
     Result<std::optional<CheckedTile>> found = (*file)->Find(TileIdOf(PmtilesKeyOf(key, is_mercator)));
-    if (!found) return tl::unexpected(std::move(found.error()));
+    if (!found) {
+      Forget(key);
+      return tl::unexpected(std::move(found.error()));
+    }
     if (!*found) return std::nullopt;
     return ArchivedTile{std::move((*found)->tile), (*found)->range};
   }
@@ -59,6 +62,8 @@ class ArchiveBase : public Archive {
  protected:
   // Null: the archive has no file with this tile.
   virtual Result<FilePtr> FileOf(const geo::TileKey& key) const = 0;
+  // The file of this tile is damaged: the next look-up opens it again, since it may have been repaired meanwhile.
+  virtual void Forget(const geo::TileKey& key) const = 0;
   virtual Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const = 0;
 
  private:
@@ -73,6 +78,7 @@ class SingleArchive final : public ArchiveBase {
 
  protected:
   Result<FilePtr> FileOf(const geo::TileKey&) const override { return file_; }
+  void Forget(const geo::TileKey&) const override {}  // a reload opens it again
   Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const override {
     return take(*file_);
   }
@@ -107,6 +113,12 @@ class ChunkedArchive final : public ArchiveBase {
     return file;
   }
 
+  void Forget(const geo::TileKey& key) const override {
+    const auto unit = units_.find(UnitNameOf(key));
+    const std::lock_guard lock(mutex_);
+    if (unit != units_.end()) open_.remove_if([&](const Open& open) { return open.unit == unit->second; });
+  }
+
   Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const override {
     for (const UnitEntry& unit : manifest().units) {
       if (unit.tiles == 0) continue;
@@ -125,7 +137,8 @@ class ChunkedArchive final : public ArchiveBase {
 
   Result<FilePtr> OpenUnit(const UnitEntry& unit) const {
     const std::string path = place() + "/" + UnitPath(unit.name);
-    Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path);
+    constexpr std::size_t kMaxMetadataBytes = std::size_t{1} << 20;  // a unit's metadata is short
+    Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path, kMaxMetadataBytes);
     if (!file) {
       if (file.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(file.error()));
       return MakeError(ErrorCode::kUnavailable, "{} is missing, although the manifest names it; bake it again", path);

@@ -11,7 +11,6 @@
 namespace terrace::archive {
 namespace {
 
-constexpr std::size_t kMaxMetadataBytes = std::size_t{256} << 20;  // not compressed
 constexpr std::size_t kRecentLeaves = 8;
 
 // The last entry that begins at or before the tile.
@@ -26,15 +25,15 @@ Error PmtilesFile::Damaged(const std::string& how) const {
   return {ErrorCode::kUnavailable, fmt::format("{} is damaged: {}; copy it again, or bake it again", path_, how)};
 }
 
-Result<std::unique_ptr<const PmtilesFile>> PmtilesFile::Open(const std::string& path) {
+Result<std::unique_ptr<const PmtilesFile>> PmtilesFile::Open(const std::string& path, std::size_t max_metadata_bytes) {
   Result<std::unique_ptr<const InputFile>> input = InputFile::Open(path);
   if (!input) return tl::unexpected(std::move(input.error()));
   std::unique_ptr<PmtilesFile> file(new PmtilesFile(path, *std::move(input)));
-  if (Result<void> read = file->ReadHead(); !read) return tl::unexpected(std::move(read.error()));
+  if (Result<void> read = file->ReadHead(max_metadata_bytes); !read) return tl::unexpected(std::move(read.error()));
   return file;
 }
 
-Result<void> PmtilesFile::ReadHead() {
+Result<void> PmtilesFile::ReadHead(std::size_t max_metadata_bytes) {
   const Result<std::string> head = file_->Read(0, std::min<std::uint64_t>(kHeadBytes, bytes()));
   if (!head) return tl::unexpected(head.error());
   const Result<PmtilesHeader> header = DecodeHeader(*head, bytes());
@@ -48,9 +47,10 @@ Result<void> PmtilesFile::ReadHead() {
   if (std::ranges::any_of(root_, [](const DirectoryEntry& entry) { return entry.run > 0; })) {
     return tl::unexpected(Damaged("its root directory names tiles, so that another program wrote it"));
   }
+  if (header_.metadata.length > max_metadata_bytes) return tl::unexpected(Damaged("its metadata is too long"));
   const Result<std::string> metadata = file_->Read(header_.metadata.offset, header_.metadata.length);
   if (!metadata) return tl::unexpected(metadata.error());
-  std::optional<std::string> json = proto::Gunzip(*metadata, kMaxMetadataBytes);
+  std::optional<std::string> json = proto::Gunzip(*metadata, max_metadata_bytes);
   if (!json) return tl::unexpected(Damaged("its metadata cannot be decompressed"));
   metadata_ = *std::move(json);
   return {};

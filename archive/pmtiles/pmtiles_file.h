@@ -20,7 +20,8 @@ namespace terrace::archive {
 class PmtilesFile {
  public:
   // Errors of InputFile::Open. kUnavailable: the file is damaged. Messages name it.
-  static Result<std::unique_ptr<const PmtilesFile>> Open(const std::string& path);
+  static Result<std::unique_ptr<const PmtilesFile>> Open(const std::string& path,
+                                                         std::size_t max_metadata_bytes = std::size_t{256} << 20);
 
   const PmtilesHeader& header() const { return header_; }
   std::uint64_t bytes() const { return file_->size(); }
@@ -44,7 +45,7 @@ class PmtilesFile {
 
   PmtilesFile(std::string path, std::unique_ptr<const InputFile> file)
       : path_(std::move(path)), file_(std::move(file)) {}
-  Result<void> ReadHead();
+  Result<void> ReadHead(std::size_t max_metadata_bytes);
   Result<LeafPtr> ReadLeaf(const DirectoryEntry& leaf) const;
   Result<LeafPtr> FindLeaf(const DirectoryEntry& leaf) const;
   Result<CheckedTile> ReadTile(const Leaf& leaf, std::size_t entry, std::uint64_t tile_id) const;

@@ -106,6 +106,25 @@ TEST_F(HostileArchiveTest, BytesOfOneTileInPlaceOfAnother) {
   EXPECT_EQ(ReadAll(), static_cast<int>(keys_.size()) - 2);
 }
 
+TEST_F(HostileArchiveTest, RepairedFileIsOpenedAgain) {
+  std::string bad = good_;
+  bad[bad.find("tile 1/0/1") + 7] = '9';
+  std::filesystem::remove(unit_);  // another file, as when it is copied again
+  WriteText(unit_, bad);
+  const auto archive = Archive::Open(place_);
+  ASSERT_TRUE(archive);
+  int damaged = 0;
+  for (const geo::TileKey& key : keys_) damaged += (*archive)->Find(key) ? 0 : 1;
+  EXPECT_EQ(damaged, 1);
+  std::filesystem::remove(unit_);
+  WriteText(unit_, good_);
+  for (int round = 0; round < 2; ++round) {
+    damaged = 0;
+    for (const geo::TileKey& key : keys_) damaged += (*archive)->Find(key) ? 0 : 1;
+  }
+  EXPECT_EQ(damaged, 0);
+}
+
 TEST_F(HostileArchiveTest, LeafThatNamesItself) {
   PmtilesHeader header = *DecodeHeader(good_, good_.size());
   const std::string leaf = EncodeDirectory({{0, 0, 60, 0}});
