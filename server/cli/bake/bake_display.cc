@@ -26,7 +26,7 @@ std::string Duration(double seconds) {
   return fmt::format("{:.1f} h", seconds / 3600);
 }
 
-const char* NameOf(bake::UnitOutcome outcome) {
+const char* OutcomeName(bake::UnitOutcome outcome) {
   switch (outcome) {
     case bake::UnitOutcome::kBaked:
       return "baked";
@@ -104,7 +104,7 @@ std::string UnitJson(const bake::UnitReport& report, const std::vector<bake::Tar
   Json json;
   json["unit"] = report.entry.name;
   json["format"] = archive::FolderOf(targets[report.target].manifest.kind.format);
-  json["outcome"] = NameOf(report.outcome);
+  json["outcome"] = OutcomeName(report.outcome);
   json["key"] = fmt::format("{:016x}", report.entry.key);
   json["tiles"] = report.entry.tiles;
   json["bytes"] = report.entry.bytes;
