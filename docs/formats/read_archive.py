@@ -1,5 +1,5 @@
 """Reads a tile of an archive: read_archive.py PLACE LEVEL X Y > tile. PLACE is a folder with a manifest.json."""
-import gzip, json, pathlib, struct, sys
+import gzip, itertools, json, pathlib, struct, sys
 
 def varints(data):
     value = shift = 0
@@ -12,8 +12,8 @@ def varints(data):
 
 def directory(compressed):  # (first tile, tiles, length, offset) of each entry; tiles 0: a leaf directory
     number = varints(gzip.decompress(compressed))
-    count, at, end, offsets = next(number), 0, 0, []
-    ids = [at := at + next(number) for _ in range(count)]
+    count, end, offsets = next(number), 0, []
+    ids = list(itertools.accumulate(next(number) for _ in range(count)))
     runs, lengths = [next(number) for _ in range(count)], [next(number) for _ in range(count)]
     for length, written in zip(lengths, number):
         offsets.append(written - 1 if written else end)

@@ -43,7 +43,6 @@ tiler::Dataset DatasetOf(std::uint64_t generation) {
 TEST(BakedStoreTest, FindsTilesOfTheGenerationThatWasBaked) {
   BakedStore store;
   EXPECT_FALSE(store.Find(KeyOf(7, 0)));
-  EXPECT_FALSE(store.stats().on);
   store.Use({DatasetOf(7)});
   ASSERT_TRUE(store.Find(KeyOf(7, 0)));
   EXPECT_EQ(store.Find(KeyOf(7, 0))->bytes, "baked");
