@@ -18,7 +18,7 @@
 namespace terrace::archive {
 
 struct ArchivedTile {
-  tiler::EncodedTile tile;  // as it was added, with its ETag; no times and no head
+  tiler::EncodedTile tile;  // as it was added, without ETag, times and head
   dem::HeightRange range;
 };
 

@@ -16,23 +16,6 @@
 namespace terrace::archive {
 namespace {
 
-// Counts tiles, and ends after a stop.
-class Counter {
- public:
-  explicit Counter(const ExportOptions& options) : options_(options) {}
-
-  Result<void> Count() {
-    if (options_.stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
-    ++tiles_;
-    if (options_.progress) options_.progress(tiles_);
-    return {};
-  }
-
- private:
-  const ExportOptions& options_;
-  std::uint64_t tiles_ = 0;
-};
-
 dem::GeoBounds HeaderBounds(const Manifest& manifest) {
   dem::GeoBounds bounds = manifest.dataset.bounds;
   if (bounds.west > bounds.east || bounds.east > 180 || bounds.west < -180) {
@@ -88,7 +71,7 @@ class PartialFolder {
 
 }  // namespace
 
-Result<void> WriteSingle(const Archive& archive, const std::string& out, const ExportOptions& options) {
+Result<void> WriteSingle(const Archive& archive, const std::string& out, const std::stop_token& stop) {
   const Manifest& manifest = archive.manifest();
   Result<PmtilesOptions> file_options = PmtilesOptionsOf(manifest.kind, std::nullopt);
   if (!file_options) return tl::unexpected(std::move(file_options.error()));
@@ -96,9 +79,8 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const E
   Result<PmtilesWriter> writer = PmtilesWriter::Create(out, *file_options);
   if (!writer) return tl::unexpected(std::move(writer.error()));
   const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
-  Counter counter(options);
   const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
-    if (Result<void> goes_on = counter.Count(); !goes_on) return goes_on;
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     return writer->Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile.tile, tile.range);
   });
   if (!copied) return copied;
@@ -107,7 +89,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const E
   return {};
 }
 
-Result<void> WriteFolder(const Archive& archive, const std::string& out, const ExportOptions& options) {
+Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop) {
   const Manifest& manifest = archive.manifest();
   if (manifest.kind.format == tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -116,9 +98,8 @@ Result<void> WriteFolder(const Archive& archive, const std::string& out, const E
   if (Result<void> is_free = CheckFree(out); !is_free) return is_free;
   const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
   PartialFolder folder(out);
-  Counter counter(options);
   const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
-    if (Result<void> goes_on = counter.Count(); !goes_on) return goes_on;
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     const std::string path =
         fmt::format("{}/{}.{}", folder.partial(), geo::ToString(key), is_mercator ? "png" : "terrain");
     return WriteUnsynced(path, tile.tile.bytes);

@@ -5,10 +5,12 @@
 // its place.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -39,15 +41,12 @@ struct BakedDataset {
   std::uint64_t generation = 0;
   double error_fraction = 0.5;
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
-  std::optional<proto::TextureFormat> texture;                            // likewise; nothing: no imagery
   dem::GeoBounds bounds;                                                  // of the data
   dem::HeightRange heights;                                               // of the data
   double floor_m = 0;
   bool has_datum = true;
-  bool has_water = false;
   int metadata_levels = 0;
-  int max_level = 0;           // of the dataset, also where the archive ends above it
-  int max_mercator_depth = 1;  // likewise of height tiles
+  int max_level = 0;  // of the dataset, also where the archive ends above it
   std::uint64_t sources = 1;
 };
 
@@ -63,14 +62,20 @@ struct Manifest {
   // The tiles in the archive by level, 0 .. max_level, as in proto::LayerDescription; of height tiles in the XYZ
   // scheme. Empty below min_level.
   std::vector<std::vector<geo::TileRange>> available;
-  std::string options;  // JSON object, as the baker got them; only for people
+  std::string identity;  // JSON object: what the baker was asked for; a later run at the same place compares it
   std::vector<UnitEntry> units;
 };
 
 // Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels roots a further unit.
 inline constexpr int kTopLevels = 7;
 
-// "terrain", "glb" or "png".
+// The formats in the order of their folders, and the folders' names.
+inline constexpr std::array<std::pair<tiler::TileFormat, std::string_view>, 3> kFormatNames = {
+    {{tiler::TileFormat::kQuantizedMesh, "terrain"},
+     {tiler::TileFormat::kGlb, "glb"},
+     {tiler::TileFormat::kHeightPng, "png"}}};
+
+// The name of a format in kFormatNames.
 std::string FolderOf(tiler::TileFormat format);
 
 // The unit of a tile: "top" or "7-X-Y". UnitRoot is its inverse: the root's key, nothing for "top".

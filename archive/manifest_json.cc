@@ -24,9 +24,7 @@ constexpr const char* kFormatMember = "terrace_archive";
 template <typename T>
 using Names = std::vector<std::pair<T, std::string_view>>;
 
-const Names<tiler::TileFormat> kFormats = {{tiler::TileFormat::kQuantizedMesh, "terrain"},
-                                           {tiler::TileFormat::kGlb, "glb"},
-                                           {tiler::TileFormat::kHeightPng, "png"}};
+const Names<tiler::TileFormat> kFormats(kFormatNames.begin(), kFormatNames.end());
 const Names<tiler::Coding> kCodings = {{tiler::Coding::kIdentity, "identity"}, {tiler::Coding::kGzip, "gzip"}};
 const Names<proto::GlbCompression> kCompressions = {{proto::GlbCompression::kDraco, "draco"},
                                                     {proto::GlbCompression::kNone, "none"},
@@ -95,8 +93,8 @@ T WholeOf(const Json& json, T min, T max) {
 constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
 Json DatasetJson(const BakedDataset& dataset) {
-  const auto& [name, attribution, generation, error_fraction, glb_compression, texture, bounds, heights, floor_m,
-               has_datum, has_water, metadata_levels, max_level, max_mercator_depth, sources] = dataset;
+  const auto& [name, attribution, generation, error_fraction, glb_compression, bounds, heights, floor_m, has_datum,
+               metadata_levels, max_level, sources] = dataset;
   Json json;
   json["name"] = name;
   json["attribution"] = attribution;
@@ -104,15 +102,12 @@ Json DatasetJson(const BakedDataset& dataset) {
   json["generation"] = fmt::format("{:016x}", generation);
   json["error_fraction"] = error_fraction;
   json["glb_compression"] = NameOf(kCompressions, glb_compression);
-  json["texture"] = texture ? Json(NameOf(kTextures, *texture)) : Json(nullptr);
   json["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
   json["heights"] = {heights.min, heights.max};
   json["floor"] = floor_m;
   json["has_datum"] = has_datum;
-  json["has_water"] = has_water;
   json["metadata_levels"] = metadata_levels;
   json["max_level"] = max_level;
-  json["max_mercator_depth"] = max_mercator_depth;
   json["sources"] = sources;
   return json;
 }
@@ -125,16 +120,13 @@ BakedDataset ReadDataset(const Json& json) {
   dataset.error_fraction = NumberOf(json.at("error_fraction"));
   if (dataset.error_fraction <= 0) throw Wrong("error_fraction must be above 0");
   dataset.glb_compression = ValueOf(kCompressions, json.at("glb_compression"));
-  if (const Json& texture = json.at("texture"); !texture.is_null()) dataset.texture = ValueOf(kTextures, texture);
   const Json& bounds = json.at("bounds");
   dataset.bounds = {NumberOf(bounds.at(0)), NumberOf(bounds.at(1)), NumberOf(bounds.at(2)), NumberOf(bounds.at(3))};
   dataset.heights = {NumberOf(json.at("heights").at(0)), NumberOf(json.at("heights").at(1))};
   dataset.floor_m = NumberOf(json.at("floor"));
   dataset.has_datum = json.at("has_datum").get<bool>();
-  dataset.has_water = json.at("has_water").get<bool>();
   dataset.metadata_levels = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
   dataset.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
-  dataset.max_mercator_depth = WholeOf<int>(json.at("max_mercator_depth"), 0, geo::kMaxLevel);
   dataset.sources = WholeOf<std::uint64_t>(json.at("sources"), 0, kAnyCount);
   return dataset;
 }
@@ -237,7 +229,7 @@ Manifest Read(const Json& json) {
   manifest.min_level = WholeOf<int>(json.at("min_level"), 0, manifest.max_level);
   ReadKind(json.at("tiles"), manifest);
   ReadAvailable(json.at("available"), manifest);
-  manifest.options = json.at("options").dump();
+  manifest.identity = json.at("identity").dump();
   std::set<std::string> names;
   for (const Json& unit : json.at("units")) {
     manifest.units.push_back(ReadUnit(unit));
@@ -258,8 +250,8 @@ std::string ToJson(const Manifest& manifest) {
   json["min_level"] = manifest.min_level;
   json["max_level"] = manifest.max_level;
   json["available"] = AvailableJson(manifest.available);
-  const Json options = Json::parse(manifest.options, nullptr, /*allow_exceptions=*/false);
-  json["options"] = options.is_object() ? options : Json::object();
+  const Json identity = Json::parse(manifest.identity, nullptr, /*allow_exceptions=*/false);
+  json["identity"] = identity.is_object() ? identity : Json::object();
   Json& units = json["units"] = Json::array();
   for (const UnitEntry& unit : manifest.units) {
     units.push_back({{"name", unit.name},

@@ -45,7 +45,7 @@ struct UnitOptions {
   std::uint64_t key = 0;    // UnitEntry::key; kept in the file
 };
 
-// Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 60 bytes for
+// Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 80 bytes for
 // each.
 Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const std::string& name,
                                                const UnitOptions& options);

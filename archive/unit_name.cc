@@ -1,6 +1,7 @@
 // Names and paths of the files of an archive.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 
 #include "archive/manifest.h"
@@ -26,15 +27,8 @@ bool TakeHyphen(std::string_view& text) {
 }  // namespace
 
 std::string FolderOf(tiler::TileFormat format) {
-  switch (format) {
-    case tiler::TileFormat::kQuantizedMesh:
-      return "terrain";
-    case tiler::TileFormat::kGlb:
-      return "glb";
-    case tiler::TileFormat::kHeightPng:
-      return "png";
-  }
-  return "terrain";
+  const auto* const row = std::ranges::find(kFormatNames, format, [](const auto& known) { return known.first; });
+  return std::string(row->second);
 }
 
 std::string UnitNameOf(const geo::TileKey& key) {

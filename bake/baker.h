@@ -64,7 +64,6 @@ struct Counters {
 
 struct BakeOptions {
   unsigned threads = 1;
-  Shard shard = {};
   bool only_verify = false;  // bake nothing: units that are not there are kMissing
   // Called for each unit, one call at a time. May be empty.
   std::function<void(const UnitReport&)> on_unit = {};

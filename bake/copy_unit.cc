@@ -1,51 +1,31 @@
 #include "bake/copy_unit.h"
 
-#include <fcntl.h>
-#include <unistd.h>
+#include <algorithm>
+#include <cstdint>
+#include <memory>
 
-#include <filesystem>
-#include <system_error>
+#include "archive/files/input_file.h"
+#include "archive/files/output_file.h"
 
 namespace terrace::bake {
-namespace {
-
-namespace fs = std::filesystem;
-
-// The data is on the disk before the name is.
-bool Sync(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const bool is_done = ::fsync(descriptor) == 0;
-  ::close(descriptor);
-  return is_done;
-}
-
-}  // namespace
 
 Result<archive::UnitSummary> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry) {
-  const fs::path source = fs::path(from) / archive::UnitPath(entry.name),
-                 target = fs::path(to) / archive::UnitPath(entry.name);
-  std::error_code error;
-  if (!fs::exists(source, error)) return MakeError(ErrorCode::kNotFound, "{}: is missing", source.string());
-  const fs::path partial = target.string() + ".partial";
-  fs::create_directories(target.parent_path(), error);
-  if (!error) fs::remove(partial, error);  // of an earlier run, perhaps with other permissions
-  if (!error) fs::copy_file(source, partial, error);
-  if (!error && !Sync(partial)) error = std::error_code(errno, std::generic_category());
-  if (!error) fs::rename(partial, target, error);
-  if (error) {
-    std::error_code ignored;
-    fs::remove(partial, ignored);
-    return MakeError(ErrorCode::kUnavailable, "{}: cannot be copied to {}: {}", source.string(), target.string(),
-                     error.message());
+  const std::string source = from + "/" + archive::UnitPath(entry.name);
+  const Result<std::unique_ptr<const archive::InputFile>> in = archive::InputFile::Open(source);
+  if (!in) return tl::unexpected(in.error());
+  Result<archive::OutputFile> out = archive::OutputFile::Create(to + "/" + archive::UnitPath(entry.name));
+  if (!out) return tl::unexpected(out.error());
+  constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
+  for (std::uint64_t at = 0; at < (*in)->size(); at += kPiece) {
+    const Result<std::string> bytes = (*in)->Read(at, std::min(kPiece, (*in)->size() - at));
+    if (!bytes) return tl::unexpected(bytes.error());
+    if (auto written = out->Write(*bytes); !written) return tl::unexpected(written.error());
   }
-  auto copied = archive::VerifyUnit(to, entry.name, entry.key);
-  const bool is_same =
-      copied && copied->tiles == entry.tiles && copied->bytes == entry.bytes && copied->xxh3 == entry.xxh3;
-  if (is_same) return copied;
-  fs::remove(target, error);
-  if (!copied) return copied;
-  return MakeError(ErrorCode::kInvalidArgument, "{}: is not the file of its manifest", source.string());
+  if (out->size() != entry.bytes || out->xxh3() != entry.xxh3) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is not the file that its manifest describes", source);
+  }
+  if (auto finished = out->Finish(); !finished) return tl::unexpected(finished.error());
+  return archive::UnitSummary{entry.tiles, entry.bytes, entry.xxh3};
 }
 
 }  // namespace terrace::bake

@@ -89,13 +89,14 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
       }
       const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - start;
       const auto each = [&](double sum) { return sum / static_cast<double>(samples.size()); };
-      levels.push_back({level, count, each(static_cast<double>(bytes)), each(took.count())});
+      levels.push_back({archive::FolderOf(manifest.kind.format), level, count, each(static_cast<double>(bytes)),
+                        each(took.count())});
       sampled += samples.size();
     }
   }
   Estimate estimate = Sum(std::move(levels));
   estimate.files = plan.files;
-  for (const UnitPlan::Of& of : plan.units) estimate.units += ReachesDown(of.unit) ? of.targets.size() : 0;
+  for (const UnitPlan::Of& of : plan.units) estimate.subtrees += ReachesDown(of.unit) ? of.targets.size() : 0;
   estimate.sampled = sampled;
   return estimate;
 }
@@ -103,12 +104,13 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
 Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double milliseconds_per_tile) {
   std::vector<LevelEstimate> levels;
   for (std::size_t level = 0; level < tiles.size(); ++level) {
-    levels.push_back({static_cast<int>(level), CountTiles({tiles[level]}), bytes_per_tile, milliseconds_per_tile});
+    levels.push_back({archive::FolderOf(tiler::TileFormat::kQuantizedMesh), static_cast<int>(level),
+                      CountTiles({tiles[level]}), bytes_per_tile, milliseconds_per_tile});
   }
   Estimate estimate = Sum(std::move(levels));
   const std::vector<Unit> units = UnitsOf(tiles);
   estimate.files = units.size();
-  estimate.units = static_cast<std::uint64_t>(std::ranges::count_if(units, ReachesDown));
+  estimate.subtrees = static_cast<std::uint64_t>(std::ranges::count_if(units, ReachesDown));
   return estimate;
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "bake/baker.h"
@@ -12,8 +13,9 @@
 namespace terrace::bake {
 
 struct LevelEstimate {
+  std::string format;  // archive::FolderOf
   int level = 0;
-  std::uint64_t tiles = 0;    // of all archives
+  std::uint64_t tiles = 0;
   double bytes_per_tile = 0;  // mean of the samples, or assumed
   double milliseconds_per_tile = 0;
 };
@@ -21,8 +23,8 @@ struct LevelEstimate {
 struct Estimate {
   std::vector<LevelEstimate> levels;
   std::uint64_t tiles = 0, files = 0;
-  std::uint64_t units = 0;    // of these the top and those that reach below their first level
-  std::uint64_t sampled = 0;  // tiles that were built for it
+  std::uint64_t subtrees = 0;  // of these the top and those that reach below their first level
+  std::uint64_t sampled = 0;   // tiles that were built for it
   double bytes = 0, core_hours = 0;
 };
 

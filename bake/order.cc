@@ -114,15 +114,12 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.generation = dataset.generation;
   baked.error_fraction = dataset.error_fraction;
   baked.glb_compression = dataset.glb.compression;
-  if (dataset.imagery.image) baked.texture = dataset.imagery.texture;
   baked.bounds = info.bounds;
   baked.heights = info.heights;
   baked.floor_m = info.floor;
   baked.has_datum = dataset.source->has_datum();
-  baked.has_water = dataset.water.any();
   baked.metadata_levels = dataset.metadata_levels;
   baked.max_level = info.max_level;
-  baked.max_mercator_depth = info.max_mercator_depth;
   baked.sources = info.sources.size();
   return baked;
 }

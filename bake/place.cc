@@ -167,10 +167,15 @@ std::string OtherLock(const std::string& place, const std::string& own) {
   return {};
 }
 
+// A file or folder of tiles.
+bool IsContent(const std::string& name) {
+  return name == archive::UnitPath("top") || name == "units" ||
+         std::ranges::any_of(archive::kFormatNames, [&](const auto& format) { return format.second == name; });
+}
+
 bool IsOurs(const std::string& name) {
-  static const std::set<std::string> kNames = {
-      kIdentityFile, archive::kManifestFile, "top.pmtiles", "units", "terrain", "glb", "png", "lost+found"};
-  return kNames.contains(name) || IsLock(name) || IsPartial(name);
+  return name == kIdentityFile || name == archive::kManifestFile || name == "lost+found" || IsContent(name) ||
+         IsLock(name) || IsPartial(name);
 }
 
 // The differences between a noted identity and this one, as one sentence; empty: none.
@@ -255,8 +260,10 @@ PlaceLock::~PlaceLock() {
 
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
   std::error_code error;
+  std::string content;
   for (const auto& entry : fs::directory_iterator(place, error)) {
     const std::string name = entry.path().filename().string();
+    if (IsContent(name)) content = name;
     if (IsOurs(name)) continue;
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: holds something that is no bake ({}); give an empty or a new folder with --out", place, name);
@@ -267,13 +274,14 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   if (is_known) {
     if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
   }
-  for (const char* folder : {"", "/terrain", "/glb", "/png"}) {
-    const std::string archive = place + folder;
+  std::vector<std::string> archives = {place};
+  for (const auto& [format, name] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
+  for (const std::string& archive : archives) {
     if (!fs::exists(fs::path(archive) / archive::kManifestFile, error)) continue;
     is_known = true;
     const auto manifest = archive::ReadManifest(archive);
     if (!manifest) return tl::unexpected(manifest.error());
-    if (auto same = CheckSame(place, manifest->options, identity, archive); !same) return same;
+    if (auto same = CheckSame(place, manifest->identity, identity, archive); !same) return same;
     if (manifest->dataset.generation != generation) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{}: holds a finished bake of version {}, and the sources are of version {} now; bake them into "
@@ -281,13 +289,10 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
                        place, tiler::VersionText(manifest->dataset.generation), tiler::VersionText(generation), place);
     }
   }
-  if (!is_known) {
-    for (const char* name : {"top.pmtiles", "units", "terrain", "glb", "png"}) {
-      if (!fs::exists(fs::path(place) / name, error)) continue;
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
-                       place, name);
-    }
+  if (!is_known && !content.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
+                     place, content);
   }
   if (fs::exists(file, error)) return {};
   const int why = CreateFile(file.string(), ToJson(identity));

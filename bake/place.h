@@ -39,13 +39,12 @@ struct BakeIdentity {
   std::vector<Field> fields;  // "dataset", "format", "levels" ...
 };
 
-// As Manifest::options.
+// As Manifest::identity.
 std::string ToJson(const BakeIdentity& identity);
 
-// Whether the place can take this bake: it is empty, holds an unfinished bake of the same identity, or is this very
-// bake
-// (`generation`), finished. Notes the identity there. kInvalidArgument: it holds something else, or another bake; the
-// message says what differs and what to do. kUnavailable: it cannot be read or written.
+// Whether the place can take this bake: it is empty, or holds a bake of the same identity, unfinished or, if it is of
+// this `generation`, finished. Notes the identity there. kInvalidArgument: it holds something else, or another bake;
+// the message says what differs and what to do. kUnavailable: it cannot be read or written.
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
 
 // Removes what only an unfinished bake needs: the identity, and leftovers of units that were interrupted.

@@ -74,9 +74,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
     if (manifest.kind.metadata) {
       // Metadata lists the dataset's tiles below a tile.
       for (int level = unit.root->level; level <= source.max_level(); ++level) {
-        const int down = level - unit.root->level;
-        const geo::TileRange below{unit.root->x << down, unit.root->y << down, ((unit.root->x + 1) << down) - 1,
-                                   ((unit.root->y + 1) << down) - 1};
+        const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;
         for (const geo::TileRange& range : source.Available(level)) {
           if (const auto common = geo::Common(range, below); !geo::IsEmpty(common)) parts.push_back(common);

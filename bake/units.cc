@@ -7,24 +7,13 @@
 
 #include "archive/manifest.h"
 #include "engine/geo/tile_cover.h"
+#include "proto/documents/subtree.h"
 
 namespace terrace::bake {
 namespace {
 
-// The bits of x and y interleaved.
 std::uint64_t ZOrder(const geo::TileKey& key) {
-  std::uint64_t order = 0;
-  for (int bit = 0; bit <= geo::kMaxLevel + 1; ++bit) {
-    order |= (static_cast<std::uint64_t>(key.x) >> bit & 1) << (2 * bit);
-    order |= (static_cast<std::uint64_t>(key.y) >> bit & 1) << (2 * bit + 1);
-  }
-  return order;
-}
-
-// The tiles of `level` at or below `root`.
-geo::TileRange Below(const geo::TileKey& root, int level) {
-  const int down = level - root.level;
-  return {root.x << down, root.y << down, ((root.x + 1) << down) - 1, ((root.y + 1) << down) - 1};
+  return proto::MortonIndex(static_cast<std::uint32_t>(key.x), static_cast<std::uint32_t>(key.y));
 }
 
 bool HasTileIn(const std::vector<geo::TileRange>& ranges, const geo::TileRange& box) {
@@ -37,7 +26,7 @@ bool HasTileIn(const std::vector<geo::TileRange>& ranges, const geo::TileRange& 
 bool HasTilesBelow(const Pyramid& tiles, const geo::TileKey& key, int last_level) {
   for (int level = key.level + 1; level <= last_level; ++level) {
     const auto& ranges = tiles[static_cast<std::size_t>(level)];
-    if (!ranges.empty()) return HasTileIn(ranges, Below(key, level));
+    if (!ranges.empty()) return HasTileIn(ranges, geo::TilesBelow(key, level));
   }
   return false;
 }
@@ -73,7 +62,7 @@ std::vector<Unit> UnitsOf(const Pyramid& pyramid) {
           const geo::TileKey root{archive::kTopLevels, x, y};
           Unit& unit = subtrees[ZOrder(root)];
           if (!unit.root) unit = {archive::UnitNameOf(root), root, Pyramid(pyramid.size())};
-          unit.tiles[static_cast<std::size_t>(level)].push_back(geo::Common(range, Below(root, level)));
+          unit.tiles[static_cast<std::size_t>(level)].push_back(geo::Common(range, geo::TilesBelow(root, level)));
         }
       }
     }
@@ -102,7 +91,7 @@ std::vector<Part> PartsOf(const Unit& unit) {
   for (const geo::TileKey& root : roots) {
     parts.push_back({root, std::min(last, split - 1)});
     if (split > last) continue;
-    const geo::TileRange below = Below(root, split);
+    const geo::TileRange below = geo::TilesBelow(root, split);
     std::vector<geo::TileKey> subtrees;
     for (std::int64_t y = below.start_y; y <= below.end_y; ++y) {
       for (std::int64_t x = below.start_x; x <= below.end_x; ++x) subtrees.push_back({split, x, y});

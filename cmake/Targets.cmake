@@ -30,3 +30,12 @@ function(terrace_test name)
       ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_SHARDS};GTEST_SHARD_INDEX=${index}")
   endforeach()
 endfunction()
+
+# terrace_binary_test(NAME SCRIPT.py TIMEOUT): a Python test of the built program. The script gets the binary and the source
+# directory. It exits with 77 if it cannot run here.
+function(terrace_binary_test name script timeout)
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  add_test(NAME ${name}
+    COMMAND Python3::Interpreter "${CMAKE_CURRENT_SOURCE_DIR}/${script}" "$<TARGET_FILE:terrace>" "${PROJECT_SOURCE_DIR}")
+  set_tests_properties(${name} PROPERTIES LABELS e2e TIMEOUT ${timeout} SKIP_RETURN_CODE 77)
+endfunction()

@@ -77,7 +77,6 @@ std::string Gzip(std::string_view bytes, int level, const std::stop_token& stop)
   return CompressWith(libdeflate_gzip_compress_bound, libdeflate_gzip_compress, bytes, level);
 }
 
-// The result is equal to that of BrotliEncoderCompress, because blocks do not depend on the division of the input.
 std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes) {
   // The size modulo 2^32 is at the end. Deflate expands by at most 1,032: a wrong size does not cost memory.
   constexpr std::size_t kMinBytes = 18, kMaxFactor = 1032;
@@ -98,6 +97,7 @@ std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes)
   return out;
 }
 
+// The result is equal to that of BrotliEncoderCompress, because blocks do not depend on the division of the input.
 std::string Brotli(std::string_view bytes, int quality, const std::stop_token& stop) {
   if (bytes.empty()) return "\x06";
   const std::unique_ptr<BrotliEncoderState, void (*)(BrotliEncoderState*)> encoder(

@@ -36,16 +36,16 @@ struct Purged {
 };
 
 // Refinements first: tiles that are made of them meanwhile are erased, too.
-Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection) {
+Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection, const std::stop_token& stop) {
   Result<tiler::RefinementCache::Erased> refinements;
-  if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection);
-  Result<TileService::Erased> tiles = parts.tiles.Erase(selection);
+  if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection, stop);
+  Result<TileService::Erased> tiles = parts.tiles.Erase(selection, stop);
   if (!refinements) return tl::unexpected(std::move(refinements.error()));
   if (!tiles) return tl::unexpected(std::move(tiles.error()));
   return Purged{*std::move(tiles), *refinements};
 }
 
-// {"dataset":"maui","version":"0a1b2c3d4e5f","erased":{"tiles":{"memory":12,"disk":40},"refinements":{...}}}
+// {"dataset":"maui","version":"0a1b2c3d4e5f","erased":{"tiles":{"memory":12,"archive":0,"disk":40},"refinements":{...}}}
 std::string PurgedJson(const Purge& purge, const Purged& purged) {
   std::string stores;
   for (const auto& [name, count] : purged.tiles.stores) stores += fmt::format(",\"{}\":{}", name, count);
@@ -53,15 +53,6 @@ std::string PurgedJson(const Purge& purge, const Purged& purged) {
       R"({{"dataset":"{}","version":"{}","erased":{{"tiles":{{"memory":{}{}}},"refinements":{{"memory":{},"disk":{}}}}}}})"
       "\n",
       purge.dataset, purge.version, purged.tiles.memory, stores, purged.refinements.memory, purged.refinements.below);
-}
-
-Response TextResponse(std::string_view content_type, Body body) {
-  Response response;
-  response.is_vital = true;
-  response.content_type = content_type;
-  response.body = std::move(body);
-  response.cache_control = "no-store";
-  return response;
 }
 
 }  // namespace
@@ -110,7 +101,7 @@ class AdminApplication::Handler final : public ConnectionHandler {
   }
 
   Answer Handle(const Request& request) override {
-    if (PathOf(request) == kPurgePath) return ErasePurged(request);
+    if (PathOf(request) == kPurgePath) return AnswerPurge(request);
     return WriteMetrics();
   }
 
@@ -157,21 +148,27 @@ class AdminApplication::Handler final : public ConnectionHandler {
   }
 
   asio::awaitable<Response> WriteMetrics() {
-    co_return TextResponse("text/plain; version=0.0.4; charset=utf-8", co_await parts_.metrics_page.Get());
+    co_return StateResponse(200, kMetricsType, co_await parts_.metrics_page.Get());
   }
 
-  asio::awaitable<Response> ErasePurged(const Request& request) {
+  asio::awaitable<Response> AnswerPurge(const Request& request) {
     const Result<Purge> purge = ParsePurge(QueryOf(request), *parts_.catalog());
     if (!purge) co_return ClientErrorResponse(purge.error(), request.id);
-    Work<Purged> work = [&parts = parts_, selection = purge->selection](const std::stop_token&) {
-      return EraseAll(parts, selection);
+    // The worker writes the log, because the client may have left by then.
+    Work<std::string> work = [&parts = parts_, purge = *purge](const std::stop_token& stop) -> Result<std::string> {
+      const Result<Purged> purged = EraseAll(parts, purge.selection, stop);
+      if (!purged) {
+        spdlog::warn("purge of {}: {}; tiles may be left", purge.dataset, purged.error().message);
+        return tl::unexpected(purged.error());
+      }
+      std::string text = PurgedJson(purge, *purged);
+      spdlog::info("purge: {}", Trim(text, "\n"));
+      return text;
     };
     const auto deadline = TileService::Clock::now() + parts_.deadline.load(std::memory_order_relaxed);
-    const Result<Purged> purged = co_await parts_.tiles.Run(std::move(work), TileService::Length::kLong, deadline);
-    if (!purged) co_return co_await BackendFailure(purged.error(), request.id);
-    std::string text = PurgedJson(*purge, *purged);
-    spdlog::info("purge: {}", Trim(text, "\n"));
-    co_return TextResponse("application/json", std::make_shared<const std::string>(std::move(text)));
+    Result<std::string> text = co_await parts_.tiles.Run(std::move(work), TileService::Length::kLong, deadline);
+    if (!text) co_return co_await BackendFailure(text.error(), request.id);
+    co_return StateResponse(200, "application/json", std::make_shared<const std::string>(*std::move(text)));
   }
 
   const AdminParts& parts_;

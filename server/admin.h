@@ -39,7 +39,8 @@ struct AdminParts {
   const std::atomic<std::chrono::milliseconds>& deadline;
 };
 
-// Requests of web pages are refused: pages can reach addresses of their user's machine, also loopback addresses.
+// Requests with an Origin header are refused: web pages can reach addresses of their user's machine, also loopback
+// addresses.
 class AdminApplication final : public Application {
  public:
   explicit AdminApplication(AdminParts parts) : parts_(std::move(parts)) {}

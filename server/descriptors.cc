@@ -18,6 +18,8 @@ constexpr std::size_t kOfIoThread = 3;
 // The listening socket, a spare to refuse connections, signals (two), PROJ's database, and one for short uses: the
 // configuration, certificates, a message to systemd.
 constexpr std::size_t kOfServer = 6;
+// The socket, and a spare to refuse connections.
+constexpr std::size_t kOfListener = 2;
 constexpr std::size_t kMinConnections = 4;
 // Datasets that the Reloader opens while the old ones are served.
 constexpr std::size_t kOpeners = 2;
@@ -36,7 +38,8 @@ std::size_t VrtParts(std::size_t open_sources, std::size_t threads) {
 Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::size_t limit, std::size_t in_use) {
   const std::size_t threads = demand.worker_threads + kOpeners;  // threads that may use a source at the same time
   const std::size_t server = kOfServer + demand.archive_files + kOfIoThread * demand.io_threads +
-                             (demand.access_log_file ? 1 : 0) + (demand.stores > 0 ? 1 : 0);
+                             (demand.access_log_file ? 1 : 0) + (demand.stores > 0 ? 1 : 0) +
+                             (demand.has_admin_listener ? kAdminConnections + kOfListener : 0);
   const std::size_t of_stores = demand.stores * (RecordDb::kOtherDescriptors + RecordDb::kMinOpenFiles);
   const std::size_t least = in_use + server + of_stores + threads + kMinConnections;
   if (limit < least) {

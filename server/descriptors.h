@@ -11,6 +11,9 @@
 
 namespace terrace::server {
 
+// Connections of operators (admin_listen) at a time; they open few.
+inline constexpr std::size_t kAdminConnections = 16;
+
 // The descriptors that a configuration would use without a limit.
 struct DescriptorDemand {
   unsigned io_threads = 1, worker_threads = 1;
@@ -21,6 +24,7 @@ struct DescriptorDemand {
   bool has_vrts = false;  // GDAL also keeps their parts open
   std::size_t connections = 1;
   std::size_t archive_files = 0;
+  bool has_admin_listener = false;
 };
 
 struct DescriptorBudget {

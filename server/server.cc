@@ -20,6 +20,7 @@
 #include "server/admin.h"
 #include "server/api/tile_formats.h"
 #include "server/application.h"
+#include "server/descriptors.h"
 #include "server/frontend/frontend.h"
 #include "server/http/listener.h"
 #include "server/http/session.h"
@@ -31,12 +32,10 @@
 namespace terrace::server {
 namespace {
 
-// Time for replies to requests whose builds were just cancelled, and again for sockets that were just aborted. Twice
-// this is less than the second that stopping may take beyond the drain timeout.
-constexpr std::chrono::milliseconds kLastWords{400};
-
-// Operators open few connections.
-constexpr std::size_t kAdminConnections = 16;
+// Time for replies to requests whose builds were just cancelled, and again for sockets that were just aborted; the
+// operators' listener takes both once more. Four times this is less than the second that stopping may take beyond the
+// drain timeout.
+constexpr std::chrono::milliseconds kLastWords{200};
 
 std::string UrlOf(const Listener& listener, bool is_https) {
   const std::string& host = listener.host();

@@ -27,7 +27,7 @@ struct ServerOptions {
   int listen_socket = -1;  // used instead of config.listen: a socket that another process keeps open as well
   // Cache tiers of finished tiles below memory, the first asked first.
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};
-  std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics and the stop; may be null
+  std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
   std::function<std::string()> cache_trouble = {};                // why cache_dir is not used; "": it is; thread-safe
   std::chrono::milliseconds metrics_age{1'000};                   // how long a text of /metrics is reused
   // How long new requests are still served after a stop; part of drain_timeout.

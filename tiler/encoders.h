@@ -14,10 +14,10 @@ struct EncoderInput;  // tile_pipeline.h
 
 enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
 
-// Sets all of `encoded` except the ETag, the compression and the times of the refinement.
 struct Encoder {
   TileFormat format;
   bool needs_refinement;
+  // Sets all of `encoded` except the ETag and the time of compression; adds to times.refine.
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 

@@ -94,11 +94,11 @@ class TilePipeline {
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
   // Reads, refines, quantizes, measures, encodes and compresses one tile. All formats share the refinement.
-  // kNotFound: no such dataset, or tile outside availability, or a dataset without sources. kUnavailable: the source
-  // cannot be read now. kCancelled: `stop` was requested.
+  // kNotFound: no such dataset, a tile outside availability, or, in a dataset without sources, a tile that its archive
+  // lacks. kUnavailable: the source cannot be read now. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // DemSource::ReadPoints.
+  // DemSource::ReadPoints. kNotFound, here and below: the dataset has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 

@@ -1,7 +1,10 @@
 #!/usr/bin/env bash
 # Installs what terrace needs on Debian 12: packages, the Boost 1.81 headers (.deps/boost), and the viewer's npm
 # modules. Installs only what is missing, so a second run takes a moment. Run it as root, or as a user who may use sudo.
-#   tools/install_deps.sh            everything for building and running   tools/install_deps.sh --test     also everything for tests, benchmarks, formatting and load tests   tools/install_deps.sh --runtime  only what a binary needs that was built elsewhere (docker/Dockerfile)
+#
+#   tools/install_deps.sh            everything for building and running
+#   tools/install_deps.sh --test     also everything for tests, benchmarks, formatting and load tests
+#   tools/install_deps.sh --runtime  only what a binary needs that was built elsewhere (docker/Dockerfile)
 set -euo pipefail
 export LC_ALL=C DEBIAN_FRONTEND=noninteractive
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)

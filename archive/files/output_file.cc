@@ -33,15 +33,15 @@ Result<void> WriteAll(int descriptor, std::string_view bytes, const std::string&
   return {};
 }
 
-std::string FolderOf(const std::string& path) {
+std::string ParentOf(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   return folder.empty() ? "." : folder;
 }
 
 Result<void> MakeFolder(const std::string& path) {
   std::error_code error;
-  std::filesystem::create_directories(FolderOf(path), error);
-  if (error) return CannotWrite(FolderOf(path), error.value());
+  std::filesystem::create_directories(ParentOf(path), error);
+  if (error) return CannotWrite(ParentOf(path), error.value());
   return {};
 }
 
@@ -101,7 +101,7 @@ Result<void> OutputFile::Finish() {
   if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
   ::close(std::exchange(impl_->descriptor, -1));
   // The new name must be on the disk as well. Some file systems do not allow this for folders, and need it not.
-  const int folder = ::open(FolderOf(impl_->path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int folder = ::open(ParentOf(impl_->path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return {};
   ::fsync(folder);
   ::close(folder);
@@ -140,7 +140,7 @@ SpoolFile::~SpoolFile() {
 
 Result<SpoolFile> SpoolFile::Create(const std::string& path) {
   if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
-  const std::string folder = FolderOf(path);
+  const std::string folder = ParentOf(path);
   int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
   if (descriptor < 0) {  // a file system without nameless files
     std::string name = path + ".spool" + std::string(kPartial);

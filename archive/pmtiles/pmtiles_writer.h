@@ -37,11 +37,6 @@ class PmtilesWriter {
     std::uint64_t tile_id = 0, spooled = 0;     // its row, followed by its bytes
     std::uint64_t hash_high = 0, hash_low = 0;  // of the bytes
     std::uint32_t length = 0;
-    std::uint32_t unused = 0;
-  };
-  struct Leaf {
-    std::vector<DirectoryEntry> entries;
-    std::size_t first = 0, tiles = 0;  // of waiting_
   };
 
   PmtilesWriter(std::string path, const PmtilesOptions& options, SpoolFile spool);

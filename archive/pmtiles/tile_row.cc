@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "engine/core/bytes.h"
-#include "tiler/strong_etag.h"
 
 namespace terrace::archive {
 namespace {
@@ -49,7 +48,6 @@ std::optional<CheckedTile> DecodeRow(std::uint64_t tile_id, std::string_view row
   tile.vertices = reader.Get<std::uint32_t>();
   tile.triangles = reader.Get<std::uint32_t>();
   tile.bytes = std::move(bytes);
-  tile.etag = tiler::StrongETag(tile.bytes);
   return checked;
 }
 

@@ -18,7 +18,7 @@ inline constexpr std::size_t kRowBytes = 48;
 std::string EncodeRow(std::uint64_t tile_id, const tiler::EncodedTile& tile, const dem::HeightRange& range);
 
 struct CheckedTile {
-  tiler::EncodedTile tile;  // with its ETag
+  tiler::EncodedTile tile;  // without ETag, times and head
   dem::HeightRange range;
 };
 

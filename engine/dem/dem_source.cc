@@ -197,15 +197,15 @@ DemInfo InfoOf(const std::vector<RasterGrid>& grids, const Rasters& rasters, con
 std::vector<SourceExtent> SourceExtentsOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
   const double finest =
       std::ranges::min_element(grids, {}, [](const RasterGrid& s) { return s.spacing().finer; })->spacing().finer;
-  std::vector<SourceExtent> reaches;
+  std::vector<SourceExtent> extents;
   for (const RasterGrid& grid : grids) {
     // `finest_error` applies to the finest source; for the other sources it is scaled by their spacing.
     const auto goal =
         options.finest_error ? std::optional(*options.finest_error * (grid.spacing().finer / finest)) : std::nullopt;
     const int depth = DeepestLevel(grid.spacing(), options.error_fraction, goal);
-    for (const GridMember& member : grid.members()) reaches.push_back({member.raster->footprint(), depth});
+    for (const GridMember& member : grid.members()) extents.push_back({member.raster->footprint(), depth});
   }
-  return reaches;
+  return extents;
 }
 
 }  // namespace

@@ -11,6 +11,12 @@ namespace terrace::geo {
 // rectangles that are adjacent in a row, and rectangles above each other with the same columns.
 std::vector<TileRange> Disjoint(std::vector<TileRange> ranges);
 
+// Returns the tiles of `level` in `key`. Precondition: `level` is not above the key's.
+constexpr TileRange TilesBelow(const TileKey& key, int level) {
+  const int down = level - key.level;
+  return {key.x << down, key.y << down, ((key.x + 1) << down) - 1, ((key.y + 1) << down) - 1};
+}
+
 // Returns the smallest range that contains both ranges.
 TileRange Hull(const TileRange& a, const TileRange& b);
 

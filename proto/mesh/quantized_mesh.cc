@@ -156,30 +156,32 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
 
 std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options) {
   ByteReader in(encoded);
-  const auto skip_indices = [&](std::size_t per_element) {
+  const auto skip_shorts = [&](std::size_t per_element) {
     const std::size_t count = in.Get<std::uint32_t>();
     in.GetBytes(count * per_element * sizeof(std::uint16_t));
   };
   in.GetBytes(kHeaderBytes);
-  skip_indices(3);  // u, v, h of the vertices
-  skip_indices(3);  // triangles
-  for (int edge = 0; edge < 4; ++edge) skip_indices(1);
+  skip_shorts(3);  // u, v, h of the vertices
+  skip_shorts(3);  // triangles
+  for (int edge = 0; edge < 4; ++edge) skip_shorts(1);
   if (!in.ok()) return std::nullopt;
 
   const auto at = [&] { return encoded.size() - in.remaining(); };
   std::string kept(encoded.substr(0, at()));
-  int missing = (options.normals ? 1 : 0) + (options.water_mask ? 1 : 0) + (options.metadata ? 1 : 0);
+  QuantizedMeshOptions found;
   while (in.remaining() > 0) {
     const std::size_t start = at();
     const auto id = in.Get<std::uint8_t>();
     in.GetBytes(in.Get<std::uint32_t>());
-    const bool is_wanted = (id == kOctVertexNormals && options.normals) || (id == kWaterMask && options.water_mask) ||
-                           (id == kMetadata && options.metadata);
-    if (!in.ok() || !is_wanted) continue;
+    const bool normals = id == kOctVertexNormals && options.normals,
+               water_mask = id == kWaterMask && options.water_mask, metadata = id == kMetadata && options.metadata;
+    if (!in.ok() || !(normals || water_mask || metadata)) continue;
     kept.append(encoded.substr(start, at() - start));
-    --missing;
+    found.normals |= normals;
+    found.water_mask |= water_mask;
+    found.metadata |= metadata;
   }
-  if (!in.ok() || missing != 0) return std::nullopt;
+  if (!in.ok() || found != options) return std::nullopt;
   return kept;
 }
 

@@ -4,19 +4,19 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "engine/geo/tile_cover.h"
+
 namespace terrace::proto {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-// The part of `ranges`, `down` levels below `key`, that lies in the tile.
-Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int down) {
+// The part of `ranges`, of tiles of `level`, that lies in `key`.
+Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
   Json below = Json::array();
-  const geo::TileRange tile{key.x << down, key.y << down, ((key.x + 1) << down) - 1, ((key.y + 1) << down) - 1};
   for (const geo::TileRange& range : ranges) {
-    const geo::TileRange part{std::max(range.start_x, tile.start_x), std::max(range.start_y, tile.start_y),
-                              std::min(range.end_x, tile.end_x), std::min(range.end_y, tile.end_y)};
-    if (part.start_x > part.end_x || part.start_y > part.end_y) continue;
+    const geo::TileRange part = geo::Common(range, geo::TilesBelow(key, level));
+    if (geo::IsEmpty(part)) continue;
     below.push_back({{"startX", part.start_x}, {"startY", part.start_y}, {"endX", part.end_x}, {"endY", part.end_y}});
   }
   return below;
@@ -33,7 +33,7 @@ std::string EncodeTileMetadata(const geo::TileKey& key, const std::vector<std::v
   const int deepest = std::min(key.level + metadata_levels, static_cast<int>(available.size()) - 1);
   Json levels = Json::array();
   for (int level = key.level + 1; level <= deepest; ++level) {
-    levels.push_back(Below(available[static_cast<std::size_t>(level)], key, level - key.level));
+    levels.push_back(Below(available[static_cast<std::size_t>(level)], key, level));
   }
   return Json{{"available", std::move(levels)}}.dump();
 }

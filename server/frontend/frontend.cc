@@ -9,26 +9,26 @@
 
 namespace terrace::server {
 
-Frontend::Frontend(const config::Config& config, AdmissionOptions gate_options)
+Frontend::Frontend(const config::Config& config, AdmissionOptions admission)
     : connections(config.max_connections, config.max_connections_per_client),
       transfers(config.transfer_bytes),
-      admission_control(std::move(gate_options)),
+      admission_control(std::move(admission)),
       cors(config.cors_origins) {}
 
 Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
-  AdmissionOptions admission_control;
+  AdmissionOptions admission;
   Result<AddressRanges> trusted = AddressRanges::Parse(config.trusted_proxies);
   if (!trusted) return tl::unexpected(std::move(trusted.error()));
-  admission_control.proxies = {*std::move(trusted), config.forwarded_header};
+  admission.proxies = {*std::move(trusted), config.forwarded_header};
   std::vector<std::string> public_datasets;
   for (const config::DatasetConfig& dataset : config.datasets) {
     if (dataset.is_public) public_datasets.push_back(dataset.name);
   }
   Result<AccessPolicy> access = AccessPolicy::Make(config.tokens, public_datasets);
   if (!access) return tl::unexpected(std::move(access.error()));
-  admission_control.access = *std::move(access);
-  admission_control.rate.per_second = config.requests_per_second;
-  admission_control.rate.burst = config.request_burst > 0 ? config.request_burst : 2 * config.requests_per_second;
+  admission.access = *std::move(access);
+  admission.rate.per_second = config.requests_per_second;
+  admission.rate.burst = config.request_burst > 0 ? config.request_burst : 2 * config.requests_per_second;
 
   std::unique_ptr<TlsContext> tls;
   if (!config.tls.certificate.empty()) {
@@ -36,7 +36,7 @@ Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
     if (!opened) return tl::unexpected(std::move(opened.error()));
     tls = *std::move(opened);
   }
-  auto frontend = std::make_unique<Frontend>(config, std::move(admission_control));
+  auto frontend = std::make_unique<Frontend>(config, std::move(admission));
   frontend->tls = std::move(tls);
   return frontend;
 }

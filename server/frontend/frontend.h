@@ -19,7 +19,7 @@ struct Frontend {
   // Errors quote the option's value, or name the file.
   static Result<std::unique_ptr<Frontend>> Open(const config::Config& config);
 
-  Frontend(const config::Config& config, AdmissionOptions gate_options);
+  Frontend(const config::Config& config, AdmissionOptions admission);
 
   ConnectionSet connections;
   TransferBudget transfers;

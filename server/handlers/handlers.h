@@ -163,6 +163,11 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
 std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen = {},
                       const std::stop_token& stop = {});
 
+// A reply about the state of the server. `content_type`: a literal.
+Response StateResponse(int status, std::string_view content_type, Body text);
+// Prometheus's text format.
+inline constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
+
 // GET /livez, /readyz and /metrics: for operators of the server.
 Answer AnswerLive(const Handlers& from, const RequestContext& context);
 Answer AnswerReady(const Handlers& from, const RequestContext& context);

@@ -7,9 +7,8 @@
 #include "server/http/text.h"
 
 namespace terrace::server {
-namespace {
 
-Response StateResponse(int status, std::string_view content_type, std::shared_ptr<const std::string> text) {
+Response StateResponse(int status, std::string_view content_type, Body text) {
   Response response;
   response.status = status;
   response.is_vital = true;
@@ -19,13 +18,15 @@ Response StateResponse(int status, std::string_view content_type, std::shared_pt
   return response;
 }
 
+namespace {
+
 Response PlainState(int status, std::string text) {
   return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
 }
 
 asio::awaitable<Response> WriteMetrics(const ProcessState& process) {
   std::shared_ptr<const std::string> text = co_await process.MetricsText();
-  co_return StateResponse(200, "text/plain; version=0.0.4; charset=utf-8", std::move(text));
+  co_return StateResponse(200, kMetricsType, std::move(text));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The tier between the caches and building: tiles of the datasets' archives.
+// The tier of the datasets' archives, asked before the disk cache.
 #pragma once
 
 #include <atomic>
@@ -8,6 +8,7 @@
 #include <optional>
 #include <set>
 #include <shared_mutex>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -28,7 +29,7 @@ class BakedStore final : public tiler::TileStore {
   const char* name() const override { return "archive"; }
   tiler::StoreStats stats() const override;
   // An archive is not a cache: nothing is erased.
-  Result<std::size_t> Erase(const tiler::TileSelection&) override { return std::size_t{0}; }
+  Result<std::size_t> Erase(const tiler::TileSelection&, const std::stop_token&) override { return std::size_t{0}; }
   void Abandon() override {}
 
   // Also nothing if a file is damaged. The log names each such fault once.

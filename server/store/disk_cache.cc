@@ -115,7 +115,7 @@ class DiskTier final : public tiler::Store<Key, Value> {
     return std::nullopt;
   }
 
-  Result<std::size_t> Erase(const tiler::TileSelection& selection) override {
+  Result<std::size_t> Erase(const tiler::TileSelection& selection, const std::stop_token& stop) override {
     if (!store_) return 0;
     const std::string version = StoreVersion();
     std::vector<std::string> prefixes;
@@ -123,7 +123,7 @@ class DiskTier final : public tiler::Store<Key, Value> {
       prefixes.push_back(version + tiler::RecordPrefix(selection.generation, level));
     }
     return store_->Erase(
-        prefixes, [&](std::string_view key) { return tiler::IsSelected(selection, key.substr(version.size())); });
+        prefixes, [&](std::string_view key) { return tiler::IsSelected(selection, key.substr(version.size())); }, stop);
   }
 
   void Insert(const Key& key, std::shared_ptr<const Value> value) override {

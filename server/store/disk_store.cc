@@ -86,7 +86,8 @@ void DiskStore::Forget(const std::string& key) {
 }
 
 Result<std::size_t> DiskStore::Erase(const std::vector<std::string>& prefixes,
-                                     const std::function<bool(std::string_view key)>& is_chosen) {
+                                     const std::function<bool(std::string_view key)>& is_chosen,
+                                     const std::stop_token& stop) {
   std::size_t erased = 0;
   std::list<Job> waiting;  // destroyed after the lock is released
   std::shared_ptr<RecordDb> db;
@@ -108,7 +109,7 @@ Result<std::size_t> DiskStore::Erase(const std::vector<std::string>& prefixes,
   if (!db) return MakeError(ErrorCode::kUnavailable, "the disk cache of {} is switched off", options_.name);
   Result<void> done;
   for (const std::string& prefix : prefixes) {
-    const Result<std::size_t> of_prefix = db->EraseIf(prefix, is_chosen);
+    const Result<std::size_t> of_prefix = db->EraseIf(prefix, is_chosen, stop);
     if (!of_prefix) {
       done = tl::unexpected(of_prefix.error());
       break;
@@ -118,6 +119,7 @@ Result<std::size_t> DiskStore::Erase(const std::vector<std::string>& prefixes,
   entries_.store(db->entries(), std::memory_order_relaxed);
   bytes_.store(db->bytes(), std::memory_order_relaxed);
   if (done) return erased;
+  if (done.error().code == ErrorCode::kCancelled) return tl::unexpected(std::move(done.error()));
   errors_.fetch_add(1, std::memory_order_relaxed);
   SwitchOff(done.error().message, /*reading=*/true);
   return tl::unexpected(std::move(done.error()));

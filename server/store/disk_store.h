@@ -1,7 +1,7 @@
 // A key-value store on a disk that may fail: a read returns the value that was written, or nothing.
 //
-// Thread-safe. Find blocks for a read; Keep returns at once, and a thread of the store writes. Errors do not reach the
-// caller. After an error the store stops using the disk and tries again every `retry_after`: after a failed write it
+// Thread-safe. Find and Erase block; Keep returns at once, and a thread of the store writes. Only Erase returns errors.
+// After an error the store stops using the disk and tries again every `retry_after`: after a failed write it
 // continues to read, after a failed read it finds nothing. Log and statistics report this.
 #pragma once
 
@@ -14,6 +14,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -55,7 +56,8 @@ class DiskStore {
   // written. Blocks for reads and writes. Returns their number. kUnavailable: the store is switched off, or the disk
   // failed; records may be left.
   Result<std::size_t> Erase(const std::vector<std::string>& prefixes,
-                            const std::function<bool(std::string_view key)>& is_chosen);
+                            const std::function<bool(std::string_view key)>& is_chosen,
+                            const std::stop_token& stop = {});
 
   // Returns when everything that was kept before the call is written or dropped.
   void Flush();

@@ -141,7 +141,8 @@ Result<void> RecordDb::Write(std::span<const Change> changes) {
 }
 
 Result<std::size_t> RecordDb::EraseIf(std::string_view prefix,
-                                      const std::function<bool(std::string_view key)>& is_chosen) {
+                                      const std::function<bool(std::string_view key)>& is_chosen,
+                                      const std::stop_token& stop) {
   std::size_t erased = 0;
   std::vector<Change> changes;
   const auto write = [&] {
@@ -152,6 +153,7 @@ Result<std::size_t> RecordDb::EraseIf(std::string_view prefix,
   };
   const std::unique_ptr<rocksdb::Iterator> record(impl_->db->NewIterator(rocksdb::ReadOptions()));
   for (record->Seek(SliceOf(prefix)); record->Valid() && record->key().starts_with(SliceOf(prefix)); record->Next()) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     const std::string_view key(record->key().data(), record->key().size());
     if (is_chosen(key)) changes.push_back({std::string(key), std::nullopt});
     if (changes.size() < kErasedAtOnce) continue;

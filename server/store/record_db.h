@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -67,7 +68,8 @@ class RecordDb {
 
   // Erases the records whose keys begin with `prefix` and that `is_chosen` accepts. Reads all that begin with it.
   // Returns their number. Errors: those of Write.
-  Result<std::size_t> EraseIf(std::string_view prefix, const std::function<bool(std::string_view key)>& is_chosen);
+  Result<std::size_t> EraseIf(std::string_view prefix, const std::function<bool(std::string_view key)>& is_chosen,
+                              const std::stop_token& stop = {});
 
   // Approximate.
   std::size_t bytes() const;

@@ -121,11 +121,11 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
 }
 
 // Memory last: what is found in a slower tier meanwhile goes there.
-Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection) {
+Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection, const std::stop_token& stop) {
   Erased erased;
   Result<void> done;
   for (const auto& store : stores_) {
-    Result<std::size_t> of_store = store->Erase(selection);
+    Result<std::size_t> of_store = store->Erase(selection, stop);
     if (of_store) {
       erased.stores.emplace_back(store->name(), *of_store);
     } else {

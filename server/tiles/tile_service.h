@@ -83,7 +83,7 @@ class TileService {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // by the tier's name
   };
-  Result<Erased> Erase(const tiler::TileSelection& selection);
+  Result<Erased> Erase(const tiler::TileSelection& selection, const std::stop_token& stop = {});
 
   void SetCacheBytes(std::size_t capacity) { cache_.SetCapacity(capacity); }
 

@@ -1,5 +1,5 @@
-// A view as the page's URL fragment: #dataset=maui&fraction=0.25&camera=-156.2,20.6,9000,30,-25&contours&wireframe With
-// 3D Tiles beside the terrain it also has &tiles3d, and &split=0.4 if the line between them was moved.
+// A view as the page's URL fragment: #dataset=maui&fraction=0.25&camera=-156.2,20.6,9000,30,-25&contours&wireframe
+// With 3D Tiles beside the terrain it also has &tiles3d, and &split=0.4 if the line between them was moved.
 const kSwitches = ["contours", "wireframe", "tiles3d"];
 
 export function encodeView({ dataset, fraction, exaggeration, camera, split, ...switches }) {

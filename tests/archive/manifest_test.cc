@@ -17,20 +17,18 @@ Manifest FullManifest() {
   manifest.dataset.generation = 0xfedcba9876543210;
   manifest.dataset.error_fraction = 0.1;
   manifest.dataset.glb_compression = proto::GlbCompression::kMeshopt;
-  manifest.dataset.texture = proto::TextureFormat::kWebp;
   manifest.dataset.bounds = {7.999583333333333, 46, 9.1, 47.3};
   manifest.dataset.heights = {-12.3456789, 4634.1};
   manifest.dataset.floor_m = 0.1;
   manifest.dataset.metadata_levels = 5;
   manifest.dataset.max_level = 13;
-  manifest.dataset.max_mercator_depth = 12;
   manifest.dataset.sources = 4;
   manifest.kind.coding = tiler::Coding::kGzip;
   manifest.kind.normals = manifest.kind.metadata = true;
   manifest.error_steps = {0, -2, 4};
   manifest.max_level = 2;
   manifest.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{4, 2, 5, 3}, {7, 0, 7, 0}}};
-  manifest.options = R"({"bbox":[1,2,3,4]})";
+  manifest.identity = R"({"bbox":[1,2,3,4]})";
   manifest.units = {{"top", 0x8000000000000001, 9, 1234, "00"}, {"7-12-34", 5, 0, 0, ""}};
   return manifest;
 }
@@ -46,7 +44,6 @@ TEST(ManifestTest, GoesBothWays) {
   EXPECT_EQ(read->error_steps, FullManifest().error_steps);
   EXPECT_EQ(read->dataset.bounds.west, FullManifest().dataset.bounds.west);
   EXPECT_EQ(read->dataset.heights.min, FullManifest().dataset.heights.min);
-  EXPECT_EQ(read->dataset.texture, proto::TextureFormat::kWebp);
 }
 
 TEST(ManifestTest, NewerFormatIsNamed) {

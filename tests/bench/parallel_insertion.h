@@ -1,4 +1,4 @@
-// Greedy insertion of many samples in each pass: section 4.4 of the paper, which advises against it.  The candidate of
+// Greedy insertion of many samples in each pass: section 4.4 of the paper, which advises against it. The candidate of
 // a triangle is its worst sample. A pass inserts all candidates that reach a threshold, and scans the changed triangles
 // only afterwards. The threshold is `alpha` times the largest error at the start of the pass (fractional), or a
 // constant `epsilon`. alpha = 1 is sequential insertion except for ties. alpha = 0 inserts a sample in every triangle.

@@ -58,3 +58,16 @@ export async function settle(page, ready) {
     throw new Error(`${error.message.split('\n')[0]}: ${await page.locator('#line').innerText()} ${page.wrongs.join('; ')}`);
   });
 }
+
+// The picture below the line: a number of 32 bits for each pixel, red in the lowest byte.
+export async function pixels(page) {
+  const clip = { x: 0, y: 80, width: kSize.width, height: kSize.height - 80 };
+  const png = (await page.screenshot({ clip, timeout: kSettleMs })).toString('base64');
+  return page.evaluate(async (base64) => {
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
+    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+    context.drawImage(image, 0, 0);
+    return Array.from(new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer));
+  }, png);
+}

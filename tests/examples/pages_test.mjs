@@ -8,7 +8,7 @@ import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { promisify } from 'node:util';
 import { json, request, samples, serve } from '../e2e/harness.mjs';
-import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, servePages, settle, typeOf } from './pages.mjs';
+import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, pixels, servePages, settle, typeOf } from './pages.mjs';
 
 const run = promisify(execFile);
 
@@ -42,19 +42,7 @@ async function click(page, x, y) {
 }
 
 // Number of colours below the line, at 5 bits a channel.
-async function colours(page) {
-  const clip = { x: 0, y: 80, width: kSize.width, height: kSize.height - 80 };
-  const png = (await page.screenshot({ clip, timeout: kSettleMs })).toString('base64');
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-    context.drawImage(image, 0, 0);
-    const { data } = context.getImageData(0, 0, image.width, image.height);
-    return new Set(Array.from({ length: data.length / 4 }, (_, i) =>
-      ((data[4 * i] >> 3) << 10) | ((data[4 * i + 1] >> 3) << 5) | (data[4 * i + 2] >> 3))).size;
-  }, png);
-}
+const colours = async (page) => new Set((await pixels(page)).map((pixel) => pixel & 0xf8f8f8)).size;
 
 // Size of a pixel of a Web Mercator tile in metres.
 const pixelMetres = (latitude, zoom, size) => 40075016 * Math.cos(latitude * Math.PI / 180) / size / 2 ** zoom;

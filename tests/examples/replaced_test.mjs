@@ -1,5 +1,5 @@
-// A source is replaced while clients look at it: a page that is loaded again shows the new terrain and nothing of the old one,
-// though the browser's cache is full of that. Asked through a proxy that notes what really reaches the server.
+// A source is replaced while clients show it. A page that is reloaded shows only the new terrain, although the browser's cache has
+// the old tiles. A proxy records the requests that reach the server.
 import assert from 'node:assert/strict';
 import { execFileSync } from 'node:child_process';
 import fs from 'node:fs';
@@ -8,7 +8,7 @@ import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { json, serve } from '../e2e/harness.mjs';
-import { kSize, kSettleMs, launchBrowser, servePages, settle } from './pages.mjs';
+import { kSize, launchBrowser, pixels, servePages, settle } from './pages.mjs';
 import { kFaults, startProxy } from './recording_proxy.mjs';
 
 const kSrtm = path.join(path.dirname(fileURLToPath(import.meta.url)), '../e2e/srtm.py');
@@ -26,7 +26,7 @@ function cesiumEdges() {
       return [along === 'x' ? west + uv.x * (east - west) : south + uv.y * (north - south), mesh.encoding.decodeHeight(mesh.vertices, index)];
     };
     const edge = (indices, along) => [...indices].map((index) => at(index, along));
-    // Beside the data CesiumJS makes tiles of their parents, which fit none of their level.
+    // Outside the data CesiumJS upsamples tiles from their parents; their edges match no tile of the level.
     return { level: terrainData?.wasCreatedByUpsampling() ? NaN : level, west, south, east, north, edges: {
       west: edge(mesh.westIndicesSouthToNorth, 'y'), east: edge(mesh.eastIndicesNorthToSouth, 'y'),
       south: edge(mesh.southIndicesEastToWest, 'x'), north: edge(mesh.northIndicesWestToEast, 'x'),
@@ -109,7 +109,7 @@ function ground(edge) {
 
 // The largest difference between edges that drawn tiles have in common: of tiles of one level, and of different ones.
 function cracks(tiles) {
-  const found = { pairs: 0, equal: 0, unequal: 0 };
+  const found = { pairs: 0, vertices: 0, equal: 0, unequal: 0 };
   for (const [side, other, low, high] of [['east', 'west', 'south', 'north'], ['north', 'south', 'west', 'east']]) {
     for (const a of tiles) for (const b of tiles) {
       const from = Math.max(a[low], b[low]), to = Math.min(a[high], b[high]);
@@ -119,6 +119,7 @@ function cracks(tiles) {
       for (const [place, height] of ground(b.edges[other])) {
         const i = line.findIndex(([t]) => t >= place - 1e-9);
         if (place < from || place > to || i < 0) continue;
+        found.vertices++;
         const [t1, h1] = line[i], [t0, h0] = line[Math.max(0, i - 1)];
         const off = Math.abs(height - (t1 - t0 > 1e-9 ? h0 + (h1 - h0) * Math.min(1, (place - t0) / (t1 - t0)) : h1));
         const kind = a.level === b.level ? 'equal' : 'unequal';
@@ -127,19 +128,6 @@ function cracks(tiles) {
     }
   }
   return found;
-}
-
-// The picture below the line as pixels.
-async function picture(page) {
-  const clip = { x: 0, y: 80, width: kSize.width, height: kSize.height - 80 };
-  const png = (await page.screenshot({ clip, timeout: kSettleMs })).toString('base64');
-  return page.evaluate(async (base64) => {
-    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-    const image = await createImageBitmap(new Blob([bytes], { type: 'image/png' }));
-    const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
-    context.drawImage(image, 0, 0);
-    return Array.from(new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer));
-  }, png);
 }
 
 const differing = (a, b) => a.filter((pixel, i) => pixel !== b[i]).length / a.length;
@@ -198,7 +186,7 @@ describe('a replaced source', () => {
       await page.evaluate(client.view);
       await settle(page, client.ready);
     }
-    const shown = await picture(page);
+    const shown = await pixels(page);
     const off = [];
     for (const place of kPlaces) off.push(await page.evaluate(client.height, place) - await truth(place));
     page.off('request', note);
@@ -228,6 +216,7 @@ describe('a replaced source', () => {
     }
     for (const metres of off) assert.ok(Math.abs(metres) < kLift / 5, `a height is off by ${metres} m`);
     assert.ok(crack.pairs >= 2, `${crack.pairs} common edges`);
+    assert.ok(crack.vertices >= 2 * crack.pairs, `${crack.vertices} compared vertices on ${crack.pairs} edges`);
     assert.ok(crack.equal < client.slack && crack.unequal < kLift / 5, `a crack of ${crack.equal}, ${crack.unequal} m`);
   }
 
@@ -267,7 +256,7 @@ describe('a replaced source', () => {
 
   for (const name of Object.keys(kClients)) {
     it(`shows in ${name} from the next document on`, () => run(name));
-    // What makes this test fail. The quickest client is enough for every day.
+    // Faults that must make the test fail. By default only the fastest client runs them.
     const faults = name === '3DTilesRendererJS' || process.env.TERRACE_LONG_TESTS ? Object.entries(kFaults) : [];
     for (const [fault, mutate] of faults) {
       it(`would not in ${name} with ${fault}`, () => assert.rejects(run(name, mutate), { name: 'AssertionError' }));

@@ -24,9 +24,9 @@ void RefinementCache::Insert(const RefinedTileKey& key, RefinedTilePtr tile) {
 }
 
 // The slower tier first: what is found there meanwhile goes into memory.
-Result<RefinementCache::Erased> RefinementCache::Erase(const TileSelection& selection) {
+Result<RefinementCache::Erased> RefinementCache::Erase(const TileSelection& selection, const std::stop_token& stop) {
   Result<std::size_t> below = 0;
-  if (below_) below = below_->Erase(selection);
+  if (below_) below = below_->Erase(selection, stop);
   Erased erased;
   erased.memory = memory_.EraseIf([&](const RefinedTileKey& key) { return IsSelected(selection, key); });
   if (!below) return tl::unexpected(std::move(below.error()));

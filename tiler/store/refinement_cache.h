@@ -28,7 +28,7 @@ class RefinementCache {
   struct Erased {
     std::size_t memory = 0, below = 0;
   };
-  Result<Erased> Erase(const TileSelection& selection);
+  Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
 
   // As ByteCache::Retain, for the memory tier.
   void Retain(const std::vector<std::uint64_t>& generations) { memory_.Retain(generations); }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <stop_token>
 
 #include "engine/core/result.h"
 #include "tiler/encoded_tile.h"
@@ -58,9 +59,9 @@ class StoreBase {
   virtual const char* name() const = 0;
   virtual StoreStats stats() const = 0;
 
-  // Erases the values of these tiles, also those that wait to be written, and returns their number. kUnavailable: the
-  // medium does not respond, and values may be left.
-  virtual Result<std::size_t> Erase(const TileSelection& selection) = 0;
+  // Erases the values of these tiles, also those that wait to be written, and returns their number. kCancelled:
+  // stopped, and values may be left. kUnavailable: the medium does not respond, and values may be left.
+  virtual Result<std::size_t> Erase(const TileSelection& selection, const std::stop_token& stop) = 0;
 
   // Drops values that wait to be written, and accepts no more: the process ends, and has no time left.
   virtual void Abandon() = 0;

@@ -201,7 +201,7 @@ std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell&
       if (row == tile_.lattice.rows()) corners[k].x = trace_.cells.positions().OfNode(column, row - 1).x;
       const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
       const double turns = (near - corners[k].x) / turn;
-      if (std::abs(turns) > 0.25) corners[k].x += turn * std::round(turns);
+      if (std::abs(turns) >= 0.5) corners[k].x += turn * std::round(turns);  // else 0; round is a call
     }
     if (!std::isfinite(corners[k].x) || !std::isfinite(corners[k].y)) return std::nullopt;
   }

@@ -139,10 +139,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
 
 // Returns false if one of the nodes `first` to `end` of a row of the tile's window has no height from this raster grid.
 bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size_t end) const {
-  const float* const heights = trace_.heights.data() + row * tile_.stride();
-  Lanes sum;
-  sum.Add(end - first, [&](std::size_t i) { return heights[first + i]; });
-  return std::isfinite(sum.Sum());
+  return !HasVoids(std::span(trace_.heights).subspan(row * tile_.stride() + first, end - first));
 }
 
 PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {

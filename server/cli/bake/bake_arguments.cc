@@ -15,6 +15,7 @@
 #include "config/parse.h"
 #include "engine/geo/tile_key.h"
 #include "proto/media_type.h"
+#include "server/cli/common/source_files.h"
 
 namespace terrace::cli {
 namespace {
@@ -31,21 +32,18 @@ std::vector<std::string> PartsOf(const std::string& text, char separator) {
 }
 
 Result<std::vector<tiler::TileFormat>> FormatsOf(const std::string& text) {
-  constexpr std::array<std::pair<const char*, tiler::TileFormat>, 3> kNames = {
-      {{"terrain", tiler::TileFormat::kQuantizedMesh},
-       {"glb", tiler::TileFormat::kGlb},
-       {"png", tiler::TileFormat::kHeightPng}}};
   std::vector<tiler::TileFormat> formats;
   for (const std::string& name : PartsOf(text, ',')) {
-    const auto* const found = std::ranges::find(kNames, name, [](const auto& row) { return row.first; });
-    if (found == kNames.end()) {
+    const auto* const found =
+        std::ranges::find(archive::kFormatNames, name, [](const auto& row) { return row.second; });
+    if (found == archive::kFormatNames.end()) {
       return MakeError(ErrorCode::kInvalidArgument, "--format {}: must be terrain, glb, png, or several with commas",
                        text);
     }
-    if (std::ranges::find(formats, found->second) != formats.end()) {
+    if (std::ranges::find(formats, found->first) != formats.end()) {
       return MakeError(ErrorCode::kInvalidArgument, "--format {}: has {} twice", text, name);
     }
-    formats.push_back(found->second);
+    formats.push_back(found->first);
   }
   return formats;
 }
@@ -92,14 +90,6 @@ Result<proto::TileExtensions> ExtensionsOf(const std::string& text) {
     extensions = extensions | one;
   }
   return extensions;
-}
-
-// For folders, keeps what looks like an extension, and ignores a trailing slash.
-std::string StemOf(const std::string& dem) {
-  std::error_code ignored;
-  const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
-  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
-  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
 }
 
 Result<config::DatasetConfig> ConfiguredDataset(const BakeArguments& arguments, const config::Config& config) {
@@ -154,9 +144,9 @@ Result<bake::Order> OrderOf(const BakeArguments& arguments) {
   if (arguments.error > 0) order.requested = {arguments.error, std::nullopt, /*at_least=*/true};
   if (arguments.fraction > 0) order.requested = {std::nullopt, arguments.fraction, false};
   order.compress = !arguments.no_gzip;
-  if (arguments.form == kSingle && order.formats.size() > 1) {
-    return MakeError(ErrorCode::kInvalidArgument, "--form single is one file of one format; --format names {}",
-                     order.formats.size());
+  if (arguments.form != kChunks && order.formats.size() > 1) {
+    return MakeError(ErrorCode::kInvalidArgument, "--form {} has one format, and --format names {}; bake each alone",
+                     arguments.form, order.formats.size());
   }
   if (arguments.form == kFolder && has(tiler::TileFormat::kGlb)) {
     return MakeError(ErrorCode::kInvalidArgument, "--form folder takes terrain and png; glb needs chunks or single");
@@ -220,7 +210,7 @@ Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::Co
     input.dataset.sources.push_back(*std::move(source));
   }
   if (!arguments.dataset.empty()) input.dataset.name = arguments.dataset;
-  if (input.dataset.name.empty()) input.dataset.name = config::SanitizeDatasetName(StemOf(arguments.dems.front()));
+  if (input.dataset.name.empty()) input.dataset.name = DatasetNameOf(arguments.dems.front());
   return input;
 }
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "engine/core/plain_number.h"
+#include "server/cli/common/progress.h"
 
 namespace terrace::cli {
 namespace {
@@ -43,14 +45,6 @@ const char* OutcomeName(bake::UnitOutcome outcome) {
 }
 
 }  // namespace
-
-std::string Grouped(std::uint64_t number) {
-  std::string text = std::to_string(number);
-  for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
-    text.insert(static_cast<std::size_t>(at), ",");
-  }
-  return text;
-}
 
 std::string Bytes(double bytes) {
   constexpr std::array<const char*, 6> kUnits = {"bytes", "kB", "MB", "GB", "TB", "PB"};
@@ -141,7 +135,7 @@ std::string SummaryJson(const BakeSummary& summary, const bake::Counters& counte
 
 std::string SummaryText(const BakeSummary& summary) {
   std::string text =
-      fmt::format("{}: {} tiles, {}, {} files", summary.place, Grouped(summary.tiles),
+      fmt::format("{}: {} tiles, {}, {} units", summary.place, Grouped(summary.tiles),
                   Bytes(static_cast<double>(summary.bytes)), summary.baked + summary.kept + summary.copied);
   for (const auto& [count, what] : {std::pair(summary.kept, "were there"), std::pair(summary.copied, "copied"),
                                     std::pair(summary.missing, "missing"), std::pair(summary.failed, "failed")}) {
@@ -158,12 +152,13 @@ std::string EstimateJson(const bake::Estimate& estimate) {
   Json json;
   json["tiles"] = estimate.tiles;
   json["files"] = estimate.files;
-  json["units"] = estimate.units;
+  json["subtrees"] = estimate.subtrees;
   json["bytes"] = std::round(estimate.bytes);
   json["core_hours"] = estimate.core_hours;
   json["sampled_tiles"] = estimate.sampled;
   for (const bake::LevelEstimate& level : estimate.levels) {
-    json["levels"].push_back({{"level", level.level},
+    json["levels"].push_back({{"format", level.format},
+                              {"level", level.level},
                               {"tiles", level.tiles},
                               {"bytes_per_tile", std::round(level.bytes_per_tile)},
                               {"milliseconds_per_tile", level.milliseconds_per_tile}});
@@ -172,15 +167,16 @@ std::string EstimateJson(const bake::Estimate& estimate) {
 }
 
 std::string EstimateText(const bake::Estimate& estimate) {
-  std::string text = fmt::format("{:>5} {:>15} {:>12} {:>10}\n", "level", "tiles", "bytes/tile", "ms/tile");
+  std::string text =
+      fmt::format("{:<8} {:>5} {:>15} {:>12} {:>10}\n", "format", "level", "tiles", "bytes/tile", "ms/tile");
   for (const bake::LevelEstimate& level : estimate.levels) {
-    fmt::format_to(std::back_inserter(text), "{:>5} {:>15} {:>12.0f} {:>10.2f}\n", level.level, Grouped(level.tiles),
-                   level.bytes_per_tile, level.milliseconds_per_tile);
+    fmt::format_to(std::back_inserter(text), "{:<8} {:>5} {:>15} {:>12.0f} {:>10.2f}\n", level.format, level.level,
+                   Grouped(level.tiles), level.bytes_per_tile, level.milliseconds_per_tile);
   }
   const std::string hours = estimate.core_hours < 0.1 ? fmt::format("{:.1f} core-minutes", estimate.core_hours * 60)
                                                       : fmt::format("{:.1f} core-hours", estimate.core_hours);
   fmt::format_to(std::back_inserter(text), "{} tiles in {} files ({} subtrees), about {} and {}; {}\n",
-                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.units), Bytes(estimate.bytes),
+                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.subtrees), Bytes(estimate.bytes),
                  hours,
                  estimate.sampled > 0 ? fmt::format("from {} tiles that were built", estimate.sampled)
                                       : std::string("from the assumed bytes and milliseconds a tile"));

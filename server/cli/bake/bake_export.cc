@@ -5,7 +5,6 @@
 
 #include "archive/archive.h"
 #include "archive/export.h"
-#include "archive/manifest.h"
 
 namespace terrace::cli {
 
@@ -20,20 +19,11 @@ Result<void> CheckExportPlace(const std::string& out) {
 }
 
 Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop) {
-  const auto archives = archive::Archive::OpenAll(baked);
-  if (!archives) return tl::unexpected(archives.error());
-  archive::ExportOptions options;
-  options.stop = stop;
-  for (const auto& archive : *archives) {
-    const std::string out = archives->size() == 1
-                                ? arguments.out
-                                : arguments.out + "/" + archive::FolderOf(archive->manifest().kind.format);
-    std::error_code error;
-    if (archives->size() > 1) fs::create_directories(arguments.out, error);
-    const Result<void> written = arguments.form == kSingle ? archive::WriteSingle(*archive, out, options)
-                                                           : archive::WriteFolder(*archive, out, options);
-    if (!written) return written;
-  }
+  const auto archive = archive::Archive::Open(baked);
+  if (!archive) return tl::unexpected(archive.error());
+  const Result<void> written = arguments.form == kSingle ? archive::WriteSingle(**archive, arguments.out, stop)
+                                                         : archive::WriteFolder(**archive, arguments.out, stop);
+  if (!written) return written;
   std::error_code ignored;
   fs::remove_all(baked, ignored);
   return {};

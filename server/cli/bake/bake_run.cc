@@ -8,13 +8,12 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <system_error>
 #include <thread>
 #include <utility>
 
+#include "archive/files/input_file.h"
 #include "bake/catalogue.h"
 #include "bake/estimate.h"
 #include "bake/place.h"
@@ -43,21 +42,15 @@ int Fail(const Error& error) {
 
 int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
 
-std::string ReadText(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 // Only ranges of tiles are made: no raster is opened.
 int PlanFromCatalogue(const BakeArguments& arguments, const bake::Order& order) {
-  if (!std::ifstream(arguments.catalogue)) {
-    return cli::Fail(arguments.catalogue + ": cannot be read; give a file with a cell such as N46E008 on each line",
-                     kExitFailure);
+  constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
+  const Result<std::string> cells = archive::ReadFile(arguments.catalogue, kMaxBytes);
+  if (!cells) {
+    return cli::Fail(cells.error().message + "; give a file with a cell such as N46E008 on each line", kExitFailure);
   }
   constexpr double kErrorFraction = 0.5;
-  auto tiles = bake::PlanCatalogue(ReadText(arguments.catalogue), arguments.arc_seconds, kErrorFraction);
+  auto tiles = bake::PlanCatalogue(*cells, arguments.arc_seconds, kErrorFraction);
   if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
   const int deepest = static_cast<int>(tiles->size()) - 1;
   if (order.levels && (order.levels->first > 0 || order.levels->second > deepest)) {
@@ -106,7 +99,8 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
            {"bbox", arguments.bbox.empty() ? "none" : arguments.bbox},
            {"error", error},
            {"extensions", extensions.empty() ? "none" : extensions},
-           {"options of the dataset and program", fmt::format("{:016x}", dataset.options)}}};
+           {"gzip", arguments.no_gzip ? "no" : "yes"},
+           {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options)}}};
 }
 
 Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
@@ -116,6 +110,10 @@ Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& target
     target.old_place = std::filesystem::exists(folder + "/" + archive::kManifestFile, ignored) ? folder : place;
     auto manifest = archive::ReadManifest(target.old_place);
     if (!manifest) return MakeError(manifest.error().code, "--update: {}", manifest.error().message);
+    if (manifest->units.empty()) {
+      return MakeError(ErrorCode::kInvalidArgument, "--update {}: is one file without units; give a bake in chunks",
+                       place);
+    }
     for (const archive::UnitEntry& unit : manifest->units) target.old_units.emplace(unit.name, unit);
   }
   return {};
@@ -129,7 +127,7 @@ Result<void> Finish(std::vector<bake::Target>& targets, const std::vector<bake::
   }
   std::vector<archive::Manifest> manifests;
   for (bake::Target& target : targets) {
-    target.manifest.options = bake::ToJson(identity);
+    target.manifest.identity = bake::ToJson(identity);
     if (auto written = archive::WriteManifest(target.place, target.manifest); !written) return written;
     manifests.push_back(target.manifest);
   }
@@ -188,7 +186,6 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   bake::Counters counters;
   bake::BakeOptions options;
   options.threads = arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
-  options.shard = shard;
   options.only_verify = arguments.finish;
   options.stop = signals.token();
   if (arguments.json) {
@@ -260,6 +257,11 @@ std::string WrongTogether(const BakeArguments& arguments) {
   if (given(arguments.catalogue)) {
     if (!arguments.dry_run) return "--catalogue plans without sources: give --dry-run with it";
     if (!arguments.dems.empty() || given(arguments.config)) return "--catalogue stands for the sources; give no DEM";
+    if (arguments.format != "terrain" || given(arguments.shard) || arguments.finish || arguments.error > 0 ||
+        arguments.fraction > 0) {
+      return "--catalogue plans all terrain tiles at the default error: leave out --format, --shard, --finish, --error "
+             "and --fraction";
+    }
     return {};
   }
   if (arguments.dems.empty() == arguments.config.empty()) {
@@ -272,8 +274,9 @@ std::string WrongTogether(const BakeArguments& arguments) {
     return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
   }
   if (given(arguments.shard) && arguments.finish) return "--finish is for all shards together: leave --shard out";
-  if (given(arguments.shard) && arguments.form != kChunks) {
-    return fmt::format("--form {} is written from all units: bake shards with --form chunks", arguments.form);
+  if ((given(arguments.shard) || arguments.finish) && arguments.form != kChunks) {
+    return fmt::format("--form {} is written from all units: bake and finish shards with --form chunks",
+                       arguments.form);
   }
   if (given(arguments.update)) {
     std::error_code ignored;

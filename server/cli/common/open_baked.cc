@@ -18,9 +18,6 @@ namespace {
 
 using Archives = std::vector<std::shared_ptr<const archive::Archive>>;
 
-constexpr tiler::TileFormat kFormats[] = {tiler::TileFormat::kQuantizedMesh, tiler::TileFormat::kGlb,
-                                          tiler::TileFormat::kHeightPng};
-
 bool IsFile(const std::string& path) {
   std::error_code ignored;
   return std::filesystem::is_regular_file(path, ignored);
@@ -51,7 +48,7 @@ std::vector<std::string> FilesOfBaked(const std::string& place) {
     if (IsFile(manifest)) files.push_back(manifest);
   };
   add(place);
-  for (const tiler::TileFormat format : kFormats) add(place + "/" + archive::FolderOf(format));
+  for (const auto& [format, name] : archive::kFormatNames) add(place + "/" + std::string(name));
   return files;
 }
 

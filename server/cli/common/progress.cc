@@ -12,17 +12,13 @@ namespace terrace::cli {
 
 using Clock = std::chrono::steady_clock;
 
-namespace {
-
-std::string Grouped(std::size_t number) {
+std::string Grouped(std::uint64_t number) {
   std::string text = std::to_string(number);
   for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
     text.insert(static_cast<std::size_t>(at), ",");
   }
   return text;
 }
-
-}  // namespace
 
 Progress::Progress(std::string what, std::size_t count)
     : what_(std::move(what)),

@@ -3,10 +3,14 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
 
 namespace terrace::cli {
+
+// "1,234,567"
+std::string Grouped(std::uint64_t number);
 
 // Prints "terrace: reading alps.tif 42 %, 3 min left", or "terrace: reading dems 1,234 of 5,000" for many items. On a
 // terminal the line is rewritten in place; otherwise a line is printed every ten seconds. Prints nothing if the work

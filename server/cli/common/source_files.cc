@@ -10,6 +10,14 @@
 
 namespace terrace::cli {
 
+std::string DatasetNameOf(const std::string& dem) {
+  std::error_code ignored;
+  const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
+  const bool is_folder = std::filesystem::is_directory(path, ignored);
+  const std::filesystem::path named = path.has_filename() ? path : path.parent_path();
+  return config::SanitizeDatasetName((is_folder ? named.filename() : path.stem()).string());
+}
+
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources) {
   std::size_t count = 0;
   for (const config::SourceConfig& source : sources) count += source.files.size();

@@ -10,6 +10,9 @@
 
 namespace terrace::cli {
 
+// The name of the dataset of a file or folder that the command line names. A folder keeps what looks like an extension.
+std::string DatasetNameOf(const std::string& dem);
+
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".

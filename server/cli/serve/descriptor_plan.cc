@@ -29,6 +29,7 @@ server::DescriptorDemand DemandOf(const config::Config& config) {
   demand.open_sources = config.max_open_sources;
   demand.has_vrts = std::ranges::any_of(config.datasets, HasVrt);
   demand.connections = config.max_connections;
+  demand.has_admin_listener = config.admin_listen.has_value();
   for (const config::DatasetConfig& dataset : config.datasets) {
     if (!dataset.baked.empty()) demand.archive_files += archive::Archive::kMaxOpenFiles;
   }

@@ -73,14 +73,6 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
   return kExitUsage;
 }
 
-// For folders, keeps what looks like an extension, and ignores a trailing slash.
-std::string StemOf(const std::string& dem) {
-  std::error_code ignored;
-  const std::filesystem::path path = std::filesystem::path(dem).lexically_normal();
-  if (!std::filesystem::is_directory(path, ignored)) return path.stem().string();
-  return path.has_filename() ? path.filename().string() : path.parent_path().filename().string();
-}
-
 // A file that can be read only once, or endlessly.
 bool IsPipe(const std::string& path) {
   std::error_code ignored;
@@ -175,7 +167,7 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
       }
       continue;
     }
-    if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(StemOf(dem));
+    if (dataset.name.empty()) dataset.name = DatasetNameOf(dem);
     Result<config::SourceConfig> source = config::SourceAt(dem);
     if (source)
       dataset.sources = {*std::move(source)};

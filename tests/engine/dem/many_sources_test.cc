@@ -3,18 +3,14 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <latch>
 #include <random>
 #include <sstream>
-#include <thread>
 #include <utility>
 
 #include "engine/dem/bound/grid_statistics.h"
-#include "engine/dem/common/parallel_for.h"
 #include "engine/dem/mosaic/grid_voids.h"
 #include "engine/dem/mosaic/raster_grid.h"
 #include "engine/dem/sources/raster_source.h"
@@ -358,41 +354,6 @@ TEST(ManySources, SourcesOfOneProjectionShareItsOperation) {
   const auto second = OpenRasterOrFail(WriteRaster(dir, spec, "b.tif"));
   ASSERT_NE(first->georeference().projector(), nullptr);
   EXPECT_EQ(first->georeference().projector(), second->georeference().projector());
-}
-
-TEST(AllCores, WorkIsDoneAtOnceAndOnce) {
-  if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "one core";
-  std::vector<int> done(100);
-  std::latch both(2);
-  bool met = true;
-  ParallelFor(done.size(), [&](std::size_t i) {
-    ++done[i];
-    if (i > 1) return true;
-    // The first two wait for each other.
-    both.count_down();
-    for (int waited = 0; !both.try_wait() && waited < 3000; ++waited)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    if (!both.try_wait()) met = false;
-    return true;
-  });
-  EXPECT_TRUE(met);
-  EXPECT_EQ(std::ranges::count(done, 1), 100);
-}
-
-TEST(AllCores, NothingBeginsAfterFalseAndWhatIsThrownComesOut) {
-  std::size_t begun = 0;
-  std::mutex mutex;
-  EXPECT_THROW(ParallelFor(100'000,
-                           [&](std::size_t i) -> bool {
-                             {
-                               const std::lock_guard lock(mutex);
-                               ++begun;
-                             }
-                             if (i == 3) throw std::runtime_error("three");
-                             return true;
-                           }),
-               std::runtime_error);
-  EXPECT_LT(begun, 100'000U);
 }
 
 std::vector<DemFile> WriteFolder(const TempDir& dir, int count) {

@@ -76,7 +76,7 @@ class FakeStore final : public tiler::TileStore {
 
   const char* name() const override { return name_; }
   tiler::StoreStats stats() const override { return {}; }
-  Result<std::size_t> Erase(const tiler::TileSelection&) override { return std::size_t{0}; }
+  Result<std::size_t> Erase(const tiler::TileSelection&, const std::stop_token&) override { return std::size_t{0}; }
   void Abandon() override {}
   std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override {
     const auto kept = kept_.find(key);
