@@ -7,6 +7,7 @@
 
 #include "archive/tile_writer.h"
 #include "tests/archive/small_archive.h"
+#include "tiler/strong_etag.h"
 #include "tests/support/scratch_directory.h"
 
 namespace terrace::archive {
@@ -38,7 +39,7 @@ TEST_F(ArchiveTest, TilesComeBackAsTheyWereAdded) {
     ASSERT_TRUE(found && *found) << geo::ToString(key);
     const tiler::EncodedTile wanted = InventedTile(key);
     EXPECT_EQ((*found)->tile.bytes, wanted.bytes);
-    EXPECT_EQ((*found)->tile.etag, wanted.etag);
+    EXPECT_EQ(tiler::StrongETag((*found)->tile.bytes), wanted.etag);
     EXPECT_EQ((*found)->tile.max_error_m, wanted.max_error_m);
     EXPECT_EQ((*found)->tile.certified_error_m, wanted.certified_error_m);
     EXPECT_EQ((*found)->tile.vertices, wanted.vertices);

@@ -9,6 +9,7 @@
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/pmtiles/tile_id.h"
 #include "tests/archive/small_archive.h"
+#include "tiler/strong_etag.h"
 #include "tests/support/scratch_directory.h"
 
 namespace terrace::archive {
@@ -106,7 +107,7 @@ TEST_F(PmtilesTest, EveryTileIsFoundAndNoOther) {
     ASSERT_TRUE(found && *found);
     const tiler::EncodedTile wanted = TileOf(id);
     ASSERT_EQ((*found)->tile.bytes, wanted.bytes);
-    ASSERT_EQ((*found)->tile.etag, wanted.etag);
+    ASSERT_EQ(tiler::StrongETag((*found)->tile.bytes), wanted.etag);
     ASSERT_EQ((*found)->tile.certified_error_m, wanted.certified_error_m);
     ASSERT_EQ((*found)->tile.vertices, wanted.vertices);
     ASSERT_EQ((*found)->range.max, 2.25);
