@@ -7,8 +7,8 @@
 
 #include "archive/tile_writer.h"
 #include "tests/archive/small_archive.h"
-#include "tiler/strong_etag.h"
 #include "tests/support/scratch_directory.h"
+#include "tiler/strong_etag.h"
 
 namespace terrace::archive {
 namespace {

@@ -9,8 +9,8 @@
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/pmtiles/tile_id.h"
 #include "tests/archive/small_archive.h"
-#include "tiler/strong_etag.h"
 #include "tests/support/scratch_directory.h"
+#include "tiler/strong_etag.h"
 
 namespace terrace::archive {
 namespace {
