@@ -169,7 +169,8 @@ void Geoid::FindGrid() {
 // to look it up. Failures are not cached, because a missing grid may be installed later.
 std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made) {
   static std::mutex mutex;
-  static std::map<std::string, std::shared_ptr<const Geoid>> shared;
+  // Never destroyed: at the end of the process, what GDAL and PROJ need to free their objects may be gone.
+  static auto& shared = *new std::map<std::string, std::shared_ptr<const Geoid>>;
   const std::lock_guard lock(mutex);
   if (made != nullptr) return shared.insert_or_assign(vertical_crs, std::move(made)).first->second;
   const auto found = shared.find(vertical_crs);

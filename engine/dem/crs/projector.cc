@@ -30,7 +30,8 @@ ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position 
 // up.
 std::shared_ptr<const Projector> FindShared(const std::string& wkt, std::shared_ptr<const Projector> made) {
   static std::mutex mutex;
-  static std::map<std::string, std::shared_ptr<const Projector>> shared;
+  // Never destroyed: at the end of the process, what GDAL and PROJ need to free their objects may be gone.
+  static auto& shared = *new std::map<std::string, std::shared_ptr<const Projector>>;
   const std::lock_guard lock(mutex);
   if (made != nullptr) return shared.insert_or_assign(wkt, std::move(made)).first->second;
   const auto found = shared.find(wkt);
