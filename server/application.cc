@@ -193,18 +193,18 @@ bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& confi
   return is_first;
 }
 
-void TerrainApplication::SetTroubles(std::map<std::string, std::string> troubles) {
+void TerrainApplication::SetProblems(std::map<std::string, std::string> problems) {
   const std::lock_guard lock(mutex_);
   const auto now = Clock::now();
-  std::erase_if(trouble_since_, [&](const auto& known) { return !troubles.contains(known.first); });
-  for (const auto& [dataset, trouble] : troubles) trouble_since_.try_emplace(dataset, now);
-  troubles_ = std::move(troubles);
+  std::erase_if(problem_since_, [&](const auto& known) { return !problems.contains(known.first); });
+  for (const auto& [dataset, problem] : problems) problem_since_.try_emplace(dataset, now);
+  problems_ = std::move(problems);
 }
 
-std::map<std::string, std::string> TerrainApplication::troubles() const {
-  const std::string cache = parts_.cache_trouble ? parts_.cache_trouble() : std::string();
+std::map<std::string, std::string> TerrainApplication::problems() const {
+  const std::string cache = parts_.cache_problem ? parts_.cache_problem() : std::string();
   const std::lock_guard lock(mutex_);
-  std::map<std::string, std::string> all = troubles_;
+  std::map<std::string, std::string> all = problems_;
   if (!cache.empty()) all.emplace(kCacheTrouble, cache);
   return all;
 }
@@ -221,8 +221,8 @@ TerrainApplication::HandlersPtr TerrainApplication::Current() const {
 
 bool TerrainApplication::HasLastingTrouble(const std::string& dataset) const {
   const std::lock_guard lock(mutex_);
-  const auto since = trouble_since_.find(dataset);
-  return since != trouble_since_.end() && Clock::now() - since->second >= kPassingTrouble;
+  const auto since = problem_since_.find(dataset);
+  return since != problem_since_.end() && Clock::now() - since->second >= kPassingTrouble;
 }
 
 // Returns false if there was none in time, or if there will be none.

@@ -36,7 +36,7 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_trouble;  // the problem kCacheTrouble; "": there is none; may be empty
+  std::function<std::string()> cache_problem;  // the problem kCacheTrouble; "": there is none; may be empty
 };
 
 class TerrainApplication final : public Application, public ProcessState {
@@ -51,13 +51,13 @@ class TerrainApplication final : public Application, public ProcessState {
   bool Replace(CatalogPtr catalog, const config::Config& config);
 
   // Problems by dataset; "" is the configuration.
-  void SetTroubles(std::map<std::string, std::string> troubles);
+  void SetProblems(std::map<std::string, std::string> problems);
 
   const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request
   // Never null; empty before the first.
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
-  std::map<std::string, std::string> troubles() const override;
+  std::map<std::string, std::string> problems() const override;
   std::uint64_t replaced() const;  // how often a catalog has replaced another
 
  private:
@@ -78,8 +78,8 @@ class TerrainApplication final : public Application, public ProcessState {
   mutable std::mutex mutex_;
   HandlersPtr handlers_;  // never null; guarded by mutex_, as the next three are
   std::uint64_t replaced_ = 0;
-  std::map<std::string, std::string> troubles_;
-  std::map<std::string, std::chrono::steady_clock::time_point> trouble_since_;  // of the same datasets
+  std::map<std::string, std::string> problems_;
+  std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets
   const std::size_t max_locations_;
   std::atomic<std::chrono::milliseconds> deadline_;
   std::atomic<bool> opening_;  // the first catalog has not come

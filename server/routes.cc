@@ -57,7 +57,7 @@ std::optional<int> CutSubtreeLevels(std::string_view& row) {
   const std::size_t dot = rest.find('.');
   if (dot == std::string_view::npos) return std::nullopt;
   const auto levels = TileNumber(rest.substr(dot + 1));
-  if (!levels || *levels < 1 || *levels > proto::kTallestSubtree) return std::nullopt;
+  if (!levels || *levels < 1 || *levels > proto::kMaxServedSubtreeLevels) return std::nullopt;
   row = rest.substr(0, dot);
   return static_cast<int>(*levels);
 }

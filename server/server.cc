@@ -75,7 +75,7 @@ class RunningServer final : public Server {
         metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
         application_({*frontend_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
-                      options_.cache_trouble},
+                      options_.cache_problem},
                      std::move(catalog), options_.config),
         admin_({tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
                 [this] { return application_.catalog(); }, application_.deadline()}),
@@ -116,8 +116,8 @@ class RunningServer final : public Server {
     return {};
   }
 
-  void SetTroubles(std::map<std::string, std::string> troubles) override {
-    application_.SetTroubles(std::move(troubles));
+  void SetProblems(std::map<std::string, std::string> problems) override {
+    application_.SetProblems(std::move(problems));
   }
 
   void ReopenAccessLog() override { access_log_.Reopen(); }
@@ -249,7 +249,7 @@ class RunningServer final : public Server {
     state.refused_connections = frontend_->connections.refused();
     state.transfers = frontend_->transfers.stats();
     state.catalog = application_.catalog();
-    state.troubles = application_.troubles().size();
+    state.problems = application_.problems().size();
     state.catalogs = application_.replaced();
     return state;
   }

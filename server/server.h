@@ -28,7 +28,7 @@ struct ServerOptions {
   // Cache tiers of finished tiles below memory, the first asked first.
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};
   std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
-  std::function<std::string()> cache_trouble = {};                // why cache_dir is not used; "": it is; thread-safe
+  std::function<std::string()> cache_problem = {};                // why cache_dir is not used; "": it is; thread-safe
   std::chrono::milliseconds metrics_age{1'000};                   // how long a text of /metrics is reused
   // How long new requests are still served after a stop; part of drain_timeout.
   std::chrono::milliseconds drain_grace{500};
@@ -66,9 +66,9 @@ class Server {
   // Call it after a rotation of logs.
   virtual void ReopenAccessLog() = 0;
 
-  // Sets the problems that /readyz reports as "degraded" besides cache_trouble, by dataset; "" is the configuration.
+  // Sets the problems that /readyz reports as "degraded" besides cache_problem, by dataset; "" is the configuration.
   // Requests do not wait for a source with a problem.
-  virtual void SetTroubles(std::map<std::string, std::string> troubles) = 0;
+  virtual void SetProblems(std::map<std::string, std::string> problems) = 0;
 
   virtual std::uint16_t port() const = 0;
   virtual std::string url() const = 0;  // "http://127.0.0.1:8080/"; https with a certificate

@@ -27,7 +27,7 @@ enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 // CR LF.
 struct HeaderLines {
   std::string text;
-  std::size_t of_body = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
+  std::size_t body_bytes = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
 };
 
 struct EncodedTile {

@@ -68,9 +68,9 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   }
   const proto::LatticeView lattice{key, heights.lattice, heights.heights};
   const tin::HeightField field = FieldOf(lattice);
-  tin::GreedyOptions plan = RefineOptionsOf(*dataset.source, lattice, dataset.rules.criterion);
-  tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(plan), known->refinement)
-                                          : tin::GreedyTriangulation(field, std::move(plan));
+  tin::GreedyOptions options = RefineOptionsOf(*dataset.source, lattice, dataset.mesh_options.criterion);
+  tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(options), known->refinement)
+                                          : tin::GreedyTriangulation(field, std::move(options));
   tin::GreedyGoal goal;
   goal.max_error = error_m;
   goal.max_points = proto::kMaxTileVertices + 1;

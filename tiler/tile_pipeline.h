@@ -27,7 +27,7 @@
 namespace terrace::tiler {
 
 // The source of a dataset's water: a mask, a sea level, or none. At most one is set.
-struct WaterRules {
+struct WaterOptions {
   std::shared_ptr<const dem::WaterRaster> mask;
   std::optional<double> sea_level_m;  // in the source's vertical datum
 
@@ -35,7 +35,7 @@ struct WaterRules {
 };
 
 // The source and encoding of textures of GLB tiles.
-struct ImageryRules {
+struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;                   // null: none
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
   int side = 512;                                              // pixels along a tile's edge, at most
@@ -49,13 +49,13 @@ struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
-  MeshRules rules;
+  MeshOptions mesh_options;
   proto::GlbOptions glb;                         // compression: for GLB requests that name none
   std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
   std::vector<std::string> baked_files;          // whose change means another archive
-  WaterRules water;
-  ImageryRules imagery;
+  WaterOptions water;
+  ImageryOptions imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
   std::uint64_t options = 0;     // the same without what only heights depend on (DemSource::fingerprint)

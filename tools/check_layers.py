@@ -31,7 +31,7 @@ ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "ser
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
        "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
 # Headers below a module that count as that module's own: every module that may include it may include these.
-DOORS = {front + "/" + name: front for front, names in {
+PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
     "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
                    "gdal/gdal_runtime.h", "gdal/remote_file.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
                    "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
@@ -44,7 +44,7 @@ HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
 API = TILES + HTTP + ["server/api"]
 SERVER = API + ["server/store", "server/telemetry", "server/query", "server/frontend", "server/documents", "server/handlers"]
-ROOMS = {
+MODULES = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
     "engine/tin/mesh": ["engine/core"],
@@ -126,7 +126,7 @@ INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', 
 
 def room_of(path):
     """The module of a file: the file itself, or the longest module that is a folder of its path."""
-    rooms = [room for room in ROOMS if path == room or path.startswith(room + "/")]
+    rooms = [room for room in MODULES if path == room or path.startswith(room + "/")]
     return max(rooms, key=len, default=None)
 
 
@@ -137,7 +137,7 @@ def library_of(header):
 class Tree:
     def __init__(self, root):
         self.sources = {}  # path -> [(line, header or None, quoted path or None)]
-        for room in sorted({room.split("/")[0] for room in ROOMS}):
+        for room in sorted({room.split("/")[0] for room in MODULES}):
             for folder, folders, names in os.walk(root / room):
                 folders[:] = sorted(set(folders) - {"node_modules"})
                 for name in sorted(names):
@@ -177,12 +177,12 @@ class Tree:
             return f'"{quoted}" is no file of a room: name it from the root of the repository'
         room, other = room_of(path), room_of(quoted)
         if room is None or other is None:
-            return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to ROOMS'
+            return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to MODULES'
         if room == other:
             return None
-        if DOORS.get(quoted) in ROOMS[room]:
-            other = DOORS[quoted]
-        if other not in ROOMS[room] and not (room in CONFIG and quoted in VALUES):
+        if PUBLIC_HEADERS.get(quoted) in MODULES[room]:
+            other = PUBLIC_HEADERS[quoted]
+        if other not in MODULES[room] and not (room in CONFIG and quoted in VALUES):
             return f'{room} may not know {other} ("{quoted}")'
         public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
         public |= {"GDAL", "Boost.Geometry"} if room.startswith("engine/dem") and other.startswith("engine/dem/") else set()

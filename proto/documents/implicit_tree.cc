@@ -100,7 +100,7 @@ void FindTrees(std::vector<TreeRoot>& trees, int levels, std::vector<TreeRoot*>&
 // Trees with the same number of levels are split together, so that neighbours are treated alike.
 void SplitTallTrees(Availability available, std::vector<TreeRoot>& trees) {
   std::size_t named = CountTiles(trees);
-  for (int levels = static_cast<int>(available.size()); levels > kTallestSubtree; --levels) {
+  for (int levels = static_cast<int>(available.size()); levels > kMaxServedSubtreeLevels; --levels) {
     std::vector<TreeRoot*> tall;
     FindTrees(trees, levels, tall);
     std::vector<std::vector<TreeRoot>> below;
@@ -147,7 +147,7 @@ std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<ge
 }
 
 int SubtreeLevels(int levels) {
-  const int stacked = (levels + kTallestSubtree - 1) / kTallestSubtree;
+  const int stacked = (levels + kMaxServedSubtreeLevels - 1) / kMaxServedSubtreeLevels;
   return (levels + stacked - 1) / stacked;
 }
 

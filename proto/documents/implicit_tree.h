@@ -35,7 +35,7 @@ int LevelsUnder(Availability available, const geo::TileKey& root);
 
 // More levels would cost CesiumJS frames: it creates an object for each of the 5,461 tiles of a full subtree when the
 // file arrives.
-inline constexpr int kTallestSubtree = 7;
+inline constexpr int kMaxServedSubtreeLevels = 7;
 
 // The number of levels of each .subtree in a tree of `levels` levels: as few subtrees above each other as possible,
 // with equally many levels. Deepest subtrees with few levels would begin at a deep level, and there would be one for

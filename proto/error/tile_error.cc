@@ -73,11 +73,11 @@ bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vert
 class TileErrorMeter::Impl {
  public:
   Impl(const LatticeView& lattice, double bound_m)
-      : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m), plumb_(lattice) {}
+      : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m), verticals_(lattice) {}
 
   int cells() const { return cells_; }
   const Surface& surface() const { return surface_; }
-  const NodeVerticals& plumb() const { return plumb_; }
+  const NodeVerticals& verticals() const { return verticals_; }
 
   // Measures the height interpolated in longitude and latitude of every triangle, and bounds the error of the flat
   // triangle. Then measures the flat triangles that may be the worst or exceed the bound.
@@ -221,7 +221,7 @@ class TileErrorMeter::Impl {
     const std::array<NodePoint, 3> p = CornersOf(t);
     const std::int64_t area = TwiceArea(p);
     if (area <= 0) return kUnknown;
-    const NodeVerticals::Bounds bounds = plumb_.BoundsOf(p, surface_.unit, surface_.beside_m);
+    const NodeVerticals::Bounds bounds = verticals_.BoundsOf(p, surface_.unit, surface_.beside_m);
     if (!std::isfinite(bounds.shift.x)) return kUnknown;
     const Linear plane = PlaneOf(t, p, area);
     const double unit = static_cast<double>(surface_.unit);
@@ -289,18 +289,18 @@ class TileErrorMeter::Impl {
                                               surface_.ecef[triangle[2]]};
     const NodeVerticals::Plane plane(corners);
     if (plane.is_line) return;
-    const VerticalsInTriangle footprint(p, surface_.unit, surface_.beside_m, plumb_);
+    const VerticalsInTriangle footprint(p, surface_.unit, surface_.beside_m, verticals_);
     for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
       const VerticalsInTriangle::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
-      const double largest = plumb_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
+      const double largest = verticals_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
       if (largest <= found.largest && largest <= bound_) continue;
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
-        const double error = std::abs(plumb_.HeightOn(plane, i, j) - lattice_.At(i, j));
+        const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
         const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
         if (!counts) continue;  // NaN: no height
-        const bool meets =
-            (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m || plumb_.Meets(corners, i, j);
+        const bool meets = (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m ||
+                           verticals_.Meets(corners, i, j);
         if (meets) Take(error, i, j, found);
       }
     }
@@ -317,7 +317,7 @@ class TileErrorMeter::Impl {
   std::vector<bool> is_vertex_;    // by node
   std::vector<Reading> readings_;  // by triangle
 
-  const NodeVerticals plumb_;
+  const NodeVerticals verticals_;
 };
 
 TileErrorMeter::TileErrorMeter(const LatticeView& lattice, double bound_m)
@@ -346,7 +346,7 @@ TileError TileErrorMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vecto
   surface.heights.reserve(mesh.vertices.size());
   for (std::size_t k = 0; k < positions.size(); ++k) {
     const tin::SamplePosition node = mesh.vertices[k];
-    const NodeVerticals::Position position = impl_->plumb().PositionOf(positions[k], node.x, node.y);
+    const NodeVerticals::Position position = impl_->verticals().PositionOf(positions[k], node.x, node.y);
     surface.points.push_back({node.x, node.y});
     surface.heights.push_back(position.height_m);
     surface.beside_m = std::max(surface.beside_m, position.beside_m);

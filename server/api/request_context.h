@@ -26,7 +26,7 @@ struct Route {
   std::string dataset;                 // the first segment of the URL, decoded, if it is a dataset
   geo::TileKey key;                    // of tiles and subtrees: valid in the tiling scheme of the format
   geo::TileKey root;                   // of subtrees: root of the URL's tree, an ancestor of `key`
-  int subtree_levels = 0;              // of subtrees: 1 .. proto::kTallestSubtree
+  int subtree_levels = 0;              // of subtrees: 1 .. proto::kMaxServedSubtreeLevels
   const TileFormat* format = nullptr;  // of tiles: by the suffix
   std::string file;                    // of the viewer: relative to its folder, decoded: "index.html" for "/"
   std::string query;                   // without '?', not decoded

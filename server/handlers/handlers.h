@@ -41,7 +41,7 @@ class ProcessState {
   virtual bool draining() const = 0;
   virtual bool opening() const = 0;  // the first catalog has not been opened yet
   // Problems by dataset; "" is the configuration, kCacheTrouble the cache folder.
-  virtual std::map<std::string, std::string> troubles() const = 0;
+  virtual std::map<std::string, std::string> problems() const = 0;
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
 };
 

@@ -47,9 +47,9 @@ Answer AnswerReady(const Handlers& from, const RequestContext& context) {
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }
-  const std::map<std::string, std::string> troubles = from.process.troubles();
-  std::string text = troubles.empty() ? "ready\n" : "degraded\n";
-  for (const auto& [dataset, reason] : troubles) {
+  const std::map<std::string, std::string> problems = from.process.problems();
+  std::string text = problems.empty() ? "ready\n" : "degraded\n";
+  for (const auto& [dataset, reason] : problems) {
     if (dataset == kCacheTrouble) {
       // It names no file.
       text += fmt::format("cache_dir: {}; averages of sources are kept in memory as far as they fit\n", reason);

@@ -31,7 +31,7 @@ Response Reply(const Handlers& from, const tiler::TileRequest& tile, const Serve
                const RequestContext& context) {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
-  response.lines_of_body = served.tile->head.of_body;
+  response.body_line_bytes = served.tile->head.body_bytes;
   response.cache_control =
       CacheControlOf(context.route.query, from.catalog->datasets[tile.dataset], from.cache_control);
   response.vary = context.route.format->vary(tile);

@@ -74,7 +74,7 @@ DatasetSlot::DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving)
 
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
 
-std::string DatasetSlot::Trouble() const {
+std::string DatasetSlot::Problem() const {
   if (!problem_.empty()) return problem_;
   if (stale_since_ && Clock::now() - *stale_since_ > kPatience) return "its source changes and is not complete yet";
   return {};

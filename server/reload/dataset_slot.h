@@ -40,7 +40,7 @@ class DatasetSlot {
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
 
   // The problem, for people; empty: there is none, or it is too recent.
-  std::string Trouble() const;
+  std::string Problem() const;
 
   // Changes the wanted configuration. The old dataset is served until the new one is open.
   void Want(config::DatasetConfig wanted);

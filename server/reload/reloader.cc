@@ -238,14 +238,14 @@ void Reloader::Publish() {
 }
 
 void Reloader::TellTroubles() {
-  std::map<std::string, std::string> troubles;
-  if (!config_problem_.empty()) troubles.emplace("", config_problem_);
+  std::map<std::string, std::string> problems;
+  if (!config_problem_.empty()) problems.emplace("", config_problem_);
   for (const DatasetSlot& slot : slots_) {
-    if (std::string trouble = slot.Trouble(); !trouble.empty())
-      troubles.emplace(slot.wanted().name, std::move(trouble));
+    if (std::string problem = slot.Problem(); !problem.empty())
+      problems.emplace(slot.wanted().name, std::move(problem));
   }
-  if (troubles == told_) return;
-  told_ = std::move(troubles);
+  if (problems == told_) return;
+  told_ = std::move(problems);
   hooks_.tell(told_);
 }
 

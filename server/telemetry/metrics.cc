@@ -315,7 +315,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
   add(kCounter, "terrace_http_transfers_cut_total",
       "Replies cut off and uploads displaced because others needed their room", state.transfers.cut);
   add(kGauge, "terrace_datasets", "Datasets served", state.catalog->datasets.size());
-  add(kGauge, "terrace_degraded", "Troubles that /readyz tells of", state.troubles);
+  add(kGauge, "terrace_degraded", "Problems that /readyz reports", state.problems);
   all.push_back(Versions(state.catalog->datasets));
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
   const tiler::TilePipeline* const pipeline = state.catalog->pipeline.get();

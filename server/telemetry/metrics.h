@@ -37,7 +37,7 @@ class Metrics {
     std::uint64_t refused_connections = 0;
     TransferBudget::Stats transfers;
     CatalogPtr catalog;  // never null
-    std::size_t troubles = 0;
+    std::size_t problems = 0;
     std::uint64_t catalogs = 0;  // that have replaced one another
   };
   // Returns the text of all counters and of the given state.

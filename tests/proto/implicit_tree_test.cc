@@ -139,7 +139,7 @@ TEST(ImplicitTrees, AreNoTallerThanASubtreeOverAnIslandOfTheGlobe) {
   const Levels available = GlobeAnd(5, {9000, 9000, 9040, 9030}, 14);
   Named named;
   Walk(available, TreesOf(available), named);
-  EXPECT_LE(named.tallest, kTallestSubtree);
+  EXPECT_LE(named.tallest, kMaxServedSubtreeLevels);
   EXPECT_LE(named.tiles, 250u) << "only above the island";
 }
 
@@ -154,7 +154,7 @@ TEST(ImplicitTrees, AreNoTallerThanASubtreeOverASmallDataset) {
   for (const Levels& levels : {available, deeper}) {
     Named named;
     Walk(levels, TreesOf(levels), named);
-    EXPECT_LE(named.tallest, kTallestSubtree);
+    EXPECT_LE(named.tallest, kMaxServedSubtreeLevels);
   }
 }
 
@@ -172,8 +172,9 @@ TEST(ImplicitTrees, OfADeepGlobeAreNamedNoFurtherThanADocumentHolds) {
 TEST(SubtreeLevels, AreEqualSoThatTheLastSubtreesAreFew) {
   for (int levels = 1; levels <= geo::kMaxLevel + 1; ++levels) {
     const int each = SubtreeLevels(levels), stacked = (levels + each - 1) / each;
-    EXPECT_LE(each, kTallestSubtree) << levels;
-    EXPECT_EQ(stacked, (levels + kTallestSubtree - 1) / kTallestSubtree) << levels << ": no more one above another";
+    EXPECT_LE(each, kMaxServedSubtreeLevels) << levels;
+    EXPECT_EQ(stacked, (levels + kMaxServedSubtreeLevels - 1) / kMaxServedSubtreeLevels)
+        << levels << ": no more one above another";
     EXPECT_GE(levels - (stacked - 1) * each, each - stacked + 1) << levels << ": the last is hardly lower";
   }
   EXPECT_EQ(SubtreeLevels(6), 6);

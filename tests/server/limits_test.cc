@@ -233,7 +233,7 @@ TEST_F(Limits, NamesDatasetsInTroubleToThoseWhoMaySeeThem) {
   ServerOptions options;
   options.config.tokens = {{"everybody", config::TokenHash(kAll), {}, 0}};
   Start(options);
-  server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
+  server_->SetProblems({{"maui", "/secret/maui.tif is gone"}});
   EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: its source cannot be opened as it is now\n");
   EXPECT_EQ(Fetch(port(), "/readyz", std::string("Authorization: Bearer ") + kAll + "\r\n").body,
             "degraded\ndataset maui: its source cannot be opened as it is now\n");

@@ -135,7 +135,7 @@ TEST_F(Replace, WaitsOutATroubleThatPasses) {
   std::atomic<int> told{0};
   options_.on_source_changed = [&] { ++told; };
   Start(CatalogOf(1, FindsItsSourceChanged()));
-  server_->SetTroubles({{"maui", "/secret/maui.tif has changed while it was opened"}});
+  server_->SetProblems({{"maui", "/secret/maui.tif has changed while it was opened"}});
   std::thread reopening([&] {
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(100ms);
@@ -150,9 +150,9 @@ TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
   options_.on_source_changed = [&] { ++told; };
   Start(CatalogOf(1, FindsItsSourceChanged()));
   EXPECT_EQ(Fetch(server_->port(), "/readyz").body, "ready\n");
-  server_->SetTroubles({{"maui", "/secret/maui.tif is gone"}});
+  server_->SetProblems({{"maui", "/secret/maui.tif is gone"}});
   std::this_thread::sleep_for(1600ms);  // the error persists
-  server_->SetTroubles({{"maui", "/secret/maui.tif is still gone"}});
+  server_->SetProblems({{"maui", "/secret/maui.tif is still gone"}});
   std::thread reopening([&] {  // a waiting request would see this
     EXPECT_TRUE(Eventually([&] { return told > 0; }));
     std::this_thread::sleep_for(1500ms);

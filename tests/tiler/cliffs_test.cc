@@ -36,7 +36,7 @@ std::string WriteCliff(const dem::TempDir& dir) {
 TilePipeline MakePipeline(const std::string& path, tin::Criterion criterion, bool compact) {
   std::vector<Dataset> datasets;
   datasets.push_back(OpenDataset("cliff", path));
-  datasets.back().rules = {criterion, compact};
+  datasets.back().mesh_options = {criterion, compact};
   return TilePipeline(std::move(datasets));
 }
 

@@ -133,7 +133,7 @@ TEST_P(RealTiles, MatchAndKeepTheirErrorsByEveryRule) {
     for (const bool compact : {false, true}) {
       Dataset dataset = Open();
       ASSERT_NE(dataset.source, nullptr);
-      dataset.rules = {criterion, compact};
+      dataset.mesh_options = {criterion, compact};
       std::vector<Dataset> datasets;
       datasets.push_back(std::move(dataset));
       const TilePipeline pipeline(std::move(datasets));

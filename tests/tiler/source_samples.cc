@@ -53,7 +53,7 @@ class Raster {
   }
 
   // Positions of the centres of a row's pixels, in degrees.
-  void PlacesOf(int row, std::vector<double>& x, std::vector<double>& y) const {
+  void GridCoordinatesOf(int row, std::vector<double>& x, std::vector<double>& y) const {
     x.resize(static_cast<std::size_t>(width_)), y.resize(x.size());
     for (std::size_t column = 0; column < x.size(); ++column) {
       const double c = static_cast<double>(column) + 0.5, r = row + 0.5;
@@ -93,7 +93,7 @@ std::vector<Sample> SamplesOf(const std::string& path) {
   std::vector<Sample> samples;
   std::vector<double> x, y;
   for (int row = 0; row < raster.height(); ++row) {
-    raster.PlacesOf(row, x, y);
+    raster.GridCoordinatesOf(row, x, y);
     for (int column = 0; column < raster.width(); ++column) {
       const auto at = static_cast<std::size_t>(column);
       if (raster.IsValid(column, row) && std::isfinite(x[at]))

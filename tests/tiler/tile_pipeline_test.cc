@@ -93,7 +93,7 @@ TEST(TilePipeline, KeepsErrorsAndEdgesByEveryRule) {
       if (criterion == tin::Criterion::kDelaunay && !compact) continue;
       std::vector<Dataset> datasets;
       datasets.push_back(OpenSample("jacksboro"));
-      datasets.back().rules = {criterion, compact};
+      datasets.back().mesh_options = {criterion, compact};
       const TilePipeline pipeline(std::move(datasets));
       for (const int level : {7, 10, 12}) {
         for (const int step : {0, 10}) {

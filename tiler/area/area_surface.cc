@@ -55,7 +55,7 @@ AreaSurface::AreaSurface(const geo::Lattice& lattice, const dem::NodeWindow& win
   for (int j = 0; j < window.rows; ++j) {
     const double latitude = At(0, j).latitude;
     row_normals_.push_back(geo::SurfaceNormal(0, latitude));
-    row_feet_.push_back(geo::ToEcef(0, latitude, 0));
+    row_points_.push_back(geo::ToEcef(0, latitude, 0));
   }
 }
 
@@ -70,7 +70,7 @@ geo::Vec3 AreaSurface::Up(int column, int row) const {
 
 geo::Vec3 AreaSurface::Ecef(int column, int row, double height_m) const {
   const geo::Vec3 foot =
-      Turned(row_feet_[static_cast<std::size_t>(row)], column_normals_[static_cast<std::size_t>(column)]);
+      Turned(row_points_[static_cast<std::size_t>(row)], column_normals_[static_cast<std::size_t>(column)]);
   return foot + Up(column, row) * height_m;
 }
 

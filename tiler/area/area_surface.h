@@ -43,7 +43,7 @@ class AreaSurface {
   const geo::Lattice lattice_;
   const dem::NodeWindow window_;
   std::vector<geo::Vec3> column_normals_, row_normals_;  // of columns, at the equator; of rows, at longitude 0
-  std::vector<geo::Vec3> row_feet_;                      // of rows: ECEF metres at longitude 0, height 0
+  std::vector<geo::Vec3> row_points_;                    // of rows: ECEF metres at longitude 0, height 0
 };
 
 // Rounds a position to multiples of 2^-10 m, which removes the last bits of libm's results, which differ between

@@ -49,15 +49,16 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
                           double wanted_error_m, double skirt_error_m, proto::PositionWidth width,
                           const std::stop_token& stop) {
   const Clock::time_point start = Clock::now();
-  Result<ReplayedMesh> started = ReplayMesh(*dataset.source, lattice, refinement, dataset.rules, wanted_error_m, stop);
-  if (!started) return tl::unexpected(std::move(started).error());
+  Result<ReplayedMesh> replayed =
+      ReplayMesh(*dataset.source, lattice, refinement, dataset.mesh_options, wanted_error_m, stop);
+  if (!replayed) return tl::unexpected(std::move(replayed).error());
   MeshedGlb meshed;
   meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 
-  tin::TinMesh& mesh = started->mesh;
+  tin::TinMesh& mesh = replayed->mesh;
   double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
   const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
-  proto::TileErrorMeter meter(lattice, started->error_m);
+  proto::TileErrorMeter meter(lattice, replayed->error_m);
   std::vector<proto::GridPoint> points;
   std::vector<geo::Vec3> positions;
   const auto measure = [&](const tin::TinMesh& rounded) {
@@ -77,7 +78,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
 
 // Cuts the texture of the requested tile from the imagery and adds it to `options`. Does nothing if no texture is
 // requested or the image shows no part of the tile.
-Result<void> AddTexture(const ImageryRules& imagery, const TileRequest& request, proto::GlbOptions& options,
+Result<void> AddTexture(const ImageryOptions& imagery, const TileRequest& request, proto::GlbOptions& options,
                         const std::stop_token& stop) {
   if (!imagery.image || request.texture == proto::TextureFormat::kNone) return {};
   const int side = imagery.image->SideOf(request.key.level, imagery.side);

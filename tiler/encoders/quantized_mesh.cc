@@ -60,7 +60,8 @@ Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded
   const auto& [dataset, request, refined, error_m] = input;
   const auto start = std::chrono::steady_clock::now();
   const proto::LatticeView lattice = input.lattice();
-  Result<MeshedTile> measured = MeshTile(*dataset.source, lattice, refined->refinement, dataset.rules, error_m, stop);
+  Result<MeshedTile> measured =
+      MeshTile(*dataset.source, lattice, refined->refinement, dataset.mesh_options, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
   if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
   const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);

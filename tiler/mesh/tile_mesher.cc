@@ -120,30 +120,31 @@ tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::La
 }
 
 Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
-                                const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                                const std::stop_token& stop) {
+                                const tin::Refinement& refinement, const MeshOptions& mesh_options,
+                                double wanted_error_m, const std::stop_token& stop) {
   double error_m = wanted_error_m;
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
-          : RefineWithinFormat(FieldOf(lattice), RefineOptionsOf(source, lattice, rules.criterion), 2, error_m, stop);
-  if (mesh && rules.compact) {
-    mesh = Compact(FieldOf(lattice), *mesh, RefineOptionsOf(source, lattice, rules.criterion), error_m, stop);
+          : RefineWithinFormat(FieldOf(lattice), RefineOptionsOf(source, lattice, mesh_options.criterion), 2, error_m,
+                               stop);
+  if (mesh && mesh_options.compact) {
+    mesh = Compact(FieldOf(lattice), *mesh, RefineOptionsOf(source, lattice, mesh_options.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
   return ReplayedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
 }
 
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
-                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                            const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop) {
   const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
   const Clock::time_point start = Clock::now();
-  Result<ReplayedMesh> started = ReplayMesh(source, lattice, refinement, rules, wanted_error_m, stop);
-  if (!started) return tl::unexpected(std::move(started).error());
-  double error_m = started->error_m;
+  Result<ReplayedMesh> replayed = ReplayMesh(source, lattice, refinement, mesh_options, wanted_error_m, stop);
+  if (!replayed) return tl::unexpected(std::move(replayed).error());
+  double error_m = replayed->error_m;
   const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(std::move(started->mesh), lattice, steps, error_m, stop);
+  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), lattice, steps, error_m, stop);
   if (meshed) meshed->replayed = replayed;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 

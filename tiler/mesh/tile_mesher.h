@@ -16,7 +16,7 @@
 namespace terrace::tiler {
 
 // Meshing options of a dataset.
-struct MeshRules {
+struct MeshOptions {
   tin::Criterion criterion = tin::Criterion::kDelaunay;
   bool compact = false;  // runs the drop pass (engine/tin/decimate/drop_pass.h)
 };
@@ -45,18 +45,18 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice);
 tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
                                    tin::Criterion criterion);
 
-// Replays the refinement to the error and runs the drop pass if the rules ask for it. The mesh is not yet quantized.
+// Replays the refinement to the error and runs the drop pass if the options ask for it. The mesh is not yet quantized.
 // `refinement` as for MeshTile. kCancelled: stopped.
 Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
-                                const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
-                                const std::stop_token& stop);
+                                const tin::Refinement& refinement, const MeshOptions& mesh_options,
+                                double wanted_error_m, const std::stop_token& stop);
 
 // ReplayMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
 // run with RefineOptionsOf to this error or a finer one, or until the format's vertex limit; in that case the inside is
 // coarser than requested and the edges are not. If quantization would flip a triangle, the tile is meshed with the
-// default rules. kCancelled: stopped.
+// default options. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
-                            const tin::Refinement& refinement, const MeshRules& rules, double wanted_error_m,
+                            const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop);
 
 }  // namespace terrace::tiler

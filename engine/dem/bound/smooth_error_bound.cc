@@ -125,8 +125,8 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
     const std::size_t first = (south + j) * tile_.stride() + west;
     double *const x = x_.get() + first, *const y = y_.get() + first;
     const float* const heights = trace_.heights.data() + first;
-    const bool are_all_known = PlacesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
-                                        {last_x, last_y}, {x, columns_here}, {y, columns_here});
+    const bool are_all_known = GridCoordinatesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
+                                                 {last_x, last_y}, {x, columns_here}, {y, columns_here});
     for (std::size_t i = 0; !are_all_known && i < columns_here; ++i) {
       if (std::isnan(heights[i]) || !std::isnan(x[i])) continue;
       const GridCell cell = cells.At(i, j);

@@ -52,7 +52,7 @@ void Touch(int file) { ::futimens(file, nullptr); }
 
 std::string ErrorText() { return std::generic_category().message(errno); }
 
-std::filesystem::path WholePath(const std::string& path) {
+std::filesystem::path AbsolutePath(const std::string& path) {
   std::error_code unresolved;
   std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);
   return unresolved ? std::filesystem::path(path) : whole;

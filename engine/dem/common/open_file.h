@@ -52,6 +52,6 @@ void Touch(int file);
 std::string ErrorText();
 
 // `path` without links and relative parts; as it is if it cannot be resolved.
-std::filesystem::path WholePath(const std::string& path);
+std::filesystem::path AbsolutePath(const std::string& path);
 
 }  // namespace terrace::dem

@@ -65,7 +65,7 @@ Known& KnownHashes() {
 class KeptHash {
  public:
   KeptHash(const std::string& cache_dir, const std::string& path, const FileStamp& stamp) {
-    const std::filesystem::path whole = WholePath(path);
+    const std::filesystem::path whole = AbsolutePath(path);
     const std::string text = whole.string();
     file_ = std::filesystem::path(cache_dir) /
             fmt::format("{}-{:016x}.content", whole.filename().string(), XXH3_64bits(text.data(), text.size()));

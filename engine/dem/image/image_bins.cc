@@ -15,7 +15,7 @@ constexpr int kPixelsAtOnce = 1 << 22;
 
 }  // namespace
 
-ImageBins::Between ImageBins::Around(double position, int side, int last) {
+ImageBins::Neighbors ImageBins::Around(double position, int side, int last) {
   // Clamped to the centres of the first and the last square: the edge's colour continues beyond them.
   const double at = std::clamp(position / side - 0.5, 0.0, static_cast<double>(last));
   const int lower = static_cast<int>(at);
@@ -31,7 +31,7 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
   int west = std::numeric_limits<int>::max(), east = -1, north = west, south = -1;
   for (const Position& p : positions) {
     if (std::isnan(p.x) || std::isnan(p.y)) continue;
-    const Between x = Around(p.x, side, bins.last_col_), y = Around(p.y, side, bins.last_row_);
+    const Neighbors x = Around(p.x, side, bins.last_col_), y = Around(p.y, side, bins.last_row_);
     west = std::min(west, x.lower);
     east = std::max(east, x.upper);
     north = std::min(north, y.lower);
@@ -80,7 +80,7 @@ Result<void> ImageBins::Fill(ImageFile& image, const std::stop_token& stop) {
 
 ColorSample ImageBins::At(Position position) const {
   if (std::isnan(position.x) || std::isnan(position.y)) return {};
-  const Between x = Around(position.x, side_, last_col_), y = Around(position.y, side_, last_row_);
+  const Neighbors x = Around(position.x, side_, last_col_), y = Around(position.y, side_, last_row_);
   std::array<double, 3> sums{};
   double whole = 0;
   const auto add = [&](int col, int row, double share) {

@@ -35,11 +35,11 @@ class ImageBins {
   };
 
   // The squares below and above a position on one axis, and the weight of the upper one.
-  struct Between {
+  struct Neighbors {
     int lower, upper;
     double share;
   };
-  static Between Around(double position, int side, int last);
+  static Neighbors Around(double position, int side, int last);
 
   Result<void> Fill(ImageFile& image, const std::stop_token& stop);
 

@@ -14,7 +14,7 @@ float SampleAt(const std::vector<float>& heights, const GridWindow& window, std:
   return heights[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
 }
 
-double Between(double first, double second, double weight) { return first + weight * (second - first); }
+double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
 
 // Moves a column by a turn, if needed, to within half a turn of `around`.
 std::int64_t NearestTurn(std::int64_t column, std::int64_t around, const GridAxis& columns) {
@@ -159,11 +159,11 @@ GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes) {
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {
   // Samples with weight 0 may lie outside the window.
   const std::int64_t dx = cell.x > 0 ? 1 : 0, dy = cell.y > 0 ? 1 : 0;
-  const double height = Between(Between(SampleAt(heights, window, cell.column, cell.row),
-                                        SampleAt(heights, window, cell.column + dx, cell.row), cell.x),
-                                Between(SampleAt(heights, window, cell.column, cell.row + dy),
-                                        SampleAt(heights, window, cell.column + dx, cell.row + dy), cell.x),
-                                cell.y);
+  const double height = Lerp(Lerp(SampleAt(heights, window, cell.column, cell.row),
+                                  SampleAt(heights, window, cell.column + dx, cell.row), cell.x),
+                             Lerp(SampleAt(heights, window, cell.column, cell.row + dy),
+                                  SampleAt(heights, window, cell.column + dx, cell.row + dy), cell.x),
+                             cell.y);
   if (!std::isnan(height)) return height;
   double sum = 0, weights = 0;
   const auto add = [&](std::int64_t x, std::int64_t y, double weight) {

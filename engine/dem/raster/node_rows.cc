@@ -263,8 +263,8 @@ void RoundHeights(std::span<const double> heights, std::span<const double> added
   (heights.data(), added.empty() ? nullptr : added.data(), heights.size(), rounded.data());
 }
 
-bool PlacesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights, Position limit,
-              std::span<double> x, std::span<double> y) {
+bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
+                       Position limit, std::span<double> x, std::span<double> y) {
   if (axes.columns.wraps()) {
     std::ranges::fill(x, kUnknown);
     std::ranges::fill(y, kUnknown);

@@ -53,8 +53,8 @@ bool HasVoids(std::span<const float> heights);
 // The places of nodes in samples, index plus weight on each axis, in the cells of GridAxes::CellAt. NaN where the
 // height is NaN, and where a place is not between 0 and `limit`. Returns false if CellAt must be asked for some of
 // them: near the ends of an axis, and if columns wrap. Precondition: all spans have one entry per node.
-bool PlacesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights, Position limit,
-              std::span<double> x, std::span<double> y);
+bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
+                       Position limit, std::span<double> x, std::span<double> y);
 
 // The outermost coordinates of positions that are known; infinite, with `least` above `most`, if there is none.
 struct PositionHull {

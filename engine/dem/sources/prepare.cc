@@ -203,7 +203,7 @@ class Preparer {
 
 std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
                            const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews) {
-  const std::filesystem::path whole = WholePath(path);
+  const std::filesystem::path whole = AbsolutePath(path);
   ByteWriter writer;
   writer.PutBytes(whole.string());
   for (const double value : extra_nodata) writer.Put(value);

@@ -75,13 +75,13 @@ CacheFolder::Use::Use(std::shared_ptr<CacheFolder> folder, const std::string& fi
 CacheFolder::Use::~Use() {
   const std::lock_guard lock(folder_->mutex_);
   folder_->in_use_.erase(folder_->in_use_.find(name_));
-  folder_->troubles_.erase(this);
+  folder_->problems_.erase(this);
 }
 
 void CacheFolder::Use::Fail(const std::string& reason) const {
   const std::lock_guard lock(folder_->mutex_);
-  const bool is_first = folder_->troubles_.empty();
-  folder_->troubles_[this] = reason;
+  const bool is_first = folder_->problems_.empty();
+  folder_->problems_[this] = reason;
   if (is_first) {
     spdlog::warn("cache_dir {}: {}: {}; averages of such sources are kept in memory as far as they fit", folder_->path_,
                  name_, reason);
@@ -90,14 +90,14 @@ void CacheFolder::Use::Fail(const std::string& reason) const {
 
 void CacheFolder::Use::Succeed() const {
   const std::lock_guard lock(folder_->mutex_);
-  if (folder_->troubles_.erase(this) > 0 && folder_->troubles_.empty()) {
+  if (folder_->problems_.erase(this) > 0 && folder_->problems_.empty()) {
     spdlog::info("cache_dir {}: all sources are kept there again", folder_->path_);
   }
 }
 
-std::string CacheFolder::trouble() const {
+std::string CacheFolder::problem() const {
   const std::lock_guard lock(mutex_);
-  return troubles_.empty() ? std::string() : troubles_.begin()->second;
+  return problems_.empty() ? std::string() : problems_.begin()->second;
 }
 
 bool CacheFolder::IsInUse(const std::string& name) const { return in_use_.contains(FinishedName(name)); }

@@ -62,7 +62,7 @@ class CacheFolder {
   void Trim();
 
   // The reason why a file in use is not stored, without its path. Empty: all are stored.
-  std::string trouble() const;
+  std::string problem() const;
 
  private:
   struct File {
@@ -79,7 +79,7 @@ class CacheFolder {
   const std::uint64_t max_bytes_;
   mutable std::mutex mutex_;
   std::multiset<std::string> in_use_;           // names; guarded by mutex_, as are these
-  std::map<const Use*, std::string> troubles_;  // reasons
+  std::map<const Use*, std::string> problems_;  // reasons
   std::uint64_t bytes_ = 0, since_scan_ = 0;    // known size of all files; bytes reserved since the last scan
   std::optional<std::chrono::steady_clock::time_point> scanned_at_;
   std::multimap<std::int64_t, File> oldest_first_;  // files that were not in use at the last scan, by modification time

@@ -38,9 +38,9 @@ std::vector<dem::DemFile> FilesOf(const config::DatasetConfig& dataset) {
   return files;
 }
 
-Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds,
-                                    const dem::FileContentOptions& content) {
-  tiler::WaterRules water;
+Result<tiler::WaterOptions> OpenWater(const config::WaterConfig& wanted, const dem::GeoBounds& bounds,
+                                      const dem::FileContentOptions& content) {
+  tiler::WaterOptions water;
   water.sea_level_m = wanted.sea_level;
   if (wanted.mask.empty()) return water;
   auto mask = dem::WaterRaster::Open(wanted.mask, bounds, content);
@@ -54,9 +54,9 @@ Result<tiler::WaterRules> OpenWater(const config::WaterConfig& wanted, const dem
   return water;
 }
 
-Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds,
-                                        const dem::FileContentOptions& content) {
-  tiler::ImageryRules imagery;
+Result<tiler::ImageryOptions> OpenImagery(const config::ImageryConfig& wanted, const dem::GeoBounds& bounds,
+                                          const dem::FileContentOptions& content) {
+  tiler::ImageryOptions imagery;
   if (wanted.image.empty()) return imagery;
   auto image = dem::Imagery::Open(wanted.image, bounds, content);
   if (!image) return MakeError(image.error().code, "imagery {}", image.error().message);
@@ -72,11 +72,11 @@ Result<tiler::ImageryRules> OpenImagery(const config::ImageryConfig& wanted, con
 // contents, wherever they lie.
 std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
                            const std::string& version, std::uint64_t heights) {
-  const tiler::WaterRules& water = dataset.water;
-  const tiler::ImageryRules& imagery = dataset.imagery;
+  const tiler::WaterOptions& water = dataset.water;
+  const tiler::ImageryOptions& imagery = dataset.imagery;
   const std::string text = fmt::format(
       "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(), heights,
-      dataset.error_fraction, static_cast<int>(dataset.rules.criterion), dataset.rules.compact,
+      dataset.error_fraction, static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
       static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
       water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
       dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, static_cast<int>(imagery.texture),
@@ -116,7 +116,7 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   dataset.name = wanted.name;
   dataset.attribution = wanted.attribution;
   dataset.error_fraction = wanted.error_fraction;
-  dataset.rules = {wanted.criterion, wanted.compact};
+  dataset.mesh_options = {wanted.criterion, wanted.compact};
   dataset.glb.compression = wanted.glb_compression;
   dataset.glb.draco = {wanted.draco_speed, wanted.draco_normal_bits};
   dataset.glb.generator = "terrace " + version;

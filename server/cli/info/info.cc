@@ -190,7 +190,7 @@ int Info(const InfoArguments& arguments) {
   if (!wrong.empty()) return kExitUsage;
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
   const dem::RasterCache cache = OpenCache(config);
-  std::string trouble;
+  std::string problem;
   nlohmann::json all = nlohmann::json::array();
   for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
     const std::string name = NameOf(sources);
@@ -205,7 +205,7 @@ int Info(const InfoArguments& arguments) {
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);
       continue;
     }
-    if (cache.folder && trouble.empty()) trouble = cache.folder->trouble();
+    if (cache.folder && problem.empty()) problem = cache.folder->problem();
     const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
     const dem::DemInfo& info = source->info();
     const bool is_one = info.sources.size() == 1;
@@ -225,9 +225,9 @@ int Info(const InfoArguments& arguments) {
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
   }
-  if (!trouble.empty()) {
+  if (!problem.empty()) {
     std::fprintf(stderr, "terrace: cache_dir %s: %s; what is learnt anew is not kept there\n",
-                 cache.folder->path().c_str(), trouble.c_str());
+                 cache.folder->path().c_str(), problem.c_str());
   }
   if (cache.folder) cache.folder->Trim();
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));

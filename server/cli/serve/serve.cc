@@ -303,7 +303,7 @@ int Serve(const ServeArguments& arguments) {
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
-  ShutdownWatchdog stop_limit;  // first, because it limits how long the others take to end
+  ShutdownWatchdog watchdog;  // first, because it limits how long the others take to end
   Result<server::DiskCache> disk;
   if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
   if (!disk) return Fail(disk.error());
@@ -315,7 +315,7 @@ int Serve(const ServeArguments& arguments) {
       std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
   const auto refinements = options.refinements;
   const dem::RasterCache cache = OpenCache(config);
-  options.cache_trouble = [folder = cache.folder] { return folder ? folder->trouble() : std::string(); };
+  options.cache_problem = [folder = cache.folder] { return folder ? folder->problem() : std::string(); };
   std::unique_ptr<server::Reloader> reloader;  // once there are datasets to watch
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
   options.on_signal[SIGHUP] = [&reloader] {
@@ -323,8 +323,8 @@ int Serve(const ServeArguments& arguments) {
     reloader->Reload();
   };
   std::stop_source stop_opening;
-  options.on_stop = [&stop_limit, &stop_opening, limit = config.drain_timeout + kStopTime] {
-    stop_limit.Begin(limit);
+  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_timeout + kStopTime] {
+    watchdog.Begin(limit);
     stop_opening.request_stop();
     NotifyStopping();
   };
@@ -384,7 +384,7 @@ int Serve(const ServeArguments& arguments) {
     server->ReopenAccessLog();
     NotifyReady(served_text());
   };
-  hooks.tell = [&](const std::map<std::string, std::string>& troubles) { server->SetTroubles(troubles); };
+  hooks.tell = [&](const std::map<std::string, std::string>& problems) { server->SetProblems(problems); };
   reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
   if (const Result<void> served = server->Replace(catalog_of(datasets), config); !served) {
     return Fail(served.error());

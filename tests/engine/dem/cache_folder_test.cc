@@ -127,7 +127,7 @@ TEST(CacheFolder, KeepsItsBoundAndDropsWhatWasNotUsedForLongest) {
   EXPECT_FALSE(fs::exists(files[2])) << "the oldest goes first";
   EXPECT_FALSE(fs::exists(files[0]));
   for (const int kept : {1, 3, 4}) EXPECT_TRUE(fs::exists(files[static_cast<std::size_t>(kept)])) << kept;
-  EXPECT_EQ(cache.folder->trouble(), "");
+  EXPECT_EQ(cache.folder->problem(), "");
 }
 
 TEST(CacheFolder, LeavesAloneWhatItDidNotWrite) {
@@ -182,12 +182,12 @@ TEST(CacheFolder, FilesInUseStayAndWhatFindsNoRoomIsKeptInMemory) {
     ASSERT_NE(other->memory_averages(), nullptr);
     EXPECT_EQ(other->memory_averages()->least_factor(), 4);
     EXPECT_EQ(cache.memory->left(), budget - other->memory_averages()->bytes());
-    EXPECT_NE(cache.folder->trouble().find("cache_dir_bytes"), std::string::npos) << cache.folder->trouble();
+    EXPECT_NE(cache.folder->problem().find("cache_dir_bytes"), std::string::npos) << cache.folder->problem();
     ExpectAveragesOf(first, *used);
     ExpectAveragesOf(second, *other);
     EXPECT_LE(BytesIn(folder), bound);
   }
-  EXPECT_EQ(cache.folder->trouble(), "") << "nobody lacks anything any more";
+  EXPECT_EQ(cache.folder->problem(), "") << "nobody lacks anything any more";
   EXPECT_EQ(cache.memory->left(), budget);
   EXPECT_NE(OpenIn(second, cache)->averages(), nullptr) << "the first one goes";
   EXPECT_LE(BytesIn(folder), bound);
@@ -234,14 +234,14 @@ TEST(CacheFolder, AFileInItsPlaceIsToldOnceAndAveragesAreInMemory) {
   const LogText log;
   const auto first = OpenIn(a, cache), second = OpenIn(b, cache);
   EXPECT_EQ(log.LinesWith("cache_dir"), 1) << log.text();
-  EXPECT_EQ(cache.folder->trouble(), "cannot be written: Not a directory");
+  EXPECT_EQ(cache.folder->problem(), "cannot be written: Not a directory");
   ASSERT_TRUE(first->memory_averages() != nullptr && second->memory_averages() != nullptr);
   ExpectAveragesOf(a, *first);
   ExpectAveragesOf(b, *second);
   fs::remove(dir.File("file"));
   const auto again = OpenIn(a, cache);
   EXPECT_NE(again->averages(), nullptr);
-  EXPECT_NE(cache.folder->trouble(), "") << "the other two go without";
+  EXPECT_NE(cache.folder->problem(), "") << "the other two go without";
 }
 
 // Root may write everywhere, so the test changes the user of all threads of the process to nobody.
@@ -275,9 +275,9 @@ TEST(CacheFolder, AFolderThatMayNotBeWrittenToIsReadAllTheSame) {
   std::optional<AsNobody> nobody(std::in_place);
   const RasterCache cache{std::make_shared<CacheFolder>(folder), std::make_shared<AveragesBudget>()};
   EXPECT_TRUE(OpenIn(known, cache)->preparation().from_cache);
-  EXPECT_EQ(cache.folder->trouble(), "");
+  EXPECT_EQ(cache.folder->problem(), "");
   const auto source = OpenIn(other, cache);
-  EXPECT_EQ(cache.folder->trouble(), "cannot be written: Permission denied");
+  EXPECT_EQ(cache.folder->problem(), "cannot be written: Permission denied");
   EXPECT_NE(source->memory_averages(), nullptr);
   nobody.reset();
   fs::permissions(folder, fs::perms::owner_all);
@@ -292,7 +292,7 @@ void ExpectFullDiskCostsNoAverage(const std::string& path, const std::string& fo
     ::setrlimit(RLIMIT_FSIZE, &limit);
     const RasterCache cache{std::make_shared<CacheFolder>(folder), std::make_shared<AveragesBudget>()};
     const auto source = OpenIn(path, cache);
-    EXPECT_EQ(cache.folder->trouble(), "cannot be written: File too large");
+    EXPECT_EQ(cache.folder->problem(), "cannot be written: File too large");
     EXPECT_NE(source->memory_averages(), nullptr);
     ExpectAveragesOf(path, *source);
     ::_exit(testing::Test::HasFailure() ? 1 : 0);
@@ -337,14 +337,14 @@ TEST(CacheFolder, WhatVanishesIsReadFromTheSourceUntilItIsOpenedAnew) {
   const LogText log;
   ExpectAveragesOf(path, *source);
   EXPECT_TRUE(source->has_lost_cache());
-  EXPECT_NE(cache.folder->trouble(), "");
+  EXPECT_NE(cache.folder->problem(), "");
   auto anew = OpenIn(path, cache);
   source.reset();
   EXPECT_EQ(log.LinesWith("cache_dir"), 1) << log.text();
   ASSERT_NE(anew->memory_averages(), nullptr);
   ExpectAveragesOf(path, *anew);
   EXPECT_FALSE(anew->has_lost_cache());
-  EXPECT_EQ(cache.folder->trouble(), "cannot be written: Not a directory");
+  EXPECT_EQ(cache.folder->problem(), "cannot be written: Not a directory");
 }
 
 TEST(CacheFolder, FilesThatDoNotFitAreMadeAnewAndSaidOnce) {

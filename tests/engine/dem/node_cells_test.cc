@@ -219,7 +219,7 @@ TEST(NodeRows, PlacesAreThoseOfCells) {
       std::vector<double> x(columns), y(columns);
       for (std::size_t j = 0; j < positions.rows(); ++j) {
         const auto of_row = std::span(heights).subspan(j * columns, columns);
-        const bool are_all_known = PlacesOf(positions.Row(j), axes, of_row, limit, x, y);
+        const bool are_all_known = GridCoordinatesOf(positions.Row(j), axes, of_row, limit, x, y);
         bool is_one_left = false;
         for (std::size_t i = 0; i < columns; ++i) {
           ASSERT_EQ(std::isnan(x[i]), std::isnan(y[i]));

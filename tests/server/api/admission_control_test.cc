@@ -10,7 +10,8 @@
 namespace terrace::server {
 namespace {
 
-AdmissionControl GateWith(const std::vector<config::TokenConfig>& tokens, const std::vector<std::string>& open = {}) {
+AdmissionControl AdmissionControlWith(const std::vector<config::TokenConfig>& tokens,
+                                      const std::vector<std::string>& open = {}) {
   AdmissionOptions options;
   options.access = *AccessPolicy::Make(tokens, open);
   return AdmissionControl(std::move(options));
@@ -49,7 +50,7 @@ config::TokenConfig TokenOf(const std::string& name, const std::string& token, s
 constexpr const char* kGateToken = "0123456789abcdef";
 
 TEST(AdmissionControl, TakesTheTokenOutOfTheTarget) {
-  const AdmissionControl admission_control = GateWith({});
+  const AdmissionControl admission_control = AdmissionControlWith({});
   const struct {
     const char *sent, *kept, *token;
   } cases[] = {
@@ -77,7 +78,7 @@ TEST(AdmissionControl, TakesTheTokenOutOfTheTarget) {
 }
 
 TEST(AdmissionControl, KeepsRepliesPrivateWhereASecretMayBe) {
-  const AdmissionControl admission_control = GateWith({});
+  const AdmissionControl admission_control = AdmissionControlWith({});
   for (const char* target : {"/a?token=s", "/a?%74oken=s", "/a?Token=s", "/a;token=s", "/a?v=1;token=s"}) {
     EXPECT_TRUE(Visit(admission_control, target).request.is_private) << target;
   }
@@ -88,7 +89,7 @@ TEST(AdmissionControl, KeepsRepliesPrivateWhereASecretMayBe) {
 }
 
 TEST(AdmissionControl, ForgetsTheRequestBefore) {
-  const AdmissionControl admission_control = GateWith({TokenOf("team", kGateToken, {})});
+  const AdmissionControl admission_control = AdmissionControlWith({TokenOf("team", kGateToken, {})});
   Visit visit(admission_control, "/maui/layer.json?token=" + std::string(kGateToken));
   EXPECT_EQ(visit.context.grant->name, "team");
   EXPECT_TRUE(visit.context.token_in_query);
@@ -104,7 +105,7 @@ TEST(AdmissionControl, ForgetsTheRequestBefore) {
 }
 
 TEST(AdmissionControl, RefusesByWhatTheRowShows) {
-  const AdmissionControl admission_control = GateWith({TokenOf("one", kGateToken, {"maui"})}, {"open"});
+  const AdmissionControl admission_control = AdmissionControlWith({TokenOf("one", kGateToken, {"maui"})}, {"open"});
   const auto refused = [&](const std::string& target, RequestFields fields = {}) {
     const auto refusal = admission_control.Refuse(Visit(admission_control, target, std::move(fields)).context);
     return refusal ? refusal->status : 0;
@@ -121,7 +122,7 @@ TEST(AdmissionControl, RefusesByWhatTheRowShows) {
 }
 
 TEST(AdmissionControl, KnowsWhichRepliesDependOnTheGrant) {
-  const AdmissionControl admission_control = GateWith({TokenOf("one", kGateToken, {})}, {"open"});
+  const AdmissionControl admission_control = AdmissionControlWith({TokenOf("one", kGateToken, {})}, {"open"});
   const std::string token = std::string("?token=") + kGateToken;
   EXPECT_TRUE(admission_control.DependsOnToken(Visit(admission_control, "/datasets").context));
   EXPECT_TRUE(admission_control.DependsOnToken(Visit(admission_control, "/maui/0/0/0.terrain" + token).context));
@@ -131,7 +132,7 @@ TEST(AdmissionControl, KnowsWhichRepliesDependOnTheGrant) {
   EXPECT_FALSE(
       admission_control.DependsOnToken(Visit(admission_control, "/open/layer.json", Bearing(kGateToken)).context));
   EXPECT_FALSE(admission_control.DependsOnToken(Visit(admission_control, "/livez").context));
-  EXPECT_FALSE(GateWith({}).DependsOnToken(Visit(admission_control, "/datasets").context))
+  EXPECT_FALSE(AdmissionControlWith({}).DependsOnToken(Visit(admission_control, "/datasets").context))
       << "everybody sees everything";
 }
 

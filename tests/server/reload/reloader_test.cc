@@ -96,9 +96,9 @@ class ReloaderTest : public testing::Test {
       served_.clear();
       for (const tiler::Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
     };
-    hooks.tell = [this](const std::map<std::string, std::string>& troubles) {
+    hooks.tell = [this](const std::map<std::string, std::string>& problems) {
       const std::lock_guard lock(mutex_);
-      troubles_ = troubles;
+      problems_ = problems;
     };
     for (const tiler::Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
     next_ = config_;
@@ -117,9 +117,9 @@ class ReloaderTest : public testing::Test {
     const std::lock_guard lock(mutex_);
     return served_;
   }
-  std::map<std::string, std::string> Troubles() {
+  std::map<std::string, std::string> Problems() {
     const std::lock_guard lock(mutex_);
-    return troubles_;
+    return problems_;
   }
 
   fs::path folder_;
@@ -130,7 +130,7 @@ class ReloaderTest : public testing::Test {
   std::mutex mutex_;
   config::ConfigResult next_;                                  // mutex_ guards this and the following
   std::vector<std::pair<std::string, std::uint64_t>> served_;  // name and generation
-  std::map<std::string, std::string> troubles_;
+  std::map<std::string, std::string> problems_;
   std::unique_ptr<Reloader> reloader_;
 };
 
@@ -149,10 +149,10 @@ TEST_F(ReloaderTest, OpensWhatChangedAndNothingElse) {
 TEST_F(ReloaderTest, SurvivesAnExceptionOfLoading) {
   Start();
   throws_ = true;
-  ASSERT_TRUE(Eventually([&] { return Troubles()[""] == "no memory"; }));
+  ASSERT_TRUE(Eventually([&] { return Problems()[""] == "no memory"; }));
   reloader_->Reload();
   throws_ = false;
-  ASSERT_TRUE(Eventually([&] { return Troubles().empty(); }));
+  ASSERT_TRUE(Eventually([&] { return Problems().empty(); }));
   EXPECT_EQ(Served().size(), 1u);
   EXPECT_EQ(openings_, 0);
 }
@@ -176,11 +176,11 @@ TEST_F(ReloaderTest, TellsTroublesAndMendsThem) {
   fails_ = true;
   Put("a");
   reloader_->Look();
-  ASSERT_TRUE(Eventually([&] { return Troubles().contains("a"); }));
+  ASSERT_TRUE(Eventually([&] { return Problems().contains("a"); }));
   EXPECT_EQ(Served(), before) << "what there is stays";
   fails_ = false;
   Put("a");
-  ASSERT_TRUE(Eventually([&] { return Troubles().empty(); }));
+  ASSERT_TRUE(Eventually([&] { return Problems().empty(); }));
   EXPECT_NE(Served(), before);
 }
 
@@ -188,11 +188,11 @@ TEST_F(ReloaderTest, AWrongConfigurationIsATroubleAndNothingElse) {
   Start();
   const auto before = Served();
   Load(tl::unexpected(std::vector<config::ConfigError>{{"/listen", "is wrong"}, {"/viewer", "too"}}));
-  ASSERT_TRUE(Eventually([&] { return Troubles().contains(""); }));
-  EXPECT_EQ(Troubles()[""], "/listen: is wrong; /viewer: too");
+  ASSERT_TRUE(Eventually([&] { return Problems().contains(""); }));
+  EXPECT_EQ(Problems()[""], "/listen: is wrong; /viewer: too");
   EXPECT_EQ(Served(), before);
   Load(config_);
-  EXPECT_TRUE(Eventually([&] { return Troubles().empty(); }));
+  EXPECT_TRUE(Eventually([&] { return Problems().empty(); }));
 }
 
 TEST_F(ReloaderTest, WatchesTheConfigurationWithoutBeingAsked) {
