@@ -86,7 +86,7 @@ def start_terrace(binary, data, folder):
     srtm = sorted(str(data / f"srtm1_{tile}_{name}.tif") for tile, name in TILES.items())
     config = {"listen": "127.0.0.1:0", "worker_threads": 1, "io_threads": 1, "max_locations": 200_000, "cache_dir": str(folder / "cache"), "datasets": [
         {"name": "single", "sources": [str(data / "srtm1_N20W157_maui_se_haleakala.tif")]},
-        {"name": "mosaic", "sources": [srtm, str(data / "etopo5_global_10min.tif")]},
+        {"name": "mosaic", "sources": [*srtm, str(data / "etopo5_global_10min.tif")]},
         {"name": "geoid", "sources": [str(data / "srtm1_N20W157_maui_se_haleakala.tif")], "vertical": "egm96"}]}
     (folder / "terrace.json").write_text(json.dumps(config))
     log = open(folder / "terrace.log", "w")

@@ -92,7 +92,7 @@ std::uint64_t RasterGrid::NextId() {
 }
 
 Result<PointBlock> RasterGrid::ReadPointBlock(const GridWindow& window, const std::stop_token& stop) const {
-  PointBlock block{window, {}, {}, {}};
+  PointBlock block{window, {}, {}, {}, {}, {}};
   auto bridged = ReadBridged(1, window, stop, &block.measured);
   if (!bridged) return tl::unexpected(bridged.error());
   auto smoothed = FillHoles(1, window, *bridged, stop);
@@ -119,6 +119,7 @@ Result<PointBlockPtr> RasterGrid::FindPointBlock(std::int64_t block_column, std:
   if (PointBlockPtr known = cache.Find(key)) return known;
   auto read = ReadPointBlock(WindowOfPointBlock(block_column, block_row), stop);
   if (!read) return tl::unexpected(read.error());
+  read->Compact();
   auto block = std::make_shared<const PointBlock>(*std::move(read));
   cache.Insert(key, block);
   return PointBlockPtr(block);
@@ -173,10 +174,9 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
     const auto read = BlockOfCells(cells, stop);
     if (!read) return tl::unexpected(read.error());
     const PointBlock& block = **read;
-    const std::vector<float>& samples = block.samples();
     for (const GridCell& cell : cells) {
       const std::size_t point = (first++)->point;
-      const auto height = Interpolate(samples, block.window, cell);
+      const auto height = block.HeightAt(cell);
       if (!height) continue;
       const float rounded = RoundHeight(converted->Of(*height, points[point]));
       const bool is_in_hole = block.has_voids() && !HasSample(block.bridged, block.window, cell);

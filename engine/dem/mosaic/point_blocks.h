@@ -9,10 +9,11 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
-#include "engine/dem/raster/sample_grid.h"
+#include "engine/dem/raster/grid_cells.h"
 
 namespace terrace::dem {
 
@@ -23,10 +24,21 @@ struct PointBlock {
   std::vector<float> bridged;   // metres in the source's datum; narrow voids are filled, NaN for the others
   std::vector<float> measured;  // before narrow voids were filled; empty: there are no voids
   std::vector<float> smooth;    // holes are filled as well; empty: there are no holes
+  // Instead of `bridged`, where there are no voids: whole metres, or one height that all samples have, as on the sea.
+  std::vector<std::int16_t> whole;
+  std::optional<float> level;
 
   bool has_voids() const { return !measured.empty(); }
-  const std::vector<float>& samples() const { return smooth.empty() ? bridged : smooth; }
-  std::size_t bytes() const { return (bridged.size() + measured.size() + smooth.size()) * sizeof(float); }
+  // Moves samples into `whole` or `level`, if that is possible.
+  void Compact();
+  // Interpolate (raster/grid_cells.h) with narrow voids and holes filled.
+  std::optional<double> HeightAt(const GridCell& cell) const;
+  // All samples, with narrow voids and holes filled; with narrow voids alone filled.
+  std::vector<float> Samples() const;
+  std::vector<float> Bridged() const;
+  std::size_t bytes() const {
+    return (bridged.size() + measured.size() + smooth.size()) * sizeof(float) + whole.size() * sizeof(std::int16_t);
+  }
 };
 using PointBlockPtr = std::shared_ptr<const PointBlock>;
 
@@ -41,7 +53,8 @@ struct PointBlockKey {
 // The most recently used blocks of all raster grids of the process. Thread-safe.
 class PointBlockCache {
  public:
-  // 250 blocks without voids, or a whole raster of 4,000 x 4,000 samples.
+  // 500 blocks of whole metres or 250 of others, if they have no voids: a raster of 4,000 x 4,000 floats. Of those of one
+  // height about 60,000.
   static constexpr std::size_t kCapacityBytes = std::size_t{64} << 20;
 
   explicit PointBlockCache(std::size_t capacity_bytes = kCapacityBytes) : capacity_bytes_(capacity_bytes) {}

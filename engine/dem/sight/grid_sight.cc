@@ -121,6 +121,9 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
     const float geoid_m = grid_.vertical().geoid ? static_cast<float>(SightBlocks::kMaxUndulation) : 0;
     bound = {range.max + geoid_m, range.has_voids};
   }
+  // Beside the raster other raster grids may have heights.
+  bound.has_voids |= (!grid_.wraps() && (x.min < -0.5 || x.max > grid_.columns() - 0.5)) || y.min < -0.5 ||
+                     y.max > grid_.rows() - 0.5;
   if (!bound.has_voids && scan.search.IsSettled(height_m - bound.max - slack_m, scan.ShareOf(first))) return {};
   if (is_in_block && bound.max == -std::numeric_limits<float>::infinity()) {
     scan.Open(first, last);
@@ -181,7 +184,7 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const std::size_t south = window.rows > 1 ? static_cast<std::size_t>(window.columns) : 0;
   const float* const heights = block.heights().data() + at;
   const double nw = heights[0], ne = heights[east], sw = heights[south], se = heights[south + east];
-  const float* const owned = block.source().bridged.data() + at;
+  const float* const owned = block.owned().data() + at;
   const double all = nw + ne + sw + se +
                      (scan.surface == SightSurface::kNotHoles ? 0.0 * (owned[0] + owned[east] + owned[south] + owned[south + east]) : 0.0);
   const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
@@ -229,25 +232,44 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
   const double x = scan.on_grid.x.At((first + last) / 2);
   const double turn = std::floor(x) - static_cast<double>(column);  // whole turns, where columns wrap
   const double shift = grid_.wraps() ? turn : 0;
-  for (int i = 0; i <= kRimParts; ++i) {
-    const double s = Lerp(first, last, static_cast<double>(i) / kRimParts);
+  const auto clearance = [&](double s) -> std::optional<double> {
     const GridCell cell{column, row, std::clamp(scan.on_grid.x.At(s) - shift - static_cast<double>(column), 0.0, 1.0),
                         std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0)};
-    const bool is_owned =
-        IsInside(scan, s) &&
-        (scan.surface == SightSurface::kAll || HasSample(block.source().bridged, block.window(), cell));
+    const bool is_owned = IsInside(scan, s) && (scan.surface == SightSurface::kAll ||
+                                                HasSample(block.owned(), block.window(), cell));
     const auto height = is_owned ? Interpolate(block.heights(), block.window(), cell) : std::nullopt;
-    if (!height) {
-      if (i < kRimParts) scan.Open(s, Lerp(first, last, static_cast<double>(i + 1) / kRimParts));
-      continue;
-    }
-    double ground = *height;
-    if (!blocks_.includes_undulations()) {
-      ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
-    }
-    const double clearance_m = scan.piece.height_m.At(s) - ground;
+    if (!height) return std::nullopt;
+    const double undulation_m =
+        blocks_.includes_undulations()
+            ? 0
+            : blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    return scan.piece.height_m.At(s) - *height - undulation_m;
+  };
+  const auto add = [&](double s, double clearance_m) {
     scan.search.Add(clearance_m, scan.ShareOf(s));
     if (clearance_m < -kSightTolerance) scan.search.AddBlocked(scan.ShareOf(s));
+  };
+  double before = first;
+  std::optional<double> known = clearance(first);
+  if (known) add(first, *known);
+  for (int i = 1; i <= kRimParts; ++i) {
+    const double s = Lerp(first, last, static_cast<double>(i) / kRimParts);
+    const std::optional<double> next = clearance(s);
+    double edge = known ? s : before;  // where the heights end or begin
+    if (known.has_value() != next.has_value()) {
+      double with = known ? before : s, without = known ? s : before;
+      for (int step = 0; step < 30; ++step) {
+        edge = (with + without) / 2;
+        const std::optional<double> there = clearance(edge);
+        if (there) add(edge, *there);
+        (there ? with : without) = edge;
+      }
+    }
+    if (!known) scan.Open(before, next ? edge : s);
+    if (known && !next) scan.Open(edge, s);
+    if (next) add(s, *next);
+    known = next;
+    before = s;
   }
 }
 

@@ -12,12 +12,11 @@ constexpr double kUndulationStep = 240;
 
 }  // namespace
 
-SightBlock::SightBlock(PointBlockPtr source, const std::vector<float>& undulations)
-    : source_(std::move(source)), heights_(source_->samples()) {
+SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
+    : window_(source.window), heights_(source.Samples()), owned_(source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
-  const std::vector<float>& owned = source_->bridged;
   Level level{(width + 1) / 2, (height + 1) / 2, {}};
   level.cells.resize(static_cast<std::size_t>(level.columns * level.rows));
   for (std::int64_t row = 0; row < level.rows; ++row) {
@@ -26,7 +25,7 @@ SightBlock::SightBlock(PointBlockPtr source, const std::vector<float>& undulatio
       for (std::int64_t y = 2 * row; y <= std::min(2 * row + 2, height - 1); ++y) {
         for (std::int64_t x = 2 * column; x <= std::min(2 * column + 2, width - 1); ++x) {
           const auto at = static_cast<std::size_t>(y * width + x);
-          bound.has_voids |= std::isnan(owned[at]) || std::isnan(heights_[at]);
+          bound.has_voids |= std::isnan(owned_[at]) || std::isnan(heights_[at]);
           if (heights_[at] > bound.max) bound.max = heights_[at];
         }
       }
@@ -126,7 +125,7 @@ Result<const SightBlock*> SightBlocks::At(std::int64_t column, std::int64_t row,
     if (!read) return tl::unexpected(std::move(read).error());
     const Result<std::vector<float>> undulations = UndulationsOf((*read)->window);
     if (!undulations) return tl::unexpected(undulations.error());
-    block = std::make_unique<const SightBlock>(*std::move(read), *undulations);
+    block = std::make_unique<const SightBlock>(**read, *undulations);
   }
   last_ = number;
   return last_block_ = block.get();

@@ -27,11 +27,11 @@ struct CellsBound {
 class SightBlock {
  public:
   // `undulations`: metres to add to the samples, one for each sample, NaN where not known; empty: none.
-  SightBlock(PointBlockPtr source, const std::vector<float>& undulations);
+  SightBlock(const PointBlock& source, const std::vector<float>& undulations);
 
-  const GridWindow& window() const { return source_->window; }
+  const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  const PointBlock& source() const { return *source_; }
+  const std::vector<float>& owned() const { return owned_; }      // NaN: a void that is not narrow, also in holes
 
   // Of the cells between two of the block, inclusive; possibly of more.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
@@ -42,8 +42,8 @@ class SightBlock {
     std::vector<CellsBound> cells;
   };
 
-  PointBlockPtr source_;
-  std::vector<float> heights_;
+  GridWindow window_;
+  std::vector<float> heights_, owned_;
   std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
 };
 

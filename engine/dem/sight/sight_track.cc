@@ -1,6 +1,7 @@
 #include "engine/dem/sight/sight_track.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "engine/geo/ellipsoid.h"
@@ -128,7 +129,11 @@ std::vector<PieceOnGrid> OnGrid(std::span<const TrackPiece> pieces, const Georef
   }
   std::vector<PieceOnGrid> on_grid(pieces.size());
   for (std::size_t i = 0; i < pieces.size(); ++i) {
-    const Position* const p = positions.data() + 2 * i;
+    std::array<Position, 3> p{positions[2 * i], positions[2 * i + 1], positions[2 * i + 2]};
+    if (georeference.period() > 0 && georeference.wrap_columns() == 0) {
+      const double moved = Near(p[1].x, georeference.width() / 2.0, georeference.period()) - p[1].x;
+      for (Position& position : p) position.x += moved;
+    }
     on_grid[i] = {{p[0].x - 0.5, p[1].x - 0.5, p[2].x - 0.5}, {p[0].y - 0.5, p[1].y - 0.5, p[2].y - 0.5}};
   }
   return on_grid;

@@ -48,7 +48,7 @@ std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& option
 struct PieceOnGrid {
   Quadratic x, y;
 };
-// `period`: columns in 360 degrees, or 0.
+// Columns of a grid that does not span 360 degrees are those of the turn around the Earth that is nearest to the grid.
 std::vector<PieceOnGrid> OnGrid(std::span<const TrackPiece> pieces, const Georeference& georeference);
 
 }  // namespace terrace::dem

@@ -13,6 +13,7 @@ namespace {
 struct Marched {
   bool is_blocked = false;
   double clearance_m = std::numeric_limits<double>::infinity();
+  double lowest_at = 0;
   double blocked_at = 2;  // share of the first step below the ground
 };
 
@@ -36,6 +37,7 @@ std::vector<Marched> March(const DemSource& source, const std::vector<SightRay>&
       const auto k = static_cast<std::size_t>(i);
       const double clearance_m = heights_m[k] - (*ground)[k];
       if (std::isnan(clearance_m)) continue;
+      if (clearance_m < one.clearance_m) one.lowest_at = static_cast<double>(i) / steps;
       one.clearance_m = std::min(one.clearance_m, clearance_m);
       if (clearance_m < -kSightTolerance) one.blocked_at = std::min(one.blocked_at, static_cast<double>(i) / steps);
     }
@@ -44,14 +46,14 @@ std::vector<Marched> March(const DemSource& source, const std::vector<SightRay>&
   return marched;
 }
 
-struct Area {
+struct Region {
   double west, south, east, north;
   double reach_degrees;  // of rays
   double step_m;         // a tenth of a pixel
 };
 
 // Rays that begin and end some metres above the ground, some of them below it.
-std::vector<SightRay> RaysIn(const DemSource& source, const Area& area, std::size_t count, unsigned seed) {
+std::vector<SightRay> RaysIn(const DemSource& source, const Region& area, std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   const auto between = [&](double low, double high) {
     return low + (high - low) * std::uniform_real_distribution<double>()(random);
@@ -75,7 +77,7 @@ std::vector<SightRay> RaysIn(const DemSource& source, const Area& area, std::siz
   return rays;
 }
 
-void ExpectAsMarched(const DemSource& source, const Area& area, std::size_t count, const SightOptions& options = {}) {
+void ExpectAsMarched(const DemSource& source, const Region& area, std::size_t count, const SightOptions& options = {}) {
   const std::vector<SightRay> rays = RaysIn(source, area, count, 7);
   const auto answers = source.LookAlong(rays, options);
   ASSERT_TRUE(answers) << answers.error().message;
@@ -85,7 +87,8 @@ void ExpectAsMarched(const DemSource& source, const Area& area, std::size_t coun
     const SightAnswer& answer = (*answers)[i];
     const double length_m = LengthOf(rays[i]);
     blocked += answer.is_visible ? 0 : 1;
-    ASSERT_FALSE(std::isnan(answer.clearance_m)) << i;
+    EXPECT_EQ(std::isnan(answer.clearance_m), std::isinf(marched[i].clearance_m)) << i;
+    if (std::isnan(answer.clearance_m)) continue;
     // The march may miss the lowest place by half a step; the ground is at most as steep as this.
     constexpr double kSteepest = 3;
     EXPECT_LE(answer.clearance_m, marched[i].clearance_m + 2e-3) << i;
@@ -96,7 +99,9 @@ void ExpectAsMarched(const DemSource& source, const Area& area, std::size_t coun
     }
     // A ray that passes below the ground between two steps alone.
     const bool is_between = !answer.is_visible && answer.clearance_m > -kSteepest * area.step_m;
-    if (!is_between) EXPECT_EQ(answer.is_visible, !marched[i].is_blocked) << i << " by " << answer.clearance_m;
+    if (!is_between) {
+      EXPECT_EQ(answer.is_visible, !marched[i].is_blocked) << i << " by " << answer.clearance_m;
+    }
     if (answer.is_visible || !marched[i].is_blocked) continue;
     ASSERT_TRUE(answer.blocked_at);
     EXPECT_LE(*answer.blocked_at * length_m, marched[i].blocked_at * length_m + 1e-3) << i;
@@ -154,9 +159,12 @@ TEST(Sight, IsThatOfAMarchOverAMosaic) {
   std::size_t blocked = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     blocked += marched[i].is_blocked ? 1 : 0;
-    EXPECT_LE((*answers)[i].clearance_m, marched[i].clearance_m + 2e-3) << i;
-    if (marched[i].is_blocked) EXPECT_FALSE((*answers)[i].is_visible) << i;
-    if (marched[i].clearance_m > 30) EXPECT_TRUE((*answers)[i].is_visible) << i;
+    EXPECT_LE((*answers)[i].clearance_m, marched[i].clearance_m + 2e-3)
+        << i << " from " << rays[i].from.longitude << ' ' << rays[i].from.latitude << " to " << rays[i].to.longitude << ' '
+        << rays[i].to.latitude << " marched lowest at " << marched[i].lowest_at;
+    const bool is_visible = (*answers)[i].is_visible;
+    EXPECT_FALSE(marched[i].is_blocked && is_visible) << i;
+    EXPECT_FALSE(marched[i].clearance_m > 30 && !is_visible) << i;
     EXPECT_FALSE((*answers)[i].has_gaps);
   }
   EXPECT_GT(blocked, 30u);
@@ -205,7 +213,7 @@ TEST(Sight, AnswersRaysWithoutLengthBelowTheGroundAndBesideTheData) {
   EXPECT_FALSE((*answers)[1].is_visible);
   EXPECT_EQ((*answers)[2].blocked_at, 0);
   EXPECT_FALSE((*answers)[3].is_visible);
-  EXPECT_NEAR(*(*answers)[3].blocked_at, 100.0 / 110, 2e-3);
+  EXPECT_NEAR(*(*answers)[3].blocked_at, (100.0 - 1) / 110, 3e-3) << "1 m of them by the curvature";
   EXPECT_TRUE((*answers)[4].is_visible) << "on the ground";
   EXPECT_TRUE(std::isnan((*answers)[5].clearance_m));
   EXPECT_TRUE((*answers)[5].has_gaps);
