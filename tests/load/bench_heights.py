@@ -13,6 +13,7 @@ and the processor.
 import argparse
 import http.client
 import json
+import math
 import os
 import pathlib
 import random
@@ -159,7 +160,7 @@ def main():
         series.setdefault((label, server.name), []).append((count / max(used, 1 / TICKS), count / wall))
 
     def repeats(server, binary):
-        return 1 if server.name == "opentopodata" else (200 if binary else 20)
+        return 1 if server.name == "opentopodata" else (400 if binary else 40)
 
     for place, dataset, box in PLACES:
         points = points_in(box, rng)
@@ -181,6 +182,19 @@ def main():
                                 [("POST", "/geoid/heights", numbers, "application/octet-stream")] * 20)
             if round_number == 0:
                 series.clear() if place == PLACES[0][0] else [series[k].clear() for k in series if k[0].startswith(place)]
+    # Rays of 10 km between points of Maui's ground, in all directions.
+    for label, eye, datasets in (("10 km rays 2 m above ground", 2, ("single", "geoid", "mosaic")),
+                                 ("10 km rays 300 m above ground", 300, ("single",))):
+        rays = b""
+        for lat, lon in points_in((-156.42, 20.68, -156.12, 20.82), rng):
+            turn = rng.uniform(0, 2 * math.pi)
+            rays += struct.pack("<6d", lon, lat, eye, lon + 0.0961 * math.sin(turn), lat + 0.0903 * math.cos(turn), eye)
+        for dataset in datasets:
+            for round_number in range(arguments.rounds + 1):
+                if round_number == 1:
+                    series.pop((f"{label}, {dataset}", "terrace"))
+                measure(servers[0], f"{label}, {dataset}", POINTS * 5,
+                        [("POST", f"/{dataset}/sight?heights=ground", rays, "application/octet-stream")] * 5)
     latencies = {server.name: [] for server in servers}
     for i, (lat, lon) in enumerate(points_in(PLACES[1][2], rng, arguments.singles)):
         for server in servers:
@@ -196,7 +210,7 @@ def main():
     for (label, name), values in series.items():
         a_core, wall = (statistics.median(v[k] for v in values) for k in (0, 1))
         result["points_per_second"][f"{name}: {label}"] = {"a_core": a_core, "by_the_clock": wall}
-        print(f"{name:13} {label:32} {a_core:12,.0f} points/s a core, {wall:12,.0f} by the clock")
+        print(f"{name:13} {label:32} {a_core:12,.0f} a second a core, {wall:12,.0f} by the clock")
     for name, values in latencies.items():
         values.sort()
         p50, p99 = (1000 * values[int(len(values) * share)] for share in (0.5, 0.99))
