@@ -14,6 +14,10 @@ namespace {
 constexpr double kMeasured = 2;
 // Metres: with undulations that are not in the blocks, parts are at most this long.
 constexpr double kUndulationPart = 500;
+// Samples between places that are measured first.
+constexpr double kProbes = 24;
+// Metres: over the largest change of a ray's height between the ends of a part in a cell and its lowest place.
+constexpr double kSag = 1e-4;
 // Parts of a cell with voids: its heights are no polynomial.
 constexpr int kRimParts = 16;
 
@@ -57,6 +61,12 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
                                                const std::stop_token& stop) {
   const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());
   std::vector<RayPart> open;
+  // No raster grid before this one has heights, so all of its own count.
+  const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
+  for (std::size_t i = 0; i < pieces.size() && is_first; ++i) {
+    Scan scan{pieces[i], on_grid[i], surface, search, open, stop};
+    if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+  }
   auto part = parts.begin();
   for (std::size_t i = 0; i < pieces.size(); ++i) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "looking along a ray was stopped");
@@ -90,6 +100,37 @@ GridSight::CellRange GridSight::CellsOf(const Quadratic::Range& x, const Quadrat
   }
   const std::int64_t columns = grid_.columns() - 1;
   return {cell(x.min, columns), cell(y.min, rows), cell(x.max, columns), cell(y.max, rows)};
+}
+
+// Measures some places first: the lower the smallest clearance is, the more of a ray can be skipped.
+Result<void> GridSight::Probe(Scan& scan) {
+  const double samples = std::max(std::abs(scan.on_grid.x.At(1) - scan.on_grid.x.At(0)),
+                                  std::abs(scan.on_grid.y.At(1) - scan.on_grid.y.At(0)));
+  if (!(samples > kProbes) || grid_.wraps()) return {};
+  const int count = static_cast<int>(std::min(samples / kProbes, 1000.0));
+  for (int i = 0; i < count; ++i) {
+    const double s = (i + 0.5) / count, x = scan.on_grid.x.At(s), y = scan.on_grid.y.At(s);
+    const bool is_between = x >= 0 && y >= 0 && x < grid_.columns() - 1 && y < grid_.rows() - 1;
+    if (!is_between || scan.search.IsSettled(scan.piece.height_m.At(s) - grid_.heights().max - SightBlocks::kMaxUndulation, 0)) continue;
+    const auto column = static_cast<std::int64_t>(x), row = static_cast<std::int64_t>(y);
+    const Result<const SightBlock*> block = blocks_.At(column, row, scan.stop);
+    if (!block) return tl::unexpected(block.error());
+    const GridWindow& window = (*block)->window();
+    const auto at = static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
+    const auto south = static_cast<std::size_t>(window.columns);
+    const float* const heights = (*block)->heights().data() + at;
+    const float* const owned = (*block)->owned().data() + at;
+    const double east_of = x - static_cast<double>(column), south_of = y - static_cast<double>(row);
+    double ground = Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
+    if (std::isnan(ground + owned[0] + owned[1] + owned[south] + owned[south + 1])) continue;
+    if (!blocks_.includes_undulations()) {
+      ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    }
+    const double clearance_m = scan.piece.height_m.At(s) - ground;
+    scan.search.Add(clearance_m, scan.ShareOf(s));
+    if (clearance_m < -kSightTolerance) scan.search.AddBlocked(scan.ShareOf(s));
+  }
+  return {};
 }
 
 Result<void> GridSight::Halve(Scan& scan, double first, double last) {
@@ -190,6 +231,11 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
   if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
     MeasureRim(scan, block, column, row, first, last);
+    return {};
+  }
+  const double slack_m = blocks_.includes_undulations() ? kSag : SightBlocks::kMaxUndulation;
+  const double lowest_m = std::min(scan.piece.height_m.At(first), scan.piece.height_m.At(last));
+  if (scan.search.IsSettled(lowest_m - std::max(std::max(nw, ne), std::max(sw, se)) - slack_m, scan.ShareOf(first))) {
     return {};
   }
   const auto clearance = [&](double s) {

@@ -64,6 +64,7 @@ class GridSight {
     std::int64_t west, north, east, south;
   };
 
+  Result<void> Probe(Scan& scan);
   Result<void> Halve(Scan& scan, double first, double last);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);

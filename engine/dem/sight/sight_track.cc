@@ -68,9 +68,8 @@ double Near(double degrees, double near, double turn) {
 Quadratic::Range Quadratic::Over(double first, double last) const {
   const double at_first = At(first), at_last = At(last);
   Range range{std::min(at_first, at_last), std::max(at_first, at_last)};
-  const double vertex = a_ != 0 ? -b_ / (2 * a_) : first;
-  if (vertex > first && vertex < last) {
-    const double value = At(vertex);
+  if (Slope(first) * Slope(last) < 0) {
+    const double value = At(-b_ / (2 * a_));
     range = {std::min(range.min, value), std::max(range.max, value)};
   }
   return range;
