@@ -144,8 +144,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   const DrawnMeshKey cache_key{dataset.generation, request.key, request.error_step, is_glb,
                                is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
   if (std::shared_ptr<const DrawnMesh> known = drawn_->Find(cache_key)) return known;
-  const double error_m =
-      MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
@@ -157,7 +156,8 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   return std::shared_ptr<const DrawnMesh>(std::move(mesh));
 }
 
-MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& surface, const std::stop_token& stop) const {
+MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& surface,
+                                  const std::stop_token& stop) const {
   return [this, dataset, surface, stop](const geo::TileKey& key) {
     const Dataset& of = datasets_[dataset];
     TileRequest request;
@@ -189,7 +189,8 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
                                                               std::stop_token stop) const {
   const Dataset& of = datasets_[dataset];
   if (!of.source) return NoSources();
-  if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded) return tl::unexpected(bounded.error());
+  if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded)
+    return tl::unexpected(bounded.error());
   if (!surface) return of.source->LookAlong(rays, options, std::move(stop));
   const int deepest = of.source->max_level();
   const Result<int> level = LevelOf(*surface, deepest, of.error_fraction);

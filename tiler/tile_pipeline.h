@@ -77,7 +77,7 @@ struct EncoderInput {
 // Heights of a dataset at points, NaN where it has none.
 struct PointHeights {
   std::vector<float> heights;
-  std::vector<std::uint8_t> filled = {};  // by point: 1 where a void was filled in; empty: none was
+  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled in; empty: none was
   std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
   // Of drawn surfaces: the tiles that were read, and which of them each point lies in; empty: of the sources.
   std::vector<geo::TileKey> tiles = {};
@@ -120,8 +120,8 @@ class TilePipeline {
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
 
-  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the rays
-  // cross too many samples. Other errors: those of the two functions above.
+  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
+  // rays cross too many samples. Other errors: those of the two functions above.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

@@ -122,8 +122,7 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
 
   const bool is_binary = parsed->is_binary;
   // 32-bit floats of heights hardly shrink, and compression takes longer than reading them.
-  const tiler::Coding coding =
-      is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
+  const tiler::Coding coding = is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = is_binary ? "application/octet-stream" : "application/json";
   response.content_encoding = tiler::NameOf(coding);
@@ -226,7 +225,7 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
     if (is_filled) json += ",\"filled\":true";
     if (!known.normals.empty() && !std::isnan(known.normals[i][2])) {
       const auto& [east, north, up] = known.normals[i];
-      fmt::format_to(out, ",\"normal\":[{},{},{}],\"slope\":{:.4g}", east, north, up,
+      fmt::format_to(out, ",\"normal\":[{},{},{}],\"slope\":{:.3f}", east, north, up,
                      geo::ToDegrees(std::atan2(std::hypot(east, north), up)));
     }
     if (!known.tiles.empty()) {

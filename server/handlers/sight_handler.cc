@@ -46,8 +46,8 @@ Result<void> RaiseFromGround(const tiler::TilePipeline& pipeline, std::uint32_t 
     const float height_m = ground->heights[i];
     if (std::isnan(height_m)) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "heights=ground: ray {}: the dataset has no height where it {}; use heights=ellipsoid", i / 2 + 1,
-                       i % 2 == 0 ? "begins" : "ends");
+                       "heights=ground: ray {}: the dataset has no height where it {}; use heights=ellipsoid",
+                       i / 2 + 1, i % 2 == 0 ? "begins" : "ends");
     }
     (i % 2 == 0 ? query.rays[i / 2].from : query.rays[i / 2].to).height_m += height_m;
   }
@@ -73,8 +73,9 @@ std::string SightBytes(const SightQuery& query, const std::vector<dem::SightAnsw
 void AppendPlace(std::string& json, const char* name, const dem::SightRay& ray, double share, double length_m,
                  const dem::SightOptions& options) {
   const dem::SightPoint place = dem::PointAt(ray, share, options);
-  fmt::format_to(std::back_inserter(json), ",\"{}\":{{\"lat\":{:.9f},\"lng\":{:.9f},\"height\":{:.3f},\"distance\":{:.3f}}}",
-                 name, place.latitude, place.longitude, place.height_m, share * length_m);
+  fmt::format_to(std::back_inserter(json),
+                 ",\"{}\":{{\"lat\":{:.9f},\"lng\":{:.9f},\"height\":{:.3f},\"distance\":{:.3f}}}", name,
+                 place.latitude, place.longitude, place.height_m, share * length_m);
 }
 
 // What a client should be told beside the numbers; empty: nothing.

@@ -67,8 +67,8 @@ Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts) {
     return MakeError(ErrorCode::kInvalidArgument, "surface must be source or served");
   }
   if (surface == "source") {
-    const bool is_plain = !texts.level && !texts.error && !texts.fraction && !texts.at_least && !texts.format &&
-                          !texts.compression;
+    const bool is_plain =
+        !texts.level && !texts.error && !texts.fraction && !texts.at_least && !texts.format && !texts.compression;
     if (is_plain) return std::optional<tiler::DrawnSurface>();
     return MakeError(ErrorCode::kInvalidArgument,
                      "level, error, fraction, atleast, format and compression need surface=served");

@@ -12,9 +12,24 @@
 namespace terrace::server {
 namespace {
 
-constexpr const char* kNames[] = {"bbox",  "width", "height",  "spacing", "crs",   "format",
-                                  "datum", "range", "surface", "level",   "error", "fraction", "atleast"};
-enum Name { kBbox, kWidth, kHeight, kSpacing, kCrs, kFormat, kDatum, kRange, kSurface, kLevel, kError, kFraction, kAtLeast, kNameCount };
+constexpr const char* kNames[] = {"bbox",  "width",   "height", "spacing", "crs",      "format", "datum",
+                                  "range", "surface", "level",  "error",   "fraction", "atleast"};
+enum Name {
+  kBbox,
+  kWidth,
+  kHeight,
+  kSpacing,
+  kCrs,
+  kFormat,
+  kDatum,
+  kRange,
+  kSurface,
+  kLevel,
+  kError,
+  kFraction,
+  kAtLeast,
+  kNameCount
+};
 static_assert(std::size(kNames) == kNameCount);
 using Texts = std::array<std::optional<std::string>, kNameCount>;
 
@@ -97,7 +112,8 @@ Result<void> SetFormat(const std::optional<std::string>& text, GridFormat& forma
 Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
   if (!text) return {};
   const auto numbers = NumbersOf<2>(*text);
-  if (!numbers || (*numbers)[0] >= (*numbers)[1]) return Invalid("range must be two numbers of metres, the lower first");
+  if (!numbers || (*numbers)[0] >= (*numbers)[1])
+    return Invalid("range must be two numbers of metres, the lower first");
   if (query.format == GridFormat::kF32 || query.format == GridFormat::kGeoTiff) {
     return Invalid("range needs format=r16 or png16");
   }

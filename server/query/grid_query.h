@@ -22,9 +22,9 @@ struct GridQuery {
   std::optional<tiler::DrawnSurface> drawn;  // nothing: the surface of the sources
 };
 
-// `bbox=west,south,east,north` in units of `crs=EPSG:CODE` (4326), `width=N&height=N` or `spacing=S`, `format`, `datum`,
-// `range=MIN,MAX`, and the parameters of surfaces except `format` and `compression` (drawn_parameters.h); `v` may be
-// repeated. kInvalidArgument: the message is for the client.
+// `bbox=west,south,east,north` in units of `crs=EPSG:CODE` (4326), `width=N&height=N` or `spacing=S`, `format`,
+// `datum`, `range=MIN,MAX`, and the parameters of surfaces except `format` and `compression` (drawn_parameters.h); `v`
+// may be repeated. kInvalidArgument: the message is for the client.
 Result<GridQuery> ParseGrid(std::string_view query);
 
 }  // namespace terrace::server

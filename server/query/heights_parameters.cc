@@ -16,9 +16,10 @@ static_assert(std::size(kTextNames) == HeightsParameters::kTexts);
 constexpr std::size_t kLongestName = 11;
 
 tl::unexpected<Error> Unknown() {
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "unknown parameter; known are locations, path, step, samples, datum, certify, normals, surface, and with "
-                   "surface=served level, error, fraction, atleast, format, compression");
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "unknown parameter; known are locations, path, step, samples, datum, certify, normals, surface, and with "
+      "surface=served level, error, fraction, atleast, format, compression");
 }
 
 tl::unexpected<Error> Repeated(const char* name) {

@@ -179,10 +179,11 @@ Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_loc
     query->wants_normals = *normals == "1";
   }
   DrawnTexts texts;
-  for (const auto& [text, of] : {std::pair(HeightsParameters::kSurface, &texts.surface), std::pair(HeightsParameters::kLevel, &texts.level),
-                                 std::pair(HeightsParameters::kError, &texts.error), std::pair(HeightsParameters::kFraction, &texts.fraction),
-                                 std::pair(HeightsParameters::kAtLeast, &texts.at_least), std::pair(HeightsParameters::kFormat, &texts.format),
-                                 std::pair(HeightsParameters::kCompression, &texts.compression)}) {
+  for (const auto& [text, of] :
+       {std::pair(HeightsParameters::kSurface, &texts.surface), std::pair(HeightsParameters::kLevel, &texts.level),
+        std::pair(HeightsParameters::kError, &texts.error), std::pair(HeightsParameters::kFraction, &texts.fraction),
+        std::pair(HeightsParameters::kAtLeast, &texts.at_least), std::pair(HeightsParameters::kFormat, &texts.format),
+        std::pair(HeightsParameters::kCompression, &texts.compression)}) {
     *of = parameters.text(text);
   }
   Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(texts);

@@ -20,7 +20,7 @@ struct HeightsQuery {
   dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
   // If certified errors are requested: the deepest level of the tiles to use; geo::kMaxLevel: the deepest available.
   std::optional<int> certify_level;
-  bool is_binary = false;    // the points were numbers of 64 bits, and the heights are to be numbers of 32 bits
+  bool is_binary = false;  // the points were numbers of 64 bits, and the heights are to be numbers of 32 bits
   bool wants_normals = false;
   std::optional<tiler::DrawnSurface> drawn;  // nothing: heights of the sources
 };
@@ -44,9 +44,10 @@ Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, P
 // `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; with either,
 // `datum=ellipsoid` or `datum=orthometric`, `certify=LEVEL` or `certify=deepest`, `normals=1`, and `surface=source` or
 // `surface=served`; with the latter `level`, `error`, `fraction`, `atleast`, `format` and `compression`, as for tiles;
-// `v` is ignored. Each may occur once in query and body together. kInvalidArgument: anything else, numbers that are not finite or not a position on
-// Earth, or more than `max_locations` points; the message is for the client, and names the item and the byte of the
-// body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes of the text.
+// `v` is ignored. Each may occur once in query and body together. kInvalidArgument: anything else, numbers that are not
+// finite or not a position on Earth, or more than `max_locations` points; the message is for the client, and names the
+// item and the byte of the body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes
+// of the text.
 Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations,
                                   const std::stop_token& stop = {});
 

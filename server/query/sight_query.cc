@@ -21,7 +21,21 @@ constexpr std::size_t kPointNumbers = 3, kRayNumbers = 6;
 
 constexpr const char* kNames[] = {"from",  "to",    "rays",     "heights", "refraction", "surface",
                                   "level", "error", "fraction", "atleast", "format",     "compression"};
-enum Name { kFrom, kTo, kRays, kHeights, kRefraction, kSurface, kLevel, kError, kFraction, kAtLeast, kFormat, kCompression, kNameCount };
+enum Name {
+  kFrom,
+  kTo,
+  kRays,
+  kHeights,
+  kRefraction,
+  kSurface,
+  kLevel,
+  kError,
+  kFraction,
+  kAtLeast,
+  kFormat,
+  kCompression,
+  kNameCount
+};
 static_assert(std::size(kNames) == kNameCount);
 
 tl::unexpected<Error> Unknown() {
@@ -128,8 +142,8 @@ class SightParameters final : public ParameterSink {
     const std::string item = fmt::format("rays: item {}", rays_.size() + 1);
     const auto numbers = NumbersOf<kRayNumbers>(*texts_[kRays]);
     if (!numbers) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "{} is not \"latitude,longitude,height,latitude,longitude,height\"", item);
+      return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height,latitude,longitude,height\"",
+                       item);
     }
     texts_[kRays]->clear();
     const dem::SightRay ray{LatitudeFirst(numbers->data()), LatitudeFirst(numbers->data() + kPointNumbers)};
@@ -149,7 +163,8 @@ class SightParameters final : public ParameterSink {
   std::vector<dem::SightRay> rays_;
 };
 
-Result<std::vector<dem::SightRay>> ParseBinary(std::string_view body, std::size_t max_rays, const std::stop_token& stop) {
+Result<std::vector<dem::SightRay>> ParseBinary(std::string_view body, std::size_t max_rays,
+                                               const std::stop_token& stop) {
   constexpr std::size_t kRayBytes = kRayNumbers * sizeof(double), kStopPeriod = 4096;
   if (body.empty() || body.size() % kRayBytes != 0) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -190,7 +205,8 @@ Result<std::vector<dem::SightRay>> ParseEnds(const SightParameters& parameters) 
     ends[name == kFrom ? 0 : 1] = LatitudeFirst(numbers->data());
   }
   const dem::SightRay ray{ends[0], ends[1]};
-  if (const Result<void> checked = Check(ray, "from", "to", "the ray"); !checked) return tl::unexpected(checked.error());
+  if (const Result<void> checked = Check(ray, "from", "to", "the ray"); !checked)
+    return tl::unexpected(checked.error());
   return std::vector<dem::SightRay>{ray};
 }
 
@@ -231,9 +247,9 @@ Result<SightQuery> ParseSight(const HeightsInput& input, std::size_t max_rays, c
     }
     query.options.refraction = *share;
   }
-  Result<std::optional<tiler::DrawnSurface>> drawn =
-      ParseDrawn({parameters.text(kSurface), parameters.text(kLevel), parameters.text(kError), parameters.text(kFraction),
-                  parameters.text(kAtLeast), parameters.text(kFormat), parameters.text(kCompression)});
+  Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(
+      {parameters.text(kSurface), parameters.text(kLevel), parameters.text(kError), parameters.text(kFraction),
+       parameters.text(kAtLeast), parameters.text(kFormat), parameters.text(kCompression)});
   if (!drawn) return tl::unexpected(drawn.error());
   query.drawn = *std::move(drawn);
   return query;

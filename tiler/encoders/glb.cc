@@ -115,7 +115,8 @@ Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_tok
   if (!meshed) return tl::unexpected(std::move(meshed).error());
   DrawnTriangles drawn;
   const double cells = input.lattice().cells();
-  for (const tin::SamplePosition& vertex : meshed->tin.vertices) drawn.places.push_back({vertex.x / cells, vertex.y / cells});
+  for (const tin::SamplePosition& vertex : meshed->tin.vertices)
+    drawn.places.push_back({vertex.x / cells, vertex.y / cells});
   drawn.positions = std::move(meshed->positions);
   drawn.triangles = std::move(meshed->tin.triangles);
   return drawn;

@@ -39,8 +39,9 @@ std::size_t DrawnMesh::bytes() const {
          (bucket_starts_.size() + bucket_triangles_.size()) * sizeof(std::uint32_t);
 }
 
-// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are no straight lines in degrees,
-// so boxes grow by the distance of a chord from the straight line. Where that is not enough, At searches all triangles.
+// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are no straight lines in
+// degrees, so boxes grow by the distance of a chord from the straight line. Where that is not enough, At searches all
+// triangles.
 void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   constexpr int kMaxSide = 256;
   side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(triangles_.size()))), 1, kMaxSide);
@@ -53,10 +54,8 @@ void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   };
   const auto bucket = [this](double place) { return std::clamp(static_cast<int>(place * side_), 0, side_ - 1); };
   const auto buckets_of = [&](const std::array<std::uint32_t, 3>& triangle) {
-    const auto [west, east] =
-        std::minmax({places[triangle[0]][0], places[triangle[1]][0], places[triangle[2]][0]});
-    const auto [south, north] =
-        std::minmax({places[triangle[0]][1], places[triangle[1]][1], places[triangle[2]][1]});
+    const auto [west, east] = std::minmax({places[triangle[0]][0], places[triangle[1]][0], places[triangle[2]][0]});
+    const auto [south, north] = std::minmax({places[triangle[0]][1], places[triangle[1]][1], places[triangle[2]][1]});
     const double width = east - west, height = north - south;
     const double grown = 1e-6 + std::min(1.0, width * side * (width + height * slope) / 4);
     return Buckets{bucket(west - grown), bucket(south - grown), bucket(east + grown), bucket(north + grown)};
@@ -82,7 +81,8 @@ void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
 std::array<double, 2> DrawnMesh::PlaceOf(const dem::GeoPosition& point) const {
   const double side = SideDegrees(key_);
   const double longitude = point.longitude == 180 && key_.x == 0 ? -180 : point.longitude;
-  return {(longitude + 180) / side - static_cast<double>(key_.x), (point.latitude + 90) / side - static_cast<double>(key_.y)};
+  return {(longitude + 180) / side - static_cast<double>(key_.x),
+          (point.latitude + 90) / side - static_cast<double>(key_.y)};
 }
 
 DrawnMesh::Bucket DrawnMesh::BucketAt(const dem::GeoPosition& point) const {
@@ -138,8 +138,7 @@ void DrawnMesh::Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& bes
 
 DrawnPoint DrawnMesh::PointOf(const Meeting& met) const {
   const auto& [a, b, c] = triangles_[met.triangle];
-  return {met.height_m,
-          geo::Normalized(geo::Cross(positions_[b] - positions_[a], positions_[c] - positions_[a]))};
+  return {met.height_m, geo::Normalized(geo::Cross(positions_[b] - positions_[a], positions_[c] - positions_[a]))};
 }
 
 std::optional<DrawnPoint> DrawnMesh::At(const dem::GeoPosition& point) const {

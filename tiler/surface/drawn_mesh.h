@@ -17,8 +17,8 @@ namespace terrace::tiler {
 
 // A tile as a client decodes it, without skirts.
 struct DrawnTriangles {
-  std::vector<geo::Vec3> positions;                     // ECEF metres
-  std::vector<std::array<double, 2>> places;            // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
+  std::vector<geo::Vec3> positions;           // ECEF metres
+  std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
 };
 
@@ -33,8 +33,8 @@ class DrawnMesh {
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
   // Where the plumb line through a position meets the mesh; nothing if it passes beside it. The edge of a tile is a
-  // parallel, and the triangles end at chords of it: in the north a tile reaches beyond its northern edge and not to all
-  // of its southern one. Where it meets several triangles, the one that it meets farthest inside counts.
+  // parallel, and the triangles end at chords of it: in the north a tile reaches beyond its northern edge and not to
+  // all of its southern one. Where it meets several triangles, the one that it meets farthest inside counts.
   std::optional<DrawnPoint> At(const dem::GeoPosition& point) const;
   // The same on the plane of the nearest triangle, also beside the mesh.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;

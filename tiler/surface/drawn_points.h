@@ -39,8 +39,8 @@ Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fra
 using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
 
 // Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
-// available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between two
-// tiles to the eastern and the northern one. `normals`: adds normals. kInvalidArgument: too many tiles.
+// available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between
+// two tiles to the eastern and the northern one. `normals`: adds normals. kInvalidArgument: too many tiles.
 Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
 

@@ -97,10 +97,11 @@ class Walk {
     auto& mesh = meshes_[key];
     if (mesh == nullptr) {
       if (meshes_.size() > kMaxDrawnTiles) {
-        return MakeError(ErrorCode::kInvalidArgument,
-                         "surface: the rays cross more than {} tiles of level {}, which is the most for one request; ask "
-                         "for fewer rays, or for a shallower level",
-                         kMaxDrawnTiles, level_);
+        return MakeError(
+            ErrorCode::kInvalidArgument,
+            "surface: the rays cross more than {} tiles of level {}, which is the most for one request; ask "
+            "for fewer rays, or for a shallower level",
+            kMaxDrawnTiles, level_);
       }
       Result<std::shared_ptr<const DrawnMesh>> made = mesh_of_(key);
       if (!made) return tl::unexpected(std::move(made).error());
@@ -114,9 +115,9 @@ class Walk {
     const auto at = [&](double s) { return dem::PointAt(ray, start + s * length, options_); };
     const dem::SightPoint first = at(0), last = at(1);
     const double east = std::remainder(last.longitude - first.longitude, 360), north = last.latitude - first.latitude;
-    constexpr double kLeastStep = 1e-6;
+    constexpr double kMinStep = 1e-6;
     for (double s = 0;;) {
-      const double inside = std::min(1.0, s + kLeastStep / 2);
+      const double inside = std::min(1.0, s + kMinStep / 2);
       const dem::GeoPosition here{std::remainder(first.longitude + inside * east, 360),
                                   first.latitude + inside * north};
       const Result<const DrawnMesh*> mesh = MeshAt(here);
@@ -129,7 +130,7 @@ class Walk {
       };
       leave(here.longitude, bucket.west, bucket.east, east);
       leave(here.latitude, bucket.south, bucket.north, north);
-      next = std::min(1.0, std::max(next, s + kLeastStep));
+      next = std::min(1.0, std::max(next, s + kMinStep));
       AddInBucket(**mesh, bucket, {at(s), at((s + next) / 2), at(next)}, start + s * length, (next - s) * length,
                   clearances);
       if (next >= 1) return {};
@@ -163,7 +164,7 @@ class Walk {
       if (from > to) continue;
       is_met |= from <= 0.5 && to >= 0.5;
       const Along over{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
-                              points[2].height_m - last->height_m};
+                       points[2].height_m - last->height_m};
       clearances.Add(over, from, to, start, length);
     }
     if (is_met) return;
@@ -188,10 +189,11 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
   double samples = 0;
   for (const dem::SightRay& ray : rays) samples += dem::LengthOf(ray) / spacing_m;
   if (samples <= kMaxSamplesAlong) return {};
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "the rays together cross about {:.0f} samples of the dataset's finest source, and {:.0f} are the most "
-                   "for one request; ask for fewer or shorter rays",
-                   samples, kMaxSamplesAlong);
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "the rays together cross about {:.0f} samples of the dataset's finest source, and {:.0f} are the most "
+      "for one request; ask for fewer or shorter rays",
+      samples, kMaxSamplesAlong);
 }
 
 Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const dem::DemSource& source, int level,

@@ -18,7 +18,8 @@ Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std
   const double least = tile.min_height, relief = static_cast<double>(tile.max_height) - least;
   DrawnTriangles drawn;
   for (std::size_t i = 0; i < tile.u.size(); ++i) {
-    const double u = static_cast<double>(tile.u[i]) / proto::kQuantizedMax, v = static_cast<double>(tile.v[i]) / proto::kQuantizedMax;
+    const double u = static_cast<double>(tile.u[i]) / proto::kQuantizedMax,
+                 v = static_cast<double>(tile.v[i]) / proto::kQuantizedMax;
     const double height_m = least + static_cast<double>(tile.h[i]) / proto::kQuantizedMax * relief;
     drawn.positions.push_back(geo::ToEcef(west + u * side, south + v * side, height_m));
     drawn.places.push_back({u, v});

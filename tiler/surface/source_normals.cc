@@ -47,8 +47,8 @@ Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& so
     const double east = Slope(side[0], own, side[1], reach_m) + 0 * own;
     const double north = Slope(side[2], own, side[3], reach_m) + 0 * own;
     const double length = std::sqrt(east * east + north * north + 1);
-    normals.push_back({static_cast<float>(-east / length), static_cast<float>(-north / length),
-                       static_cast<float>(1 / length)});
+    normals.push_back(
+        {static_cast<float>(-east / length), static_cast<float>(-north / length), static_cast<float>(1 / length)});
   }
   return normals;
 }

@@ -52,10 +52,9 @@ void Place(const OutputGrid& grid, GDALDataset& dataset) {
 
 template <typename T>
 CPLErr WriteBand(const OutputGrid& grid, GDALDataset& dataset, std::span<const T> values, GDALDataType type) {
-  return dataset.GetRasterBand(1)->RasterIO(GF_Write, 0, 0, static_cast<int>(grid.columns),
-                                            static_cast<int>(grid.rows), const_cast<T*>(values.data()),
-                                            static_cast<int>(grid.columns), static_cast<int>(grid.rows), type, 0, 0,
-                                            nullptr);
+  return dataset.GetRasterBand(1)->RasterIO(GF_Write, 0, 0, static_cast<int>(grid.columns), static_cast<int>(grid.rows),
+                                            const_cast<T*>(values.data()), static_cast<int>(grid.columns),
+                                            static_cast<int>(grid.rows), type, 0, 0, nullptr);
 }
 
 }  // namespace
@@ -85,14 +84,15 @@ Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint
   GDALDriver* const memory = GetGDALDriverManager()->GetDriverByName("MEM");
   GDALDriver* const png = GetGDALDriverManager()->GetDriverByName("PNG");
   if (memory == nullptr || png == nullptr) return CannotWrite("PNG");
-  const GDALDatasetUniquePtr source(memory->Create("", static_cast<int>(grid.columns), static_cast<int>(grid.rows), 1,
-                                                   GDT_UInt16, nullptr));
+  const GDALDatasetUniquePtr source(
+      memory->Create("", static_cast<int>(grid.columns), static_cast<int>(grid.rows), 1, GDT_UInt16, nullptr));
   if (source == nullptr || WriteBand(grid, *source, values, GDT_UInt16) != CE_None) return CannotWrite("MEM");
   const MemoryFile file(".png");
   CPLStringList options;
   options.AddString("ZLEVEL=3");
   {
-    const GDALDatasetUniquePtr copy(png->CreateCopy(file.path(), source.get(), FALSE, options.List(), nullptr, nullptr));
+    const GDALDatasetUniquePtr copy(
+        png->CreateCopy(file.path(), source.get(), FALSE, options.List(), nullptr, nullptr));
     if (copy == nullptr) return CannotWrite("PNG");
   }
   std::string bytes = file.Bytes();

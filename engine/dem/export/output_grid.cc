@@ -56,7 +56,8 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
       if (std::abs(longitude) > 180) return Invalid("bbox: longitudes must be numbers from -180 to 180");
     }
     for (const double latitude : {grid.south, grid.north}) {
-      if (std::abs(latitude) > 90) return Invalid("bbox: latitudes must be numbers from -90 to 90; longitudes come first");
+      if (std::abs(latitude) > 90)
+        return Invalid("bbox: latitudes must be numbers from -90 to 90; longitudes come first");
     }
     if (grid.east < grid.west) grid.east += 360;
   }
@@ -64,7 +65,8 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
     return Invalid("bbox is empty; it is west,south,east,north in the units of the crs");
   }
   const double spacing = request.spacing.value_or(1);
-  const auto columns = NodesAlong(grid.east - grid.west, request.columns, spacing, request.spacing ? "spacing" : "width");
+  const auto columns =
+      NodesAlong(grid.east - grid.west, request.columns, spacing, request.spacing ? "spacing" : "width");
   if (!columns) return tl::unexpected(columns.error());
   const auto rows = NodesAlong(grid.north - grid.south, request.rows, spacing, request.spacing ? "spacing" : "height");
   if (!rows) return tl::unexpected(rows.error());
@@ -72,9 +74,10 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
   constexpr std::int64_t kLongestSide = 65536;
   const double nodes = static_cast<double>(grid.columns) * static_cast<double>(grid.rows);
   if (nodes > static_cast<double>(max_nodes) || std::max(grid.columns, grid.rows) > kLongestSide) {
-    return Invalid(fmt::format("the grid has {} x {} nodes, more than max_mesh_samples of this server ({}) or than {} on "
-                               "a side; ask for fewer, or for a smaller bbox",
-                               grid.columns, grid.rows, max_nodes, kLongestSide));
+    return Invalid(
+        fmt::format("the grid has {} x {} nodes, more than max_mesh_samples of this server ({}) or than {} on "
+                    "a side; ask for fewer, or for a smaller bbox",
+                    grid.columns, grid.rows, max_nodes, kLongestSide));
   }
   if (request.spacing) {
     grid.east = grid.west + spacing * static_cast<double>(grid.columns - 1);
@@ -90,12 +93,12 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
   for (std::int64_t row = first_row; row < first_row + rows; ++row) {
     const double y = row == grid.rows - 1 ? grid.south : grid.north - static_cast<double>(row) * grid.step_y();
     for (std::int64_t column = 0; column < grid.columns; ++column) {
-      nodes.push_back({column == grid.columns - 1 ? grid.east : grid.west + static_cast<double>(column) * grid.step_x(), y});
+      nodes.push_back(
+          {column == grid.columns - 1 ? grid.east : grid.west + static_cast<double>(column) * grid.step_x(), y});
     }
   }
   if (grid.epsg != kWgs84) {
-    const auto projector =
-        Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
+    const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
     if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
     std::vector<Position> kept, back;
     for (std::size_t i = 0; i < nodes.size(); i += kCheckPeriod) kept.push_back(nodes[i]);
@@ -112,13 +115,14 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
       return std::hypot(grid.is_geographic ? std::remainder(off_x, 360) : off_x, back[i].y - kept[i].y) <= farthest;
     };
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-      const bool is_place = !std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 &&
-                            (i % kCheckPeriod != 0 || is_back(i / kCheckPeriod));
+      const bool is_place =
+          !std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 && (i % kCheckPeriod != 0 || is_back(i / kCheckPeriod));
       if (is_place) continue;
-      return Invalid(fmt::format("bbox: EPSG:{} has no place on Earth for column {}, row {} of the grid; choose a bbox "
-                                 "within the area that the CRS is made for",
-                                 grid.epsg, static_cast<std::int64_t>(i) % grid.columns,
-                                 first_row + static_cast<std::int64_t>(i) / grid.columns));
+      return Invalid(
+          fmt::format("bbox: EPSG:{} has no place on Earth for column {}, row {} of the grid; choose a bbox "
+                      "within the area that the CRS is made for",
+                      grid.epsg, static_cast<std::int64_t>(i) % grid.columns,
+                      first_row + static_cast<std::int64_t>(i) / grid.columns));
     }
   }
   std::vector<GeoPosition> positions;

@@ -17,8 +17,8 @@ namespace terrace::dem {
 // Nodes in rows from the north, from the west; the outermost nodes lie on the box.
 struct OutputGrid {
   int epsg = 4326;
-  std::string wkt;            // of the CRS
-  bool is_geographic = true;  // x and y are degrees of longitude and latitude
+  std::string wkt;                                  // of the CRS
+  bool is_geographic = true;                        // x and y are degrees of longitude and latitude
   double west = 0, south = 0, east = 0, north = 0;  // units of the CRS
   std::int64_t columns = 0, rows = 0;
 
@@ -35,16 +35,17 @@ struct GridRequest {
   std::optional<double> spacing;
 };
 
-// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has no easting and northing; the box is
-// empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
+// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has no easting and northing; the box
+// is empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
 Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes);
 
-// Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS has
-// no position on Earth at a node. kCancelled: stopped.
+// Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS
+// has no position on Earth at a node. kCancelled: stopped.
 Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
                                              const std::stop_token& stop);
 
-// A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL cannot write it.
+// A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL
+// cannot write it.
 Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights);
 // A grey image of 16 bits. `values`: one per node. Errors: as above.
 Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values);

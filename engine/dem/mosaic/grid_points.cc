@@ -38,9 +38,8 @@ std::vector<PointCell> InBlockOrder(std::vector<PointCell> cells) {
   if (west == east && north == south) return cells;
   const auto columns = static_cast<std::size_t>(east - west + 1), rows = static_cast<std::size_t>(south - north + 1);
   if (columns > (cells.size() + 1024) / rows) {
-    std::ranges::sort(cells, {}, [](const PointCell& p) {
-      return std::tuple(BlockRow(p.cell), BlockColumn(p.cell), p.point);
-    });
+    std::ranges::sort(cells, {},
+                      [](const PointCell& p) { return std::tuple(BlockRow(p.cell), BlockColumn(p.cell), p.point); });
     return cells;
   }
   const auto block_of = [&](const PointCell& p) {

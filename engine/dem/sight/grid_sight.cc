@@ -57,8 +57,7 @@ SightAnswer SightSearch::Answer(bool has_gaps) const {
 }
 
 Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
-                                               SightSurface surface, SightSearch& search,
-                                               const std::stop_token& stop) {
+                                               SightSurface surface, SightSearch& search, const std::stop_token& stop) {
   const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());
   std::vector<RayPart> open;
   // No raster grid before this one has heights, so all of its own count.
@@ -91,7 +90,8 @@ std::int64_t GridSight::WrappedColumn(std::int64_t column) const {
 // Of positions on the grid. Positions in the outer half of the outermost pixels belong to the outermost cells.
 GridSight::CellRange GridSight::CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const {
   const auto cell = [](double position, std::int64_t cells) {
-    return std::clamp(static_cast<std::int64_t>(std::floor(position)), std::int64_t{0}, std::max(cells - 1, std::int64_t{0}));
+    return std::clamp(static_cast<std::int64_t>(std::floor(position)), std::int64_t{0},
+                      std::max(cells - 1, std::int64_t{0}));
   };
   const std::int64_t rows = grid_.rows() - 1;
   if (grid_.wraps()) {
@@ -111,7 +111,9 @@ Result<void> GridSight::Probe(Scan& scan) {
   for (int i = 0; i < count; ++i) {
     const double s = (i + 0.5) / count, x = scan.on_grid.x.At(s), y = scan.on_grid.y.At(s);
     const bool is_between = x >= 0 && y >= 0 && x < grid_.columns() - 1 && y < grid_.rows() - 1;
-    if (!is_between || scan.search.IsSettled(scan.piece.height_m.At(s) - grid_.heights().max - SightBlocks::kMaxUndulation, 0)) continue;
+    if (!is_between ||
+        scan.search.IsSettled(scan.piece.height_m.At(s) - grid_.heights().max - SightBlocks::kMaxUndulation, 0))
+      continue;
     const auto column = static_cast<std::int64_t>(x), row = static_cast<std::int64_t>(y);
     const Result<const SightBlock*> block = blocks_.At(column, row, scan.stop);
     if (!block) return tl::unexpected(block.error());
@@ -121,7 +123,8 @@ Result<void> GridSight::Probe(Scan& scan) {
     const float* const heights = (*block)->heights().data() + at;
     const float* const owned = (*block)->owned().data() + at;
     const double east_of = x - static_cast<double>(column), south_of = y - static_cast<double>(row);
-    double ground = Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
+    double ground =
+        Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
     if (std::isnan(ground + owned[0] + owned[1] + owned[south] + owned[south + 1])) continue;
     if (!blocks_.includes_undulations()) {
       ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
@@ -136,8 +139,8 @@ Result<void> GridSight::Probe(Scan& scan) {
 Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   const Quadratic::Range x = scan.on_grid.x.Over(first, last), y = scan.on_grid.y.Over(first, last);
   constexpr double kRim = 0.5 + GridCover::kEdgeTolerance;
-  const bool is_beside = (!grid_.wraps() && (x.max < -kRim || x.min > grid_.columns() - 1 + kRim)) ||
-                         y.max < -kRim || y.min > grid_.rows() - 1 + kRim;
+  const bool is_beside = (!grid_.wraps() && (x.max < -kRim || x.min > grid_.columns() - 1 + kRim)) || y.max < -kRim ||
+                         y.min > grid_.rows() - 1 + kRim;
   // A position that the CRS does not have is not on the grid either.
   if (is_beside || !(x.min <= x.max) || !(y.min <= y.max)) {
     scan.Open(first, last);
@@ -163,8 +166,8 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
     bound = {range.max + geoid_m, range.has_voids};
   }
   // Beside the raster other raster grids may have heights.
-  bound.has_voids |= (!grid_.wraps() && (x.min < -0.5 || x.max > grid_.columns() - 0.5)) || y.min < -0.5 ||
-                     y.max > grid_.rows() - 0.5;
+  bound.has_voids |=
+      (!grid_.wraps() && (x.min < -0.5 || x.max > grid_.columns() - 0.5)) || y.min < -0.5 || y.max > grid_.rows() - 0.5;
   if (!bound.has_voids && scan.search.IsSettled(height_m - bound.max - slack_m, scan.ShareOf(first))) return {};
   if (is_in_block && bound.max == -std::numeric_limits<float>::infinity()) {
     scan.Open(first, last);
@@ -185,7 +188,8 @@ Result<void> GridSight::Measure(Scan& scan, double first, double last) {
   std::size_t count = 0;
   at[count++] = first;
   const std::array<std::pair<const Quadratic*, std::int64_t>, 2> axes = {
-      std::pair(&scan.on_grid.x, std::int64_t{grid_.columns()}), std::pair(&scan.on_grid.y, std::int64_t{grid_.rows()})};
+      std::pair(&scan.on_grid.x, std::int64_t{grid_.columns()}),
+      std::pair(&scan.on_grid.y, std::int64_t{grid_.rows()})};
   for (const auto& [axis, samples] : axes) {
     const Quadratic::Range range = axis->Over(first, last);
     for (double line = std::ceil(range.min); line <= range.max && count + 1 < at.size(); ++line) {
@@ -226,8 +230,10 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const float* const heights = block.heights().data() + at;
   const double nw = heights[0], ne = heights[east], sw = heights[south], se = heights[south + east];
   const float* const owned = block.owned().data() + at;
-  const double all = nw + ne + sw + se +
-                     (scan.surface == SightSurface::kNotHoles ? 0.0 * (owned[0] + owned[east] + owned[south] + owned[south + east]) : 0.0);
+  const double all =
+      nw + ne + sw + se +
+      (scan.surface == SightSurface::kNotHoles ? 0.0 * (owned[0] + owned[east] + owned[south] + owned[south + east])
+                                               : 0.0);
   const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
   if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
     MeasureRim(scan, block, column, row, first, last);
@@ -281,14 +287,13 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
   const auto clearance = [&](double s) -> std::optional<double> {
     const GridCell cell{column, row, std::clamp(scan.on_grid.x.At(s) - shift - static_cast<double>(column), 0.0, 1.0),
                         std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0)};
-    const bool is_owned = IsInside(scan, s) && (scan.surface == SightSurface::kAll ||
-                                                HasSample(block.owned(), block.window(), cell));
+    const bool is_owned =
+        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.owned(), block.window(), cell));
     const auto height = is_owned ? Interpolate(block.heights(), block.window(), cell) : std::nullopt;
     if (!height) return std::nullopt;
-    const double undulation_m =
-        blocks_.includes_undulations()
-            ? 0
-            : blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    const double undulation_m = blocks_.includes_undulations()
+                                    ? 0
+                                    : blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
     return scan.piece.height_m.At(s) - *height - undulation_m;
   };
   const auto add = [&](double s, double clearance_m) {

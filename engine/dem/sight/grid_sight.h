@@ -53,8 +53,8 @@ class GridSight {
  public:
   explicit GridSight(const RasterGrid& grid) : grid_(grid), blocks_(grid) {}
 
-  // Measures the parts of a ray, in order. Returns the parts above places where the raster grid has no height. `pieces`:
-  // of the ray. Errors: those of RasterGrid::FindPointBlock.
+  // Measures the parts of a ray, in order. Returns the parts above places where the raster grid has no height.
+  // `pieces`: of the ray. Errors: those of RasterGrid::FindPointBlock.
   Result<std::vector<RayPart>> Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
                                       SightSurface surface, SightSearch& search, const std::stop_token& stop);
 
@@ -68,7 +68,8 @@ class GridSight {
   Result<void> Halve(Scan& scan, double first, double last);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);
-  void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first, double last);
+  void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
+                  double last);
   bool IsInside(const Scan& scan, double s) const;
   std::int64_t WrappedColumn(std::int64_t column) const;
   CellRange CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const;

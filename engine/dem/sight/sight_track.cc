@@ -19,8 +19,7 @@ SightPoint ToGeodetic(const geo::Vec3& p) {
   double sine = 0, cosine = 1;
   for (int step = 0; step < 2; ++step) {
     const double reduced_cosine = std::isfinite(tangent) ? 1 / std::sqrt(1 + tangent * tangent) : 0;
-    const double reduced_sine =
-        std::isfinite(tangent) ? tangent * reduced_cosine : std::copysign(1.0, p.z);
+    const double reduced_sine = std::isfinite(tangent) ? tangent * reduced_cosine : std::copysign(1.0, p.z);
     const double y = p.z + e2_of_b * b * reduced_sine * reduced_sine * reduced_sine;
     const double x = from_axis - e2 * a * reduced_cosine * reduced_cosine * reduced_cosine;
     const double length = std::hypot(x, y);
@@ -41,8 +40,8 @@ class Course {
     const SightPoint middle = ToGeodetic(start_ + way_ * 0.5);
     // The Gaussian radius of curvature.
     const double prime = geo::PrimeVerticalRadius(middle.latitude);
-    const double meridian = prime * prime * prime * (1 - geo::kEccentricitySquared) /
-                            (geo::kSemiMajorAxis * geo::kSemiMajorAxis);
+    const double meridian =
+        prime * prime * prime * (1 - geo::kEccentricitySquared) / (geo::kSemiMajorAxis * geo::kSemiMajorAxis);
     rise_ = options.refraction * length_m_ * length_m_ / (2 * std::sqrt(prime * meridian));
   }
 

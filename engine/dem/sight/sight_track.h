@@ -35,10 +35,10 @@ class Quadratic {
 struct TrackPiece {
   static constexpr double kMaxLength = 8000;  // metres
 
-  double start = 0, end = 1;        // as shares of the ray
+  double start = 0, end = 1;  // as shares of the ray
   double length_m = 0;
-  Quadratic longitude, latitude;    // continuous across the antimeridian
-  Quadratic height_m;               // of the ray above the ellipsoid
+  Quadratic longitude, latitude;  // continuous across the antimeridian
+  Quadratic height_m;             // of the ray above the ellipsoid
 };
 
 // The pieces of a ray, in order; at least one.

@@ -160,8 +160,8 @@ TEST(Sight, IsThatOfAMarchOverAMosaic) {
   for (std::size_t i = 0; i < rays.size(); ++i) {
     blocked += marched[i].is_blocked ? 1 : 0;
     EXPECT_LE((*answers)[i].clearance_m, marched[i].clearance_m + 2e-3)
-        << i << " from " << rays[i].from.longitude << ' ' << rays[i].from.latitude << " to " << rays[i].to.longitude << ' '
-        << rays[i].to.latitude << " marched lowest at " << marched[i].lowest_at;
+        << i << " from " << rays[i].from.longitude << ' ' << rays[i].from.latitude << " to " << rays[i].to.longitude
+        << ' ' << rays[i].to.latitude << " marched lowest at " << marched[i].lowest_at;
     const bool is_visible = (*answers)[i].is_visible;
     EXPECT_FALSE(marched[i].is_blocked && is_visible) << i;
     EXPECT_FALSE(marched[i].clearance_m > 30 && !is_visible) << i;
@@ -196,14 +196,14 @@ TEST(Sight, AnswersRaysWithoutLengthBelowTheGroundAndBesideTheData) {
   const auto source = OpenOrFail(WriteRaster(dir, FlatSquare(0, 2, 200, .01, 100)));
   ASSERT_TRUE(source);
   const std::vector<SightRay> rays = {
-      {{1, 1, 150}, {1, 1, 150}},         // no length
-      {{1, 1, 90}, {1, 1, 90}},           // no length, below the ground
-      {{1, 1, 90}, {1.1, 1, 200}},        // begins below
-      {{1, 1, 200}, {1.1, 1, 90}},        // ends below
-      {{1, 1, 100}, {1, 1, 5000}},        // straight up from the ground
-      {{40, 1, 100}, {40.1, 1, 100}},     // beside the data
-      {{-0.1, 1, 200}, {0.1, 1, 200}},    // partly
-      {{1, 1, 1e6}, {1.5, 1.5, 1e6}},     // in orbit
+      {{1, 1, 150}, {1, 1, 150}},       // no length
+      {{1, 1, 90}, {1, 1, 90}},         // no length, below the ground
+      {{1, 1, 90}, {1.1, 1, 200}},      // begins below
+      {{1, 1, 200}, {1.1, 1, 90}},      // ends below
+      {{1, 1, 100}, {1, 1, 5000}},      // straight up from the ground
+      {{40, 1, 100}, {40.1, 1, 100}},   // beside the data
+      {{-0.1, 1, 200}, {0.1, 1, 200}},  // partly
+      {{1, 1, 1e6}, {1.5, 1.5, 1e6}},   // in orbit
   };
   const auto answers = source->LookAlong(rays, {});
   ASSERT_TRUE(answers);

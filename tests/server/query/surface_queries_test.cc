@@ -62,7 +62,8 @@ TEST(BinaryHeights, SaysWhatIsWrong) {
 }
 
 TEST(DrawnSurface, ReadsTheParametersOfTiles) {
-  const auto query = ParseHeights({"locations=1,2&surface=served&level=12&error=5&atleast=1&format=glb&compression=meshopt", {}, {}}, 9);
+  const auto query = ParseHeights(
+      {"locations=1,2&surface=served&level=12&error=5&atleast=1&format=glb&compression=meshopt", {}, {}}, 9);
   ASSERT_TRUE(query) << query.error().message;
   ASSERT_TRUE(query->drawn);
   EXPECT_EQ(query->drawn->level, 12);
@@ -103,7 +104,8 @@ TEST(DrawnSurface, SaysWhatIsWrong) {
 }
 
 TEST(GridQuery, ReadsSizesFormatsAndRanges) {
-  const auto query = ParseGrid("bbox=400000,3790000,401000,3791000&crs=EPSG:32611&width=505&height=505&format=r16&range=0,512&v=1");
+  const auto query =
+      ParseGrid("bbox=400000,3790000,401000,3791000&crs=EPSG:32611&width=505&height=505&format=r16&range=0,512&v=1");
   ASSERT_TRUE(query) << query.error().message;
   EXPECT_EQ(query->grid.epsg, 32611);
   EXPECT_EQ(query->grid.columns, 505);
@@ -224,7 +226,8 @@ TEST(SightQuery, SaysWhatIsWrong) {
   const std::string ray = BytesOf({7, 46, 10, 7.5, 46.5, 20});
   ExpectSays(ParseSight({{}, kBinary, ray.substr(8)}, 2), "40 bytes, which is no multiple of 48");
   ExpectSays(ParseSight({{}, kBinary, ray + ray + ray}, 2), "more than 2 rays");
-  ExpectSays(ParseSight({{}, kBinary, ray + BytesOf({7, kNaN, 10, 7.5, 46.5, 20})}, 2), "byte 48: ray 2: from: the latitude");
+  ExpectSays(ParseSight({{}, kBinary, ray + BytesOf({7, kNaN, 10, 7.5, 46.5, 20})}, 2),
+             "byte 48: ray 2: from: the latitude");
   ExpectSays(ParseSight({{}, kBinary, BytesOf({7, 46, 10, 7.5, 46.5, kInfinity})}, 2), "ray 1: to: the height");
 }
 
