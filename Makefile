@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper deb docs format lint tidy clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper deb docs site format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -64,6 +64,9 @@ docs: deps  ## write config.schema.json and the tables of docs/configuration.md 
 	cmake --preset release --log-level=WARNING
 	cmake --build build/release -j $(JOBS) --target write_option_docs
 	build/release/config/write_option_docs .
+
+site: test-deps  ## build the documentation as a site into build/site
+	@mkdocs build --quiet && echo "build/site/index.html"
 
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i
