@@ -21,11 +21,11 @@ namespace {
 // From this number of rays on, looking along them is long work, which never occupies all workers.
 constexpr std::size_t kFewRays = 16;
 // A query of at most this many bytes has one ray and is parsed in microseconds.
-constexpr std::size_t kQuickQuery = 512;
+constexpr std::size_t kQuickRays = 512;
 // Rays written between two checks of the stop token.
-constexpr std::size_t kStopPeriod = 1024;
+constexpr std::size_t kRayStopPeriod = 1024;
 
-struct Made {
+struct MadeSight {
   std::string bytes;  // in the reply's coding
   tiler::StageTimes times;
 };
@@ -92,7 +92,7 @@ std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswe
   std::string json = "{\"results\":[";
   const auto out = std::back_inserter(json);
   for (std::size_t i = 0; i < answers.size(); ++i) {
-    if (i % kStopPeriod == 0 && stop.stop_requested()) return {};
+    if (i % kRayStopPeriod == 0 && stop.stop_requested()) return {};
     const dem::SightAnswer& answer = answers[i];
     const double length_m = dem::LengthOf(query.rays[i]);
     if (i > 0) json += ',';
@@ -115,12 +115,12 @@ std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswe
 }
 
 // Parses on a worker, unless the input is small.
-asio::awaitable<Result<SightQuery>> ParseOnWorker(const Handlers& from, const RequestContext& context,
-                                                  TileService::Clock::time_point deadline) {
+asio::awaitable<Result<SightQuery>> ParseRaysOnWorker(const Handlers& from, const RequestContext& context,
+                                                      TileService::Clock::time_point deadline) {
   const Request& request = *context.request;
   const std::string& query = context.route.query;
   const bool is_post = request.method == Method::kPost;
-  if (!is_post && query.size() <= kQuickQuery) {
+  if (!is_post && query.size() <= kQuickRays) {
     const HeightsInput input{query, {}, {}};
     co_return ParseSight(input, from.max_locations);
   }
@@ -136,7 +136,7 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   const Request& request = *context.request;
   const DatasetView& view = from.catalog->datasets[dataset];
   const auto deadline = from.Deadline();
-  Result<SightQuery> parsed = co_await ParseOnWorker(from, context, deadline);
+  Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
   if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
     co_return co_await BackendFailure(parsed.error(), request.id);
   }
@@ -155,9 +155,9 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   }
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
-  Work<Made> work = [catalog = from.catalog, dataset, coding, query,
-                     asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<Made> {
-    Made made;
+  Work<MadeSight> work = [catalog = from.catalog, dataset, coding, query,
+                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeSight> {
+    MadeSight made;
     made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
     const tiler::TilePipeline& pipeline = *catalog->pipeline;
@@ -174,7 +174,7 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
     return made;
   };
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
-  Result<Made> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeSight> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
   const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
   if (is_absent || (!made && made.error().code == ErrorCode::kInvalidArgument)) {
     co_return ClientErrorResponse(made.error(), request.id);

@@ -12,34 +12,34 @@
 namespace terrace::server {
 namespace {
 
-constexpr const char* kNames[] = {"bbox",  "width",   "height", "spacing", "crs",      "format", "datum",
-                                  "range", "surface", "level",  "error",   "fraction", "atleast"};
-enum Name {
-  kBbox,
-  kWidth,
-  kHeight,
-  kSpacing,
-  kCrs,
-  kFormat,
-  kDatum,
-  kRange,
-  kSurface,
-  kLevel,
-  kError,
-  kFraction,
-  kAtLeast,
-  kNameCount
+constexpr const char* kGridNames[] = {"bbox",  "width",   "height", "spacing", "crs",      "format", "datum",
+                                      "range", "surface", "level",  "error",   "fraction", "atleast"};
+enum GridName {
+  kGridBbox,
+  kGridWidth,
+  kGridHeight,
+  kGridSpacing,
+  kGridCrs,
+  kGridFormat,
+  kGridDatum,
+  kGridRange,
+  kGridSurface,
+  kGridLevel,
+  kGridError,
+  kGridFraction,
+  kGridAtLeast,
+  kGridNameCount
 };
-static_assert(std::size(kNames) == kNameCount);
-using Texts = std::array<std::optional<std::string>, kNameCount>;
+static_assert(std::size(kGridNames) == kGridNameCount);
+using GridTexts = std::array<std::optional<std::string>, kGridNameCount>;
 
-tl::unexpected<Error> Invalid(std::string message) {
+tl::unexpected<Error> InvalidGrid(std::string message) {
   return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
 }
 
 // Finite numbers with commas between them; nothing if the text is anything else.
 template <std::size_t kCount>
-std::optional<std::array<double, kCount>> NumbersOf(std::string_view text) {
+std::optional<std::array<double, kCount>> GridNumbersOf(std::string_view text) {
   std::array<double, kCount> numbers{};
   for (std::size_t i = 0; i < kCount; ++i) {
     const std::size_t comma = i + 1 == kCount ? text.size() : text.find(',');
@@ -51,35 +51,35 @@ std::optional<std::array<double, kCount>> NumbersOf(std::string_view text) {
   return numbers;
 }
 
-Result<Texts> TextsOf(std::string_view query) {
+Result<GridTexts> GridTextsOf(std::string_view query) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
-  Texts texts;
+  GridTexts texts;
   for (const auto& [name, value] : *sent) {
     if (name == "v") continue;
-    const auto known = std::find(std::begin(kNames), std::end(kNames), name);
-    if (known == std::end(kNames)) {
-      return Invalid(
+    const auto known = std::find(std::begin(kGridNames), std::end(kGridNames), name);
+    if (known == std::end(kGridNames)) {
+      return InvalidGrid(
           "unknown parameter; known are bbox, width, height, spacing, crs, format, datum, range, surface, and with "
           "surface=served level, error, fraction, atleast");
     }
-    auto& text = texts[static_cast<std::size_t>(known - std::begin(kNames))];
-    if (text) return Invalid(fmt::format("{} is given more than once", *known));
+    auto& text = texts[static_cast<std::size_t>(known - std::begin(kGridNames))];
+    if (text) return InvalidGrid(fmt::format("{} is given more than once", *known));
     text = value;
   }
   return texts;
 }
 
-Result<void> SetSize(const Texts& texts, dem::GridRequest& grid) {
-  if (texts[kSpacing]) {
-    if (texts[kWidth] || texts[kHeight]) return Invalid("spacing excludes width and height");
-    grid.spacing = PositiveNumber(*texts[kSpacing]);
-    return grid.spacing ? Result<void>() : Invalid("spacing must be a finite number above 0, in units of the crs");
+Result<void> SetSize(const GridTexts& texts, dem::GridRequest& grid) {
+  if (texts[kGridSpacing]) {
+    if (texts[kGridWidth] || texts[kGridHeight]) return InvalidGrid("spacing excludes width and height");
+    grid.spacing = PositiveNumber(*texts[kGridSpacing]);
+    return grid.spacing ? Result<void>() : InvalidGrid("spacing must be a finite number above 0, in units of the crs");
   }
-  if (!texts[kWidth] || !texts[kHeight]) return Invalid("width and height, or spacing, are needed");
-  for (const auto& [name, of] : {std::pair(kWidth, &grid.columns), std::pair(kHeight, &grid.rows)}) {
+  if (!texts[kGridWidth] || !texts[kGridHeight]) return InvalidGrid("width and height, or spacing, are needed");
+  for (const auto& [name, of] : {std::pair(kGridWidth, &grid.columns), std::pair(kGridHeight, &grid.rows)}) {
     *of = PlainDecimal(*texts[name], /*max_digits=*/15);
-    if (!*of) return Invalid(fmt::format("{} must be a whole number from 2", kNames[name]));
+    if (!*of) return InvalidGrid(fmt::format("{} must be a whole number from 2", kGridNames[name]));
   }
   return {};
 }
@@ -89,12 +89,12 @@ Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& gr
   std::string_view code = *text;
   const bool is_epsg = code.size() > 5 && EqualsIgnoringCase(code.substr(0, 5), "EPSG:");
   const auto number = is_epsg ? PlainDecimal(code.substr(5), /*max_digits=*/6) : std::nullopt;
-  if (!number) return Invalid("crs must be EPSG: and a number, such as EPSG:32611");
+  if (!number) return InvalidGrid("crs must be EPSG: and a number, such as EPSG:32611");
   grid.epsg = static_cast<int>(*number);
   return {};
 }
 
-Result<void> SetFormat(const std::optional<std::string>& text, GridFormat& format) {
+Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& format) {
   constexpr std::pair<std::string_view, GridFormat> kFormats[] = {{"f32", GridFormat::kF32},
                                                                   {"r16", GridFormat::kR16},
                                                                   {"geotiff", GridFormat::kGeoTiff},
@@ -106,16 +106,16 @@ Result<void> SetFormat(const std::optional<std::string>& text, GridFormat& forma
     format = value;
     return {};
   }
-  return Invalid("format must be f32, r16, geotiff, png16 or json");
+  return InvalidGrid("format must be f32, r16, geotiff, png16 or json");
 }
 
 Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
   if (!text) return {};
-  const auto numbers = NumbersOf<2>(*text);
+  const auto numbers = GridNumbersOf<2>(*text);
   if (!numbers || (*numbers)[0] >= (*numbers)[1])
-    return Invalid("range must be two numbers of metres, the lower first");
+    return InvalidGrid("range must be two numbers of metres, the lower first");
   if (query.format == GridFormat::kF32 || query.format == GridFormat::kGeoTiff) {
-    return Invalid("range needs format=r16 or png16");
+    return InvalidGrid("range needs format=r16 or png16");
   }
   query.range = dem::HeightRange{(*numbers)[0], (*numbers)[1]};
   return {};
@@ -124,27 +124,29 @@ Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) 
 }  // namespace
 
 Result<GridQuery> ParseGrid(std::string_view text) {
-  const Result<Texts> parsed = TextsOf(text);
+  const Result<GridTexts> parsed = GridTextsOf(text);
   if (!parsed) return tl::unexpected(parsed.error());
-  const Texts& texts = *parsed;
+  const GridTexts& texts = *parsed;
   GridQuery query;
-  const auto box = texts[kBbox] ? NumbersOf<4>(*texts[kBbox]) : std::nullopt;
-  if (!box) return Invalid("bbox=west,south,east,north is needed: four numbers in units of the crs");
+  const auto box = texts[kGridBbox] ? GridNumbersOf<4>(*texts[kGridBbox]) : std::nullopt;
+  if (!box) return InvalidGrid("bbox=west,south,east,north is needed: four numbers in units of the crs");
   query.grid.west = (*box)[0], query.grid.south = (*box)[1], query.grid.east = (*box)[2], query.grid.north = (*box)[3];
-  for (const Result<void>& set : {SetSize(texts, query.grid), SetCrs(texts[kCrs], query.grid),
-                                  SetFormat(texts[kFormat], query.format), SetRange(texts[kRange], query)}) {
+  for (const Result<void>& set :
+       {SetSize(texts, query.grid), SetCrs(texts[kGridCrs], query.grid),
+        SetGridFormat(texts[kGridFormat], query.format), SetRange(texts[kGridRange], query)}) {
     if (!set) return tl::unexpected(set.error());
   }
-  if (texts[kDatum] && *texts[kDatum] != "ellipsoid" && *texts[kDatum] != "orthometric") {
-    return Invalid("datum must be ellipsoid or orthometric");
+  if (texts[kGridDatum] && *texts[kGridDatum] != "ellipsoid" && *texts[kGridDatum] != "orthometric") {
+    return InvalidGrid("datum must be ellipsoid or orthometric");
   }
-  if (texts[kDatum] && *texts[kDatum] == "orthometric") query.datum = dem::HeightDatum::kOrthometric;
-  Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(
-      {texts[kSurface], texts[kLevel], texts[kError], texts[kFraction], texts[kAtLeast], std::nullopt, std::nullopt});
+  if (texts[kGridDatum] && *texts[kGridDatum] == "orthometric") query.datum = dem::HeightDatum::kOrthometric;
+  Result<std::optional<tiler::DrawnSurface>> drawn =
+      ParseDrawn({texts[kGridSurface], texts[kGridLevel], texts[kGridError], texts[kGridFraction], texts[kGridAtLeast],
+                  std::nullopt, std::nullopt});
   if (!drawn) return tl::unexpected(drawn.error());
   query.drawn = *std::move(drawn);
   if (query.drawn && query.datum != dem::HeightDatum::kEllipsoid) {
-    return Invalid("surface=served has ellipsoidal heights alone, as tiles have");
+    return InvalidGrid("surface=served has ellipsoidal heights alone, as tiles have");
   }
   return query;
 }

@@ -19,8 +19,8 @@ namespace {
 constexpr double kLowest = -12'000, kHighest = 1'000'000;  // metres
 constexpr std::size_t kPointNumbers = 3, kRayNumbers = 6;
 
-constexpr const char* kNames[] = {"from",  "to",    "rays",     "heights", "refraction", "surface",
-                                  "level", "error", "fraction", "atleast", "format",     "compression"};
+constexpr const char* kSightNames[] = {"from",  "to",    "rays",     "heights", "refraction", "surface",
+                                       "level", "error", "fraction", "atleast", "format",     "compression"};
 enum Name {
   kFrom,
   kTo,
@@ -34,11 +34,11 @@ enum Name {
   kAtLeast,
   kFormat,
   kCompression,
-  kNameCount
+  kSightNameCount
 };
-static_assert(std::size(kNames) == kNameCount);
+static_assert(std::size(kSightNames) == kSightNameCount);
 
-tl::unexpected<Error> Unknown() {
+tl::unexpected<Error> UnknownOfSight() {
   return MakeError(ErrorCode::kInvalidArgument,
                    "unknown parameter; known are from, to, rays, heights, refraction, surface, and with surface=served "
                    "level, error, fraction, atleast, format, compression");
@@ -46,7 +46,7 @@ tl::unexpected<Error> Unknown() {
 
 // The numbers of a text with commas between them; nothing if it is anything else.
 template <std::size_t kCount>
-std::optional<std::array<double, kCount>> NumbersOf(std::string_view text) {
+std::optional<std::array<double, kCount>> SightNumbersOf(std::string_view text) {
   std::array<double, kCount> numbers{};
   for (std::size_t i = 0; i < kCount; ++i) {
     const std::size_t comma = i + 1 == kCount ? text.size() : text.find(',');
@@ -96,23 +96,23 @@ class SightParameters final : public ParameterSink {
   explicit SightParameters(std::size_t max_rays) : max_rays_(max_rays) {}
 
   Result<void> AddToName(std::string_view part) override {
-    constexpr std::size_t kLongestName = 11;
-    if (name_.size() + part.size() > kLongestName) return Unknown();
+    constexpr std::size_t kLongestSightName = 11;
+    if (name_.size() + part.size() > kLongestSightName) return UnknownOfSight();
     name_ += part;
     return {};
   }
   Result<void> EndName() override {
     const std::string name = std::exchange(name_, {});
-    const auto known = std::find(std::begin(kNames), std::end(kNames), name);
-    current_ = static_cast<Name>(known - std::begin(kNames));
+    const auto known = std::find(std::begin(kSightNames), std::end(kSightNames), name);
+    current_ = static_cast<Name>(known - std::begin(kSightNames));
     if (name == "v") return {};
-    if (known == std::end(kNames)) return Unknown();
+    if (known == std::end(kSightNames)) return UnknownOfSight();
     if (texts_[current_]) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", *known);
     texts_[current_].emplace();
     return {};
   }
   Result<void> AddToValue(std::string_view part) override {
-    if (current_ == kNameCount) return {};
+    if (current_ == kSightNameCount) return {};
     while (current_ == kRays) {
       const std::size_t bar = part.find('|');
       if (bar == std::string_view::npos) break;
@@ -131,7 +131,7 @@ class SightParameters final : public ParameterSink {
   Result<void> Add(std::string_view part) {
     std::string& text = *texts_[current_];
     if (text.size() + part.size() > HeightsParameters::kMaxItemBytes) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: an item is longer than {} bytes", kNames[current_],
+      return MakeError(ErrorCode::kInvalidArgument, "{}: an item is longer than {} bytes", kSightNames[current_],
                        HeightsParameters::kMaxItemBytes);
     }
     text += part;
@@ -140,7 +140,7 @@ class SightParameters final : public ParameterSink {
   Result<void> EndRay() {
     if (rays_.size() == max_rays_) return TooManyRays();
     const std::string item = fmt::format("rays: item {}", rays_.size() + 1);
-    const auto numbers = NumbersOf<kRayNumbers>(*texts_[kRays]);
+    const auto numbers = SightNumbersOf<kRayNumbers>(*texts_[kRays]);
     if (!numbers) {
       return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height,latitude,longitude,height\"",
                        item);
@@ -158,13 +158,13 @@ class SightParameters final : public ParameterSink {
 
   const std::size_t max_rays_;
   std::string name_;
-  Name current_ = kNameCount;
-  std::array<std::optional<std::string>, kNameCount> texts_;
+  Name current_ = kSightNameCount;
+  std::array<std::optional<std::string>, kSightNameCount> texts_;
   std::vector<dem::SightRay> rays_;
 };
 
-Result<std::vector<dem::SightRay>> ParseBinary(std::string_view body, std::size_t max_rays,
-                                               const std::stop_token& stop) {
+Result<std::vector<dem::SightRay>> ParseBinaryRays(std::string_view body, std::size_t max_rays,
+                                                   const std::stop_token& stop) {
   constexpr std::size_t kRayBytes = kRayNumbers * sizeof(double), kStopPeriod = 4096;
   if (body.empty() || body.size() % kRayBytes != 0) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -198,9 +198,9 @@ Result<std::vector<dem::SightRay>> ParseBinary(std::string_view body, std::size_
 Result<std::vector<dem::SightRay>> ParseEnds(const SightParameters& parameters) {
   std::array<dem::SightPoint, 2> ends{};
   for (const Name name : {kFrom, kTo}) {
-    const auto numbers = NumbersOf<kPointNumbers>(*parameters.text(name));
+    const auto numbers = SightNumbersOf<kPointNumbers>(*parameters.text(name));
     if (!numbers) {
-      return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height\"", kNames[name]);
+      return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height\"", kSightNames[name]);
     }
     ends[name == kFrom ? 0 : 1] = LatitudeFirst(numbers->data());
   }
@@ -214,7 +214,7 @@ Result<std::vector<dem::SightRay>> ParseRays(SightParameters& parameters, const 
                                              std::size_t max_rays, const std::stop_token& stop) {
   const bool has_ends = parameters.text(kFrom) || parameters.text(kTo), has_list = parameters.text(kRays).has_value();
   if (IsBinaryBody(input.content_type)) {
-    if (!has_ends && !has_list) return ParseBinary(input.body, max_rays, stop);
+    if (!has_ends && !has_list) return ParseBinaryRays(input.body, max_rays, stop);
     return MakeError(ErrorCode::kInvalidArgument, "from, to and rays exclude a body of rays");
   }
   if (has_list && !has_ends) return parameters.TakeRays();

@@ -1,6 +1,8 @@
 // Lines of sight against a march along each ray in steps of a tenth of a pixel.
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstdlib>
 #include <limits>
 #include <random>
 
@@ -77,6 +79,12 @@ std::vector<SightRay> RaysIn(const DemSource& source, const Region& area, std::s
   return rays;
 }
 
+// TERRACE_LONG_TESTS=1 takes ten times as many rays.
+std::size_t Rays(std::size_t count) {
+  const char* const is_long = std::getenv("TERRACE_LONG_TESTS");
+  return is_long != nullptr && *is_long == '1' ? 10 * count : count;
+}
+
 void ExpectAsMarched(const DemSource& source, const Region& area, std::size_t count, const SightOptions& options = {}) {
   const std::vector<SightRay> rays = RaysIn(source, area, count, 7);
   const auto answers = source.LookAlong(rays, options);
@@ -106,6 +114,7 @@ void ExpectAsMarched(const DemSource& source, const Region& area, std::size_t co
     ASSERT_TRUE(answer.blocked_at);
     EXPECT_LE(*answer.blocked_at * length_m, marched[i].blocked_at * length_m + 1e-3) << i;
   }
+  std::printf("%zu rays, %zu blocked, %zu within 1 cm\n", count, blocked, close);
   EXPECT_GT(blocked, count / 10);
   EXPECT_LT(blocked, count - count / 10);
   EXPECT_LT(close, count / 50);
@@ -124,7 +133,7 @@ TEST(Sight, IsThatOfAMarchOverHillsAndAHole) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Hills()));
   ASSERT_TRUE(source);
-  ExpectAsMarched(*source, {10.02, 45.42, 10.68, 45.98, .06, 8}, 600);
+  ExpectAsMarched(*source, {10.02, 45.42, 10.68, 45.98, .06, 8}, Rays(600));
 }
 
 TEST(Sight, IsThatOfAMarchOverRealMountains) {
@@ -133,14 +142,14 @@ TEST(Sight, IsThatOfAMarchOverRealMountains) {
   options.source.vertical = "egm96";
   const auto source = OpenOrFail(path, options);
   ASSERT_TRUE(source);
-  ExpectAsMarched(*source, {8.05, 46.05, 8.95, 46.95, .06, 7}, 1000, {.refraction = 0.13});
+  ExpectAsMarched(*source, {8.05, 46.05, 8.95, 46.95, .06, 7}, Rays(1000), {.refraction = 0.13});
 }
 
 TEST(Sight, IsThatOfAMarchOverAProjectedRaster) {
   TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
   const auto source = OpenOrFail(path);
   ASSERT_TRUE(source);
-  ExpectAsMarched(*source, {-118.35, 34.25, -118.05, 34.36, .03, 3}, 800);
+  ExpectAsMarched(*source, {-118.35, 34.25, -118.05, 34.36, .03, 3}, Rays(800));
 }
 
 TEST(Sight, IsThatOfAMarchOverAMosaic) {
