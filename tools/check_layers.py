@@ -59,7 +59,8 @@ MODULES = {
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
-    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive"],
+    "bake/queue": ["engine/core", "redis"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive", "bake/queue"],
     "redis": ["engine/core"],
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
@@ -77,7 +78,7 @@ MODULES = {
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli/bake": ENGINE + ["bake", "server/cli/common"],
+    "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/cli/common"],
     "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
