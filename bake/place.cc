@@ -347,6 +347,16 @@ bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest
   return true;
 }
 
+void LeaveEmpty(const std::string& place, const std::string& own_lock) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(place, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name != kIdentityFile && name != kPlaceIdFile && name != fmt::format("bake-{}.lock", own_lock)) return;
+  }
+  fs::remove(fs::path(place) / kPlaceIdFile, error);
+  fs::remove(fs::path(place) / kIdentityFile, error);
+}
+
 void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker) {
   const std::string own = fmt::format("bake-{}.lock", LockOfWorker(but_of_worker, job));
   const std::string ending = LockOfWorker("", job) + ".lock";

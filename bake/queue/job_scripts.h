@@ -35,8 +35,10 @@ local function remove(id, name)
 end
 )lua";
 
-// ARGV: incarnation, number of fields, fields and values, units.
+// ARGV: incarnation, number of fields, fields and values, units. A Redis that is full refuses only the first write of a
+// script, and never DEL.
 inline constexpr const char* kFill = R"lua(
+redis.call('HSET', job, 'state', 'filling')
 redis.call('DEL', job, units, dead, taken, done, errors)
 local fields = tonumber(ARGV[2])
 for i = 1, fields do redis.call('HSET', job, ARGV[1 + 2 * i], ARGV[2 + 2 * i]) end

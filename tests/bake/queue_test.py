@@ -172,16 +172,21 @@ class Queue(unittest.TestCase):
     def test_a_stopped_worker_loses_its_unit_and_comes_back(self):
         place = self.place()
         first = self.start(place)
-        line = first.stdout.readline()
-        first.send_signal(signal.SIGSTOP)
-        held = json.loads(self.status("--json"))["running"]
-        self.assertEqual(len(held), 1)
+        first.stdout.readline()
+        while True:  # until it is stopped in the middle of a unit
+            first.send_signal(signal.SIGSTOP)
+            held = json.loads(self.status("--json"))["running"]
+            unit = held[0]["unit"].split("/")[1] if held else ""
+            if unit and not (place / "units" / f"{unit}.pmtiles").exists():
+                break
+            first.send_signal(signal.SIGCONT)
+            time.sleep(0.02)
         out, _ = self.run_bake(place)  # waits for the lease, inherits, finishes
-        self.assertIn(held[0]["unit"].split("/")[1], self.baked(out))
+        self.assertIn(unit, self.baked(out))
         self.expect_equal(place)
         first.send_signal(signal.SIGCONT)
         rest, _ = self.end(first)
-        self.assertEqual(self.baked(line, rest, out), sorted(self.units + self.baked(rest)), "the inherited unit twice, no other")
+        self.assertLessEqual(set(self.baked(rest)), {unit})
         self.expect_equal(place)
 
     def test_a_slow_unit_is_not_inherited_while_its_worker_lives(self):
@@ -225,12 +230,20 @@ class Queue(unittest.TestCase):
         line = workers[0].stdout.readline()
         self.redis.lose()
         time.sleep(self.seconds / 4)
-        there = len(list((place / "units").glob("*.pmtiles")))
+        for worker in workers:
+            worker.send_signal(signal.SIGSTOP)
         self.redis.start()
-        while not self.redis("EXISTS", self.key("units")):
-            time.sleep(0.02)
-        queued = len(self.redis("XRANGE", self.key("units"), "-", "+"))
-        self.assertLess(queued, len(self.units), f"{there} files were there")
+        there = {file.stem for file in place.rglob("*.pmtiles")}
+        missing = set(self.units) - there
+        if missing:  # else the workers were quick
+            workers[1].send_signal(signal.SIGCONT)
+            while not self.redis("EXISTS", self.key("units")):
+                time.sleep(0.02)
+            workers[1].send_signal(signal.SIGSTOP)
+            queued = {entry[1][1].split("/")[1] for entry in self.redis("XRANGE", self.key("units"), "-", "+")}
+            self.assertLessEqual(queued, missing)
+        for worker in workers:
+            worker.send_signal(signal.SIGCONT)
         ends = [self.end(worker) for worker in workers]
         self.expect_equal(place)
         self.assertEqual(sorted(set(self.baked(line, *(out for out, _ in ends)))), sorted(self.units))
@@ -333,6 +346,7 @@ class Queue(unittest.TestCase):
         self.assertIn('levels "0-11", not "0-10"', errors)
         self.assertIn('extensions "octvertexnormals", not "none"', errors)
         self.assertNotIn("gzip", errors)
+        self.assertEqual(files_of(other), [], "a refused worker leaves the place to others")
         _, errors = self.run_bake(other, code=2)
         self.assertIn("place (bake-place.id)", errors)
         self.redis("HSET", self.key("job"), "program", "terrace 0.0.1")
@@ -388,7 +402,7 @@ class Queue(unittest.TestCase):
         self.expect_refusal("redis://nowhere.invalid:1/0", "host is not known", 1)
         self.expect_refusal(self.redis.url.replace("//", "//:secret@"), "has no password, but one was given", 2)
         self.expect_refusal("redis://u:secret@:6379", "has no host", 2)
-        self.expect_refusal(self.redis.url + "000000", "database", 2)
+        self.expect_refusal(self.redis.url + "99", "has no such database", 2)
         locked = self.start_redis("locked", "--requirepass", "open-sesame")
         self.expect_refusal(locked.url, "wants a password", 2)
         self.expect_refusal(locked.url.replace("//", "//:secret@"), "refuses the user or the password", 2)

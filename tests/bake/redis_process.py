@@ -115,6 +115,7 @@ def proxy(port, change):
             while data := server.recv(65536):
                 changed = change(data)
                 if changed is None:
+                    client.shutdown(socket.SHUT_RDWR)
                     return
                 client.sendall(changed)
     return Listener(play)

@@ -159,7 +159,11 @@ bool IsFinished(const std::string& place, const std::vector<bake::Target>& targe
 
 int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<bake::UnitReport>& reports) {
   const auto queue = Join(bake);
-  if (!queue) return IsFinished(bake.place, bake.targets) ? kExitOk : Fail(queue.error());
+  if (!queue) {
+    if (IsFinished(bake.place, bake.targets)) return kExitOk;
+    bake::LeaveEmpty(bake.place, bake::LockOfWorker(bake.worker, bake.arguments.job));
+    return Fail(queue.error());
+  }
   while (true) {
     std::vector<bake::UnitReport> taken;
     {

@@ -1,6 +1,7 @@
 #include "server/cli/bake/bake_run.h"
 
 #include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -319,6 +320,7 @@ int Bake(const BakeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
   const StopSignals signals;
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("terrace"));  // stdout is for --json
   spdlog::set_level(spdlog::level::warn);
   if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) {
     return cli::Fail(wrong + "\nRun 'terrace bake --help' for what is accepted.", kExitUsage);
