@@ -88,6 +88,21 @@ class Queue(unittest.TestCase):
         self.addCleanup(end)
         return process
 
+    def joined(self, place, count, **options):
+        """Workers that have all joined the job, each with a unit or about to take one."""
+        workers = []
+        for _ in range(count):
+            worker = self.start(place, lease=20, **options)
+            workers.append(worker)
+            until = time.monotonic() + 60
+            while f"-{worker.pid}-" not in str(self.redis("XINFO", "CONSUMERS", self.key("units"), "bakers")):
+                self.assertLess(time.monotonic(), until)
+                time.sleep(0.005)
+            worker.send_signal(signal.SIGSTOP)
+        for worker in workers:
+            worker.send_signal(signal.SIGCONT)
+        return workers
+
     def end(self, process, code=0):
         out, errors = process.communicate(timeout=120)
         self.assertEqual(process.returncode, code, errors)
@@ -213,7 +228,7 @@ class Queue(unittest.TestCase):
     def test_redis_that_is_killed_comes_back_from_its_aof(self):
         self.redis = self.start_redis("aof", "--appendonly", "yes", "--appendfsync", "always")
         place = self.place()
-        workers = [self.start(place) for _ in range(3)]
+        workers = self.joined(place, 3)
         line = workers[0].stdout.readline()
         self.redis.kill()
         time.sleep(self.seconds / 4)
@@ -226,7 +241,7 @@ class Queue(unittest.TestCase):
 
     def test_a_lost_redis_is_filled_with_what_is_missing(self):
         place = self.place()
-        workers = [self.start(place) for _ in range(3)]
+        workers = self.joined(place, 3)
         line = workers[0].stdout.readline()
         self.redis.lose()
         time.sleep(self.seconds / 4)
@@ -237,7 +252,9 @@ class Queue(unittest.TestCase):
         missing = set(self.units) - there
         if missing:  # else the workers were quick
             workers[1].send_signal(signal.SIGCONT)
+            until = time.monotonic() + 60
             while not self.redis("EXISTS", self.key("units")):
+                self.assertLess(time.monotonic(), until)
                 time.sleep(0.02)
             workers[1].send_signal(signal.SIGSTOP)
             queued = {entry[1][1].split("/")[1] for entry in self.redis("XRANGE", self.key("units"), "-", "+")}
@@ -251,7 +268,7 @@ class Queue(unittest.TestCase):
     def test_an_emptied_redis_is_filled_again(self):
         for command in (("FLUSHALL",), ("DEL", self.key("units")), ("XGROUP", "DESTROY", self.key("units"), "bakers")):
             place = self.place(command[0])
-            workers = [self.start(place) for _ in range(2)]
+            workers = self.joined(place, 2)
             workers[0].stdout.readline()
             self.redis(*command)
             for worker in workers:
@@ -261,7 +278,7 @@ class Queue(unittest.TestCase):
     def test_units_that_cannot_be_baked_are_listed(self):
         config = self.make_sources("poisoned")
         place = self.place()
-        workers = [self.start(place, config=config) for _ in range(2)]
+        workers = self.joined(place, 2, config=config)
         lines = [worker.stdout.readline() for worker in workers]
         for worker in workers:
             worker.send_signal(signal.SIGSTOP)
