@@ -57,7 +57,8 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 Result<std::string> PlaceId(const std::string& place);
 // Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted.
 bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
-// Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was refused.
+// Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
+// refused.
 void LeaveEmpty(const std::string& place, const std::string& own_lock);
 // The name of a worker's lock for PlaceLock::Take: the workers of one job exclude all but one another.
 std::string LockOfWorker(const std::string& worker, const std::string& job);

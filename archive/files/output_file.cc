@@ -35,8 +35,8 @@ Result<void> WriteAll(int descriptor, std::string_view bytes, const std::string&
   return {};
 }
 
-// A new file beside `path`, and its name. Bakers that share a place may write one file at the same time: none may rename
-// or truncate what another is still writing. Below 0: errno says why.
+// A new file beside `path`, and its name. Bakers that share a place may write one file at the same time: none may
+// rename or truncate what another is still writing. Below 0: errno says why.
 std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
   while (true) {
     std::string name = fmt::format("{}.{:08x}{}", path, std::random_device()(), kPartial);
