@@ -11,7 +11,6 @@
 #include <thread>
 #include <utility>
 
-#include "archive/tile_writer.h"
 #include "bake/copy_unit.h"
 #include "bake/order.h"
 #include "bake/unit_key.h"
@@ -145,12 +144,12 @@ class Run {
       if (HasReport(index, target)) continue;
       const Target& to = targets_[target];
       const std::uint64_t key = UnitKey(dataset_, to.manifest, of.unit);
-      if (TakeFinished(index, target, key)) continue;
+      if (!to.create && TakeFinished(index, target, key)) continue;
       if (options_.only_verify) {
         Report(index, {target, {of.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
         continue;
       }
-      auto writer = archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
+      auto writer = to.create ? to.create() : archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
       if (!writer) {
         unit->outputs.push_back({target, key});
         unit->error = writer.error();
@@ -207,7 +206,12 @@ class Run {
   Result<void> BakeTile(OpenUnit& unit, const geo::TileKey& key) {
     std::optional<dem::HeightRange> range;
     for (OpenUnit::Output& output : unit.outputs) {
-      const tiler::TileRequest request = RequestOf(targets_[output.target].manifest, key);
+      const Target& to = targets_[output.target];
+      const tiler::TileRequest request = RequestOf(to.manifest, key);
+      if (to.has && to.has(request)) {
+        ++counters_.passed;
+        continue;
+      }
       const Result<tiler::EncodedTile> tile = pipeline_.Build(request, options_.stop);
       if (!tile) return tl::unexpected(tile.error());
       if (!range) {
