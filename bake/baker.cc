@@ -181,7 +181,10 @@ class Run {
     const Target& to = targets_[target];
     const std::string& name = plan_.units[index].unit.name;
     UnitOutcome outcome = UnitOutcome::kKept;
-    auto summary = archive::VerifyUnit(to.place, name, key);
+    auto summary = archive::VerifyUnit(to.place, name, {to.manifest.kind, key});
+    if (summary && summary->tiles != CountTiles(plan_.units[index].unit.tiles)) {
+      summary = MakeError(ErrorCode::kInvalidArgument, "the file lacks tiles");
+    }
     const auto old = to.old_units.find(name);
     if (!summary && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
       outcome = UnitOutcome::kCopied;
