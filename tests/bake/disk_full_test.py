@@ -24,6 +24,11 @@ def mount_small_disk(path, size):
     return libc.mount(b"tmpfs", str(path).encode(), b"tmpfs", 0, f"size={size}".encode()) == 0
 
 
+def unmount(path):
+    detach = 2
+    ctypes.CDLL(None).umount2(str(path).encode(), detach)
+
+
 class DiskFull(unittest.TestCase):
     def test_full_for_a_while_the_files_are_the_same(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -45,29 +50,32 @@ class DiskFull(unittest.TestCase):
             # Files wait in a spool beside them, so that there must be room for the largest twice.
             if not mount_small_disk(disk, 4 * bytes_needed):
                 raise unittest.SkipTest("SKIPPED: mounting needs CAP_SYS_ADMIN")
-            for out, form in ((disk / "out", "chunks"), (disk / "out.3tz", "3tz")):
-                ballast = disk / "ballast"
-                with open(ballast, "wb") as file:
-                    free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize
-                    file.write(bytes(max(0, free - bytes_needed // 3)))
-                full = subprocess.run(command(out, form), capture_output=True, text=True)
-                self.assertEqual(full.returncode, 1, full.stderr)
-                self.assertIn("No space left on device", full.stderr)
-                self.assertFalse((out / "manifest.json").exists())
-                # Now it is freed in mid-bake.
-                process = subprocess.Popen(command(out, form), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-                time.sleep(0.7)
-                ballast.unlink()
-                _, errors = process.communicate()
-                if process.returncode != 0:  # a unit failed three times before
-                    again = subprocess.run(command(out, form), capture_output=True, text=True)
-                    self.assertEqual(again.returncode, 0, (errors, again.stderr))
-                if form == "3tz":
-                    self.assertEqual(out.read_bytes(), (scratch / "reference.3tz").read_bytes())
-                    continue
-                names = sorted(path.relative_to(reference).as_posix() for path in reference.rglob("*") if path.is_file())
-                self.assertEqual(sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()), names)
-                self.assertEqual(filecmp.cmpfiles(reference, out, names, shallow=False)[1:], ([], []))
+            try:
+                for out, form in ((disk / "out", "chunks"), (disk / "out.3tz", "3tz")):
+                    ballast = disk / "ballast"
+                    with open(ballast, "wb") as file:
+                        free = os.statvfs(disk).f_bavail * os.statvfs(disk).f_frsize
+                        file.write(bytes(max(0, free - bytes_needed // 3)))
+                    full = subprocess.run(command(out, form), capture_output=True, text=True)
+                    self.assertEqual(full.returncode, 1, full.stderr)
+                    self.assertIn("No space left on device", full.stderr)
+                    self.assertFalse((out / "manifest.json").exists())
+                    # Now it is freed in mid-bake.
+                    process = subprocess.Popen(command(out, form), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                    time.sleep(0.7)
+                    ballast.unlink()
+                    _, errors = process.communicate()
+                    if process.returncode != 0:  # a unit failed three times before
+                        again = subprocess.run(command(out, form), capture_output=True, text=True)
+                        self.assertEqual(again.returncode, 0, (errors, again.stderr))
+                    if form == "3tz":
+                        self.assertEqual(out.read_bytes(), (scratch / "reference.3tz").read_bytes())
+                        continue
+                    names = sorted(path.relative_to(reference).as_posix() for path in reference.rglob("*") if path.is_file())
+                    self.assertEqual(sorted(path.relative_to(out).as_posix() for path in out.rglob("*") if path.is_file()), names)
+                    self.assertEqual(filecmp.cmpfiles(reference, out, names, shallow=False)[1:], ([], []))
+            finally:
+                unmount(disk)
 
 
 if __name__ == "__main__":

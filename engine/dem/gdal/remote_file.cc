@@ -47,13 +47,14 @@ Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
   ForgetGdalError();
   VSICurlPartialClearCache(path.c_str());
   VSIStatBufL status{};
-  VSIErrorReset();
-  constexpr int kFlags = VSI_STAT_EXISTS_FLAG | VSI_STAT_NATURE_FLAG | VSI_STAT_SIZE_FLAG | VSI_STAT_SET_ERROR_FLAG;
-  if (VSIStatExL(path.c_str(), &status, kFlags) != 0) {
-    if (IsAbsence(VSIGetLastErrorNo(), VSIGetLastErrorMsg())) {
-      return MakeError(ErrorCode::kNotFound, "{} is not there", path);
-    }
-    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up now: {}", path, VSIGetLastErrorMsg());
+  if (VSIStatL(path.c_str(), &status) != 0) {
+    // Only opening states why, and not what GDAL remembers.
+    VSICurlPartialClearCache(path.c_str());
+    VSIErrorReset();
+    if (VSILFILE* const there = VSIFOpenExL(path.c_str(), "rb", /*bSetError=*/TRUE)) VSIFCloseL(there);
+    const std::string why = VSIGetLastErrorMsg();
+    if (IsAbsence(VSIGetLastErrorNo(), why)) return MakeError(ErrorCode::kNotFound, "{} is not there", path);
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up now: {}", path, why);
   }
   VSILFILE* const file = VSIFOpenL(path.c_str(), "rb");
   if (file == nullptr) {
