@@ -3,6 +3,7 @@ import collections
 import http.client
 import json
 import pathlib
+import random
 import re
 import subprocess
 import sys
@@ -124,7 +125,10 @@ class SeedCache(unittest.TestCase):
 
     def test_refusals(self):
         config, cache = self.config("cache", tile_bytes=16 << 20)
-        full = self.seed(config, cache, "--codings", "identity,gzip,br,zstd", levels=11)
+        noise = self.scratch / "N10E010.hgt"  # of which tiles are large
+        noise.write_bytes(bytes(byte & 7 if i % 2 == 0 else byte for i, byte in enumerate(random.Random(28).randbytes(2 * 1201 * 1201))))
+        config.write_text(config.read_text().replace("N46E007", noise.stem))
+        full = self.seed(config, cache, "--error", "1", levels=11)
         self.assertEqual(full.returncode, 1, full.stderr)
         self.assertIn("raise disk_cache.tile_bytes", full.stderr)
         config, cache = self.config("large", tile_bytes=0)
