@@ -12,6 +12,7 @@
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
 #include "engine/dem/gdal/remote_file.h"
+#include "tiler/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {
@@ -28,7 +29,7 @@ class ArchiveBase : public Archive {
 
   Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const override {
     const bool is_mercator = manifest_.kind.format == tiler::TileFormat::kHeightPng;
-    if (!IsInScheme(key, is_mercator) || key.level < manifest_.min_level || key.level > manifest_.max_level) {
+    if (!tiler::IsInScheme(key, is_mercator) || key.level < manifest_.min_level || key.level > manifest_.max_level) {
       return std::nullopt;
     }
     const Result<FilePtr> file = FileOf(key);

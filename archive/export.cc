@@ -9,7 +9,9 @@
 
 #include "archive/documents.h"
 #include "archive/files/output_file.h"
+#include "archive/files/zip_writer.h"
 #include "archive/pmtiles/pmtiles_writer.h"
+#include "archive/static_tileset.h"
 #include "archive/tile_scheme.h"
 #include "engine/geo/mercator_grid.h"
 
@@ -91,13 +93,16 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
 
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop) {
   const Manifest& manifest = archive.manifest();
-  if (manifest.kind.format == tiler::TileFormat::kGlb) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "GLB tiles have no folder form; bake chunks, and serve them with 'terrace serve'");
-  }
   if (Result<void> is_free = CheckFree(out); !is_free) return is_free;
   const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
   PartialFolder folder(out);
+  if (manifest.kind.format == tiler::TileFormat::kGlb) {
+    const auto take = [&](const std::string& path, std::string_view bytes, bool) {
+      return WriteUnsynced(folder.partial() + "/" + path, bytes);
+    };
+    if (Result<void> copied = ForEachFileOfTileset(archive, /*has_versions=*/true, take, stop); !copied) return copied;
+    return folder.Finish();
+  }
   const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     const std::string path =
@@ -109,6 +114,19 @@ Result<void> WriteFolder(const Archive& archive, const std::string& out, const s
                                              : WriteText(folder.partial() + "/layer.json", LayerJson(manifest));
   if (!described) return described;
   return folder.Finish();
+}
+
+Result<void> Write3tz(const Archive& archive, const std::string& out, const std::stop_token& stop) {
+  if (archive.manifest().kind.format != tiler::TileFormat::kGlb) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: a 3TZ file holds 3D Tiles; bake it with --format glb", out);
+  }
+  Result<ZipWriter> zip = ZipWriter::Create(out);
+  if (!zip) return tl::unexpected(std::move(zip.error()));
+  const auto take = [&](const std::string& path, std::string_view bytes, bool is_gzip) {
+    return is_gzip ? zip->AddGzip(path, bytes) : zip->Add(path, bytes);
+  };
+  if (Result<void> copied = ForEachFileOfTileset(archive, /*has_versions=*/false, take, stop); !copied) return copied;
+  return zip->Finish();
 }
 
 }  // namespace terrace::archive

@@ -13,8 +13,12 @@ namespace terrace::archive {
 // One PMTiles file with all tiles; Archive::Open reads it.
 Result<void> WriteSingle(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
-// A folder for static hosts: {z}/{x}/{y}.terrain with layer.json, or {z}/{x}/{y}.png with tiles.json. kInvalidArgument:
-// `out` exists and is not empty, or these are GLB tiles.
+// A folder for static hosts: {z}/{x}/{y}.terrain with layer.json, {z}/{x}/{y}.png with tiles.json, or tileset.json with
+// subtrees and GLB tiles in 3dtiles/. kInvalidArgument: `out` exists and is not empty.
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
+
+// One 3TZ file: a zip file with the same files as the folder of GLB tiles, but URLs without versions, and an index.
+// Compressed tiles are deflated entries. kInvalidArgument: these are no GLB tiles.
+Result<void> Write3tz(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
 }  // namespace terrace::archive

@@ -28,9 +28,11 @@ Result<Manifest> ReadSingle(const std::string& path) {
 }  // namespace
 
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
-  Result<OutputFile> out = OutputFile::Create(place + "/" + kManifestFile);
+  const std::string path = place + "/" + kManifestFile, json = ToJson(manifest);
+  if (const Result<std::string> there = ReadFile(path, kMaxManifestBytes); there && *there == json) return {};
+  Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));
-  if (Result<void> written = out->Write(ToJson(manifest)); !written) return written;
+  if (Result<void> written = out->Write(json); !written) return written;
   return out->Finish();
 }
 

@@ -3,36 +3,19 @@
 #include <fmt/format.h>
 
 #include <charconv>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "archive/manifest.h"
 #include "archive/manifest_json.h"
-#include "engine/geo/mercator_grid.h"
 #include "proto/documents/tile_json.h"
+#include "tiler/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-dem::GeoBounds BoundsOf(const geo::TileKey& key, bool is_mercator) {
-  const auto x = static_cast<double>(key.x), y = static_cast<double>(key.y);
-  if (!is_mercator) {
-    const double side = std::ldexp(180, -key.level);
-    return {x * side - 180, y * side - 90, (x + 1) * side - 180, (y + 1) * side - 90};
-  }
-  const double share = std::ldexp(1, -key.level);
-  return {x * share * 360 - 180, geo::MercatorLatitude((y + 1) * share), (x + 1) * share * 360 - 180,
-          geo::MercatorLatitude(y * share)};
-}
-
 }  // namespace
-
-bool IsInScheme(const geo::TileKey& key, bool is_mercator) {
-  if (!geo::IsValid(key)) return false;
-  return !is_mercator || key.x < geo::TileRows(key.level);
-}
 
 PmtilesKey PmtilesKeyOf(const geo::TileKey& key, bool is_mercator) {
   return {key.level + (is_mercator ? 0 : 1), static_cast<std::uint64_t>(key.x), static_cast<std::uint64_t>(key.y)};
@@ -43,7 +26,7 @@ std::optional<geo::TileKey> TileKeyOf(std::uint64_t tile_id, bool is_mercator) {
   if (!found) return std::nullopt;
   const geo::TileKey key{found->zoom - (is_mercator ? 0 : 1), static_cast<std::int64_t>(found->x),
                          static_cast<std::int64_t>(found->y)};
-  if (!IsInScheme(key, is_mercator)) return std::nullopt;
+  if (!tiler::IsInScheme(key, is_mercator)) return std::nullopt;
   return key;
 }
 
@@ -58,9 +41,9 @@ Result<PmtilesOptions> PmtilesOptionsOf(const tiler::TileRequest& kind, const st
   }
   if (is_mercator) options.type = PmtilesType::kPng;
   if (root) {
-    options.bounds = BoundsOf(*root, is_mercator);
+    options.bounds = tiler::TileBounds(*root, is_mercator);
   } else if (is_mercator) {
-    options.bounds = BoundsOf({0, 0, 0}, is_mercator);
+    options.bounds = tiler::TileBounds({0, 0, 0}, is_mercator);
   }
   return options;
 }

@@ -14,11 +14,8 @@
 
 namespace terrace::archive {
 
-// Whether the scheme has such a tile: TMS geodetic, or Web Mercator's XYZ.
-bool IsInScheme(const geo::TileKey& key, bool is_mercator);
-
 // A geodetic level has two roots and is as wide as the next level of PMTiles: level z lies at z + 1, columns and rows
-// keep their numbers. Precondition: IsInScheme.
+// keep their numbers. Precondition: tiler::IsInScheme.
 PmtilesKey PmtilesKeyOf(const geo::TileKey& key, bool is_mercator);
 // Nothing: there is no such tile.
 std::optional<geo::TileKey> TileKeyOf(std::uint64_t tile_id, bool is_mercator);

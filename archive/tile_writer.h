@@ -50,8 +50,9 @@ struct UnitOptions {
 Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const std::string& name,
                                                const UnitOptions& options);
 
-// Reads a finished file in full: every checksum, and whether it has this key. For going on with a bake. kNotFound: no
-// file. kInvalidArgument: another key, or damaged: bake it again.
-Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, std::uint64_t key);
+// Reads a finished file in full: every checksum, whether its tiles belong to the unit, and whether header and metadata
+// are those that a writer with these options writes. For going on with a bake. kNotFound: no file. kInvalidArgument:
+// another bake's, or damaged: bake it again.
+Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
 
 }  // namespace terrace::archive

@@ -1,16 +1,18 @@
 #include <fmt/format.h>
-#include <xxhash.h>
 
 #include <algorithm>
 #include <memory>
-#include <new>
+#include <optional>
 #include <utility>
 
 #include "archive/files/input_file.h"
+#include "archive/pmtiles/directory.h"
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/tile_scheme.h"
 #include "archive/tile_writer.h"
+#include "engine/dem/common/content_hash.h"
+#include "tiler/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {
@@ -22,7 +24,7 @@ class UnitWriter final : public TileWriter {
 
   Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange& range) override {
     const bool is_mercator = options_.kind.format == tiler::TileFormat::kHeightPng;
-    if (!IsInScheme(key, is_mercator) || UnitNameOf(key) != name_) {
+    if (!tiler::IsInScheme(key, is_mercator) || UnitNameOf(key) != name_) {
       return MakeError(ErrorCode::kInvalidArgument, "tile {} does not belong to unit {}", geo::ToString(key), name_);
     }
     return writer_.Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile, range);
@@ -36,20 +38,28 @@ class UnitWriter final : public TileWriter {
   PmtilesWriter writer_;
 };
 
+// Whether the parts of a header that do not depend on the tiles are those of a file with these options.
+bool IsHeaderOf(const PmtilesHeader& header, const PmtilesOptions& options) {
+  PmtilesHeader rounded;  // as bounds are written
+  rounded.bounds = options.bounds;
+  const std::string as_written = EncodeHeader(rounded);
+  rounded.bounds = header.bounds;
+  return header.type == options.type && header.tile_compression == options.compression &&
+         EncodeHeader(rounded) == as_written;
+}
+
 Result<std::string> HashOfFile(const std::string& path) {
   constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
   const Result<std::unique_ptr<const InputFile>> file = InputFile::Open(path);
   if (!file) return tl::unexpected(file.error());
-  const std::unique_ptr<XXH3_state_t, decltype(&XXH3_freeState)> state(XXH3_createState(), XXH3_freeState);
-  if (state == nullptr) throw std::bad_alloc();
-  XXH3_128bits_reset(state.get());
+  dem::ContentHasher hasher;
   for (std::uint64_t at = 0; at < (*file)->size(); at += kPiece) {
     const Result<std::string> bytes = (*file)->Read(at, std::min(kPiece, (*file)->size() - at));
     if (!bytes) return tl::unexpected(bytes.error());
-    XXH3_128bits_update(state.get(), bytes->data(), bytes->size());
+    hasher.AddBytes(bytes->data(), bytes->size());
   }
-  const XXH128_hash_t hash = XXH3_128bits_digest(state.get());
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  const dem::ContentHash hash = hasher.Hash();
+  return fmt::format("{:016x}{:016x}", hash.high, hash.low);
 }
 
 }  // namespace
@@ -65,7 +75,7 @@ Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const s
   return std::make_unique<UnitWriter>(name, options, *std::move(writer));
 }
 
-Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, std::uint64_t key) {
+Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {
   const std::string path = place + "/" + UnitPath(name);
   const auto as_damaged = [](Error error) {
     if (error.code == ErrorCode::kUnavailable) error.code = ErrorCode::kInvalidArgument;
@@ -73,11 +83,20 @@ Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name
   };
   const Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path);
   if (!file) return as_damaged(file.error());
-  if (UnitKeyIn((*file)->metadata()) != key) {
+  const Result<std::optional<geo::TileKey>> root = UnitRoot(name);
+  if (!root) return tl::unexpected(root.error());
+  const Result<PmtilesOptions> wanted = PmtilesOptionsOf(options.kind, *root);
+  if (!wanted) return tl::unexpected(wanted.error());
+  if ((*file)->metadata() != UnitMetadata(options.kind, options.key) || !IsHeaderOf((*file)->header(), *wanted)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} was baked from other sources or with other options", path);
   }
+  const bool is_mercator = options.kind.format == tiler::TileFormat::kHeightPng;
   UnitSummary summary;
-  const Result<void> read = (*file)->ForEach([&](std::uint64_t, const CheckedTile&) -> Result<void> {
+  const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const CheckedTile&) -> Result<void> {
+    const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
+    if (!key || UnitNameOf(*key) != name) {
+      return MakeError(ErrorCode::kInvalidArgument, "{} has a tile of another unit", path);
+    }
     ++summary.tiles;
     return {};
   });

@@ -11,7 +11,6 @@
 #include <thread>
 #include <utility>
 
-#include "archive/tile_writer.h"
 #include "bake/copy_unit.h"
 #include "bake/order.h"
 #include "bake/queue/local_queue.h"
@@ -149,12 +148,12 @@ class Run {
       if (HasReport(index, target)) continue;
       const Target& to = targets_[target];
       const std::uint64_t key = UnitKey(dataset_, to.manifest, of.unit);
-      if (TakeFinished(index, target, key)) continue;
+      if (!to.create && TakeFinished(index, target, key)) continue;
       if (options_.only_verify) {
         Report(index, {target, {of.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
         continue;
       }
-      auto writer = archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
+      auto writer = to.create ? to.create() : archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
       if (!writer) {
         unit->outputs.push_back({target, key});
         unit->error = writer.error();
@@ -189,7 +188,10 @@ class Run {
     const Target& to = targets_[target];
     const std::string& name = plan_.units[index].unit.name;
     UnitOutcome outcome = UnitOutcome::kKept;
-    auto summary = archive::VerifyUnit(to.place, name, key);
+    auto summary = archive::VerifyUnit(to.place, name, {to.manifest.kind, key});
+    if (summary && summary->tiles != CountTiles(plan_.units[index].unit.tiles)) {
+      summary = MakeError(ErrorCode::kInvalidArgument, "the file lacks tiles");
+    }
     const auto old = to.old_units.find(name);
     if (!summary && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
       outcome = UnitOutcome::kCopied;
@@ -214,7 +216,12 @@ class Run {
   Result<void> BakeTile(OpenUnit& unit, const geo::TileKey& key) {
     std::optional<dem::HeightRange> range;
     for (OpenUnit::Output& output : unit.outputs) {
-      const tiler::TileRequest request = RequestOf(targets_[output.target].manifest, key);
+      const Target& to = targets_[output.target];
+      const tiler::TileRequest request = RequestOf(to.manifest, key);
+      if (to.has && to.has(request)) {
+        ++counters_.passed;
+        continue;
+      }
       const Result<tiler::EncodedTile> tile = pipeline_.Build(request, options_.stop);
       if (!tile) return tl::unexpected(tile.error());
       if (!range) {

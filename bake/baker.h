@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "archive/manifest.h"
+#include "archive/tile_writer.h"
 #include "bake/queue/unit_queue.h"
 #include "bake/units.h"
 #include "engine/core/result.h"
@@ -26,6 +27,10 @@ struct Target {
   // The archive that units with equal keys are taken from; its folder and its units by name.
   std::string old_place = {};
   std::map<std::string, archive::UnitEntry> old_units = {};
+  // Instead of a place: where the tiles go. `create` makes the writer of a unit, which is called by one thread at a
+  // time; tiles that `has` names are there already and are not built. Both empty: files in `place`.
+  std::function<Result<std::unique_ptr<archive::TileWriter>>()> create = {};
+  std::function<bool(const tiler::TileRequest&)> has = {};
 };
 
 // One process of several that share a bake.

@@ -12,6 +12,7 @@
 #include <memory>
 #include <new>
 
+#include "engine/core/bytes.h"
 #include "engine/core/check.h"
 
 namespace terrace::proto {
@@ -147,5 +148,19 @@ std::string Zstd(std::string_view bytes, int level, const std::stop_token& stop)
 std::string Zlib(std::string_view bytes, int level) {
   return CompressWith(libdeflate_zlib_compress_bound, libdeflate_zlib_compress, bytes, level);
 }
+
+std::optional<GzipMember> SplitGzip(std::string_view gzip) {
+  constexpr std::size_t kHead = 10, kTail = 8;
+  constexpr std::string_view kMagic("\x1f\x8b\x08\x00", 4);  // deflate, no optional fields
+  if (gzip.size() < kHead + kTail || !gzip.starts_with(kMagic)) return std::nullopt;
+  ByteReader tail(gzip.substr(gzip.size() - kTail));
+  GzipMember member;
+  member.deflated = gzip.substr(kHead, gzip.size() - kHead - kTail);
+  member.crc32 = tail.Get<std::uint32_t>();
+  member.size = tail.Get<std::uint32_t>();
+  return member;
+}
+
+std::uint32_t Crc32(std::string_view bytes) { return libdeflate_crc32(0, bytes.data(), bytes.size()); }
 
 }  // namespace terrace::proto

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -26,6 +27,17 @@ std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop
 // Decompresses one member of gzip; its checksum must be right. Nothing: it is damaged, something follows it, or it is
 // larger than `max_bytes`. Accepts any bytes. Thread-safe.
 std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes);
+
+// A member of gzip as what other formats hold: the deflated bytes, and the CRC-32 and length of what they decompress to.
+struct GzipMember {
+  std::string_view deflated;  // within the member
+  std::uint32_t crc32 = 0, size = 0;
+};
+// Nothing: not what Gzip wrote. Does not decompress, and so does not check.
+std::optional<GzipMember> SplitGzip(std::string_view gzip);
+
+// CRC-32 as in gzip and zip. Thread-safe.
+std::uint32_t Crc32(std::string_view bytes);
 
 // RFC 7932 brotli. Thread-safe. Precondition: 2 <= quality <= 9. From 5 on it takes twice the time of 4 and saves a
 // thousandth.

@@ -11,6 +11,7 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
+#include "server/reply_record.h"
 
 namespace terrace::server {
 namespace {
@@ -106,18 +107,9 @@ class AdminApplication::Handler final : public ConnectionHandler {
   }
 
   void Report(const SentReply& reply) override {
-    ReplyRecord record;
-    record.method = reply.request.method_name;
-    record.target = reply.request.target;
-    record.status = reply.response.status;
-    record.body_bytes = reply.body_bytes;
-    record.duration = reply.duration;
+    ReplyRecord record = RecordOf(reply);
     record.route = "admin";
     record.cache = "-";
-    record.version = reply.request.version;
-    record.request_id = reply.request.id;
-    record.peer = reply.peer;
-    record.user_agent = reply.request.fields->user_agent;
     parts_.metrics.CountReply(record);
     parts_.access_log.Write(record);
   }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "server/http/http_error.h"
+#include "server/reply_record.h"
 #include "server/routes.h"
 
 namespace terrace::server {
@@ -138,22 +139,7 @@ asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handle
 }
 
 void TerrainApplication::Handler::Report(const SentReply& reply) {
-  const Request& request = reply.request;
-  const Response& response = reply.response;
-  ReplyRecord record;
-  record.method = request.method_name;
-  record.target = request.target;
-  record.status = response.status;
-  record.body_bytes = reply.body_bytes;
-  record.duration = reply.duration;
-  record.route = response.labels.route;
-  record.dataset = response.labels.subject;
-  record.cache = response.labels.cache;
-  record.version = request.version;
-  record.referer = request.fields->referer;
-  record.user_agent = request.fields->user_agent;
-  record.request_id = request.id;
-  record.peer = reply.peer;
+  ReplyRecord record = RecordOf(reply);
   if (reply.is_admitted && client_.address != peer_.address) record.client = client_.text;
   if (reply.is_admitted && context_.grant) record.token_name = context_.grant->name;
   application_.parts_.metrics.CountReply(record);

@@ -7,6 +7,7 @@
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/http/text.h"
+#include "tiler/tile_bounds.h"
 
 namespace terrace::server {
 namespace {
@@ -28,16 +29,11 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
 // One tile has one URL.
 std::optional<std::int64_t> TileNumber(std::string_view text) { return PlainDecimal(text, /*max_digits=*/9); }
 
-// Web Mercator has one root, TMS geodetic two side by side.
-bool IsInScheme(const geo::TileKey& key, bool is_mercator) {
-  return geo::IsValid(key) && (!is_mercator || key.x < geo::TileRows(key.level));
-}
-
 std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y, bool is_mercator) {
   const auto level = TileNumber(z), column = TileNumber(x), row = TileNumber(y);
   if (!level || !column || !row || *level > geo::kMaxLevel) return std::nullopt;
   const geo::TileKey key{static_cast<int>(*level), *column, *row};
-  return IsInScheme(key, is_mercator) ? std::optional(key) : std::nullopt;
+  return tiler::IsInScheme(key, is_mercator) ? std::optional(key) : std::nullopt;
 }
 
 // "9-272-359": level, column and row of an implicit tree's root.

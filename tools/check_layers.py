@@ -78,7 +78,7 @@ MODULES = {
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/cli/common"],
+    "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/store", "server/cli/common"],
     "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
@@ -103,7 +103,7 @@ LIBRARIES = [
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
-    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|redis/socket|server/net/.*)\.cc"),
+    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|redis/socket|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"server/"),

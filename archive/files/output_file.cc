@@ -3,16 +3,16 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
-#include <xxhash.h>
 
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <new>
 #include <random>
 #include <system_error>
 #include <tuple>
 #include <utility>
+
+#include "engine/dem/common/content_hash.h"
 
 namespace terrace::archive {
 namespace {
@@ -60,12 +60,8 @@ Result<void> MakeFolder(const std::string& path) {
 }  // namespace
 
 struct OutputFile::Impl {
-  explicit Impl(std::string p) : path(std::move(p)), hash(XXH3_createState()) {
-    if (hash == nullptr) throw std::bad_alloc();
-    XXH3_128bits_reset(hash);
-  }
+  explicit Impl(std::string p) : path(std::move(p)) {}
   ~Impl() {
-    XXH3_freeState(hash);
     if (descriptor < 0) return;
     ::close(descriptor);
     ::unlink(partial.c_str());
@@ -81,7 +77,7 @@ struct OutputFile::Impl {
 
   const std::string path;
   std::string partial;
-  XXH3_state_t* const hash;
+  dem::ContentHasher hasher;
   int descriptor = -1;
   std::uint64_t size = 0;
   std::string waiting;
@@ -100,7 +96,7 @@ Result<OutputFile> OutputFile::Create(const std::string& path) {
 }
 
 Result<void> OutputFile::Write(std::string_view bytes) {
-  XXH3_128bits_update(impl_->hash, bytes.data(), bytes.size());
+  impl_->hasher.AddBytes(bytes.data(), bytes.size());
   impl_->size += bytes.size();
   impl_->waiting += bytes;
   if (impl_->waiting.size() < kBufferBytes) return {};
@@ -123,8 +119,8 @@ Result<void> OutputFile::Finish() {
 std::uint64_t OutputFile::size() const { return impl_->size; }
 
 std::string OutputFile::xxh3() const {
-  const XXH128_hash_t hash = XXH3_128bits_digest(impl_->hash);
-  return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
+  const dem::ContentHash hash = impl_->hasher.Hash();
+  return fmt::format("{:016x}{:016x}", hash.high, hash.low);
 }
 
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {

@@ -67,19 +67,26 @@ Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const 
   return {};
 }
 
+Result<void> AddVertical(ContentHasher& hasher, const RasterGrid& grid, const FileContentOptions& content) {
+  const auto& geoid = grid.vertical().geoid;
+  hasher.Add(grid.vertical().is_known());
+  hasher.Add(geoid != nullptr);
+  return geoid ? geoid->AddTo(hasher, content) : Result<void>();
+}
+
+FileContentOptions ContentOptionsOf(const DemOptions& options) {
+  return {options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
+}
+
 Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const DemOptions& options, double floor) {
-  const FileContentOptions content{options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
+  const FileContentOptions content = ContentOptionsOf(options);
   ContentHasher hasher;
   for (const RasterGrid& grid : grids) {
     hasher.Add(std::uint64_t{grid.members().size()});  // includes which rasters form a raster grid
     for (const GridMember& member : grid.members()) {
       if (auto added = AddRaster(hasher, *member.raster, content); !added) return tl::unexpected(added.error());
     }
-    hasher.Add(grid.vertical().is_known());
-    hasher.Add(grid.vertical().geoid != nullptr);
-    if (const auto& geoid = grid.vertical().geoid) {
-      if (auto added = geoid->AddTo(hasher, content); !added) return tl::unexpected(added.error());
-    }
+    if (auto added = AddVertical(hasher, grid, content); !added) return tl::unexpected(added.error());
   }
   for (const double number : {options.error_fraction, options.finest_error.value_or(0), floor, options.feather}) {
     hasher.Add(number);
@@ -91,7 +98,7 @@ Result<std::uint64_t> FingerprintOf(const std::vector<RasterGrid>& grids, const 
 
 // The parts of the fingerprint, for tiles that do not depend on all rasters.
 Result<std::vector<GridContent>> ContentsOf(const std::vector<RasterGrid>& grids, const DemOptions& options) {
-  const FileContentOptions content{options.cache.folder ? options.cache.folder->path() : std::string(), options.stop};
+  const FileContentOptions content = ContentOptionsOf(options);
   std::vector<GridContent> contents;
   for (const RasterGrid& grid : grids) {
     GridContent& of_grid = contents.emplace_back();
@@ -103,11 +110,7 @@ Result<std::vector<GridContent>> ContentsOf(const std::vector<RasterGrid>& grids
     ContentHasher hasher;
     if (auto added = grid.georeference().AddTo(hasher, content); !added) return tl::unexpected(added.error());
     grid.AddTo(hasher);
-    hasher.Add(grid.vertical().is_known());
-    hasher.Add(grid.vertical().geoid != nullptr);
-    if (const auto& geoid = grid.vertical().geoid) {
-      if (auto added = geoid->AddTo(hasher, content); !added) return tl::unexpected(added.error());
-    }
+    if (auto added = AddVertical(hasher, grid, content); !added) return tl::unexpected(added.error());
     of_grid.grid = hasher.Hash();
   }
   return contents;

@@ -35,7 +35,7 @@ Json Region(const HeightSpan& heights, int level, const geo::TileRange& block) {
 }
 
 std::string Query(const TilesetDescription& tileset, const std::string& parameters) {
-  std::string query = tileset.version.empty() ? "" : "v=" + tileset.version;
+  std::string query = tileset.version.empty() || !tileset.has_versioned_urls ? "" : "v=" + tileset.version;
   if (!query.empty() && !parameters.empty()) query += '&';
   query += parameters;
   return query.empty() ? "" : "?" + query;

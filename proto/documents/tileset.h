@@ -11,7 +11,8 @@
 namespace terrace::proto {
 
 struct TilesetDescription {
-  std::string version;  // of the tiles, [0-9A-Za-z._~-]: the first parameter of every URL; empty: none
+  std::string version;             // of the tiles, [0-9A-Za-z._~-]; empty: none
+  bool has_versioned_urls = true;  // the version is the first parameter of every URL
   std::string attribution;
   std::vector<TreeRoot> roots;  // tiles of one level (ImplicitTrees)
   // The range of a tile and, if a tree is rooted at it, of all its descendants, because clients apply a root's range to

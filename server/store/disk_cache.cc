@@ -104,6 +104,10 @@ class DiskTier final : public tiler::Store<Key, Value> {
     if (store_) store_->Abandon();
   }
 
+  void Flush() override {
+    if (store_) store_->Flush();
+  }
+
   std::optional<Value> Find(const Key& key) override {
     if (!store_) return std::nullopt;
     const std::string store_key = StoreKey(key);
@@ -142,7 +146,7 @@ class DiskTier final : public tiler::Store<Key, Value> {
 
 // Debian's build of RocksDB asserts, and so ends the process, on some kinds of damage when it opens a store. The lock
 // file counts unfinished openings: after two, the stores are deleted. Other files in the directory are never deleted.
-Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size_t open_files) {
+Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size_t open_files, bool waits_for_room) {
   tiler::BuildId();  // taken before sources are opened, for which GDAL may load libraries
   std::error_code failed;
   std::filesystem::create_directories(config.directory, failed);
@@ -171,6 +175,7 @@ Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size
     options.db.compress = compress;
     options.db.open_files = open_files;
     options.name = name;
+    options.waits_for_room = waits_for_room;
     if (anew && bytes > 0) static_cast<void>(RecordDb::Destroy(options.db));  // opening reports what is wrong
     return options;
   };

@@ -22,6 +22,9 @@ struct DiskCache {
 
 // `open_files`: of each store (RecordDbOptions). kInvalidArgument: the directory cannot be made or locked, or another
 // process uses it. Messages name the remedy.
-Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size_t open_files);
+// `waits_for_room`: Insert waits while its queue is full, so that nothing is lost unless the disk fails; for programs
+// that fill the cache ahead of requests.
+Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size_t open_files,
+                                bool waits_for_room = false);
 
 }  // namespace terrace::server

@@ -127,8 +127,13 @@ Result<std::size_t> DiskStore::Erase(const std::vector<std::string>& prefixes,
 
 void DiskStore::Enqueue(Job job) {
   {
-    const std::lock_guard lock(mutex_);
-    if (!writing_ || stop_ || abandoned_ || queued_bytes_ + job.charge > options_.queue_bytes) {
+    std::unique_lock lock(mutex_);
+    const auto is_off = [this] { return !writing_ || stop_ || abandoned_; };
+    const auto has_room = [&] { return queued_bytes_ + job.charge <= options_.queue_bytes; };
+    if (options_.waits_for_room) {
+      changed_.wait(lock, [&] { return is_off() || has_room() || queued_bytes_ == 0; });
+    }
+    if (is_off() || !(options_.waits_for_room || has_room())) {
       dropped_.fetch_add(1, std::memory_order_relaxed);
       return;
     }

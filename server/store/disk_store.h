@@ -1,6 +1,6 @@
 // A key-value store on a disk that may fail: a read returns the value that was written, or nothing.
 //
-// Thread-safe. Find and Erase block; Keep returns at once, and a thread of the store writes. Only Erase returns errors.
+// Thread-safe. Find and Erase block; Keep returns at once, unless waits_for_room is set, and a thread of the store writes. Only Erase returns errors.
 // After an error the store stops using the disk and tries again every `retry_after`: after a failed write it
 // continues to read, after a failed read it finds nothing. Log and statistics report this.
 #pragma once
@@ -29,6 +29,7 @@ struct DiskStoreOptions {
   RecordDbOptions db;
   std::string name;                                 // in the log: "tiles"
   std::size_t queue_bytes = std::size_t{16} << 20;  // memory of values that wait to be written; more are dropped
+  bool waits_for_room = false;                      // Keep waits while the queue is full, instead of dropping
   std::chrono::milliseconds retry_after{2'000};
 };
 

@@ -113,12 +113,27 @@ TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {
 TEST_F(ArchiveTest, VerifiedUnitEqualsItsSummary) {
   Bake();
   for (const UnitEntry& unit : manifest_.units) {
-    const Result<UnitSummary> summary = VerifyUnit(Place(), unit.name, unit.key);
+    const Result<UnitSummary> summary = VerifyUnit(Place(), unit.name, {manifest_.kind, unit.key});
     ASSERT_TRUE(summary) << summary.error().message;
     EXPECT_EQ(*summary, (UnitSummary{unit.tiles, unit.bytes, unit.xxh3}));
-    EXPECT_EQ(VerifyUnit(Place(), unit.name, unit.key + 1).error().code, ErrorCode::kInvalidArgument);
+    const auto refused = [&](const UnitOptions& options) {
+      const Result<UnitSummary> other = VerifyUnit(Place(), unit.name, options);
+      return !other && other.error().code == ErrorCode::kInvalidArgument;
+    };
+    EXPECT_TRUE(refused({manifest_.kind, unit.key + 1}));
+    // With the same key: header and metadata are compared as well.
+    tiler::TileRequest kind = manifest_.kind;
+    kind.coding = kind.coding == tiler::Coding::kGzip ? tiler::Coding::kIdentity : tiler::Coding::kGzip;
+    EXPECT_TRUE(refused({kind, unit.key}));
+    kind = manifest_.kind;
+    kind.format = tiler::TileFormat::kGlb;
+    EXPECT_TRUE(refused({kind, unit.key}));
   }
-  EXPECT_EQ(VerifyUnit(Place(), "7-1-1", 7).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(VerifyUnit(Place(), "7-1-1", {manifest_.kind, 7}).error().code, ErrorCode::kNotFound);
+  // A unit's file under another unit's name.
+  std::filesystem::copy_file(Place() + "/top.pmtiles", Place() + "/units/7-1-1.pmtiles");
+  const std::uint64_t key = manifest_.units.front().name == "top" ? manifest_.units.front().key : 7;
+  EXPECT_EQ(VerifyUnit(Place(), "7-1-1", {manifest_.kind, key}).error().code, ErrorCode::kInvalidArgument);
 }
 
 TEST_F(ArchiveTest, TileOfAnotherUnitIsRefused) {

@@ -82,13 +82,14 @@ TEST_F(HostileArchiveTest, EveryFlippedByte) {
 }
 
 TEST_F(HostileArchiveTest, FlippedBytesAreFoundByVerifying) {
+  const Manifest manifest = Archive::Open(place_).value()->manifest();
   for (std::size_t at = 0; at < good_.size(); at += 7) {
     std::string bad = good_;
     bad[at] = static_cast<char>(bad[at] ^ 0x10);
     WriteText(unit_, bad);
-    const Result<UnitSummary> good = VerifyUnit(place_, "top", 7);
+    const Result<UnitSummary> good = VerifyUnit(place_, "top", {manifest.kind, 7});
     if (!good) continue;
-    EXPECT_NE(good->xxh3, Archive::Open(place_).value()->manifest().units.front().xxh3);
+    EXPECT_NE(good->xxh3, manifest.units.front().xxh3);
   }
 }
 

@@ -334,7 +334,7 @@ class Bake(unittest.TestCase):
                 (("--out", other), "3-9", "--levels 0-9"),
                 (("--out", other, "--bbox", "1,2,3"), "0-9", "WEST,SOUTH,EAST,NORTH"),
                 (("--out", other, "--bbox", "100,-20,110,-10"), "0-9", "lies outside"),
-                (("--out", other, "--form", "tar"), "0-9", "chunks, folder or single"),
+                (("--out", other, "--form", "tar"), "0-9", "chunks, folder, single or 3tz"),
                 (("--out", other, "--form", "single", "--format", "terrain,png"), "0-9", "has one format"),
                 (("--out", other, "--format", "obj"), "0-9", "terrain, glb, png"),
                 (("--out", other, "--shard", "3/3"), "0-9", "I from 0 to N-1"),

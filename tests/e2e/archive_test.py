@@ -278,6 +278,33 @@ class ArchiveTest(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("allowed prefix", done.stderr)
 
+    def test_a_bucket_that_is_away_is_not_an_empty_one(self):
+        class Away(http.server.BaseHTTPRequestHandler):
+            status = 500
+
+            def do_GET(self):
+                self.send_error(self.status)
+            do_HEAD = do_GET
+
+            def log_message(self, *_):
+                pass
+        bucket = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Away)
+        threading.Thread(target=bucket.serve_forever, daemon=True).start()
+        url = f"/vsicurl/http://127.0.0.1:{bucket.server_address[1]}/"
+
+        def serve():
+            config = {"datasets": [{"name": "cell", "baked": url + "terrain"}], "allowed_prefixes": [url]}
+            done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--listen", "127.0.0.1:0"], text=True, timeout=60,
+                                  input=json.dumps(config), capture_output=True, env={**os.environ, "GDAL_HTTP_MAX_RETRY": "0"})
+            self.assertEqual(done.returncode, 1)
+            return done.stderr
+        self.assertRegex(serve(), r"manifest\.json cannot be looked up now: HTTP response code: 500")
+        Away.status = 404
+        self.assertIn("has no manifest.json", serve())
+        bucket.shutdown()
+        bucket.server_close()
+        self.assertIn("manifest.json cannot be looked up now", serve())
+
     def test_python_reader(self):
         reader = SOURCE_DIR / "docs/formats/read_archive.py"
         with self.serve_alone() as server:

@@ -7,11 +7,12 @@ import http from 'node:http';
 import path from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { after, before, describe, it } from 'node:test';
-import { json, request, samples, serve } from './harness.mjs';
+import os from 'node:os';
+import { json, request, run, samples, serve } from './harness.mjs';
 
 const kModules = path.join(path.dirname(fileURLToPath(import.meta.url)), 'node_modules');
 const kChromium = process.env.TERRACE_CHROMIUM;
-const kHaveBrowser = kChromium && fs.existsSync(path.join(kModules, 'maplibre-gl')) &&
+const kHaveBrowser = kChromium && fs.existsSync(path.join(kModules, 'maplibre-gl')) && fs.existsSync(path.join(kModules, 'pmtiles')) &&
     fs.existsSync(path.join(kModules, 'playwright-core'));
 const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
                 '--disable-background-networking', '--no-first-run'];
@@ -157,13 +158,24 @@ describe('a map with terrain', { skip: kHaveBrowser ? false : 'needs TERRACE_CHR
   let server, pages, browser, page;
   const centre = [-84.24, 36.3];
   const wrongs = [];
+  const scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace-map-'));
+  const archive = path.join(scratch, 'dem.pmtiles');
 
   before(async () => {
+    const done = run('bake', kDem, '--form', 'single', '--format', 'png', '--out', archive);
+    assert.equal(done.code, 0, done.err);
     const { chromium } = await import('playwright-core');
     server = await serve(kDem, '--attribution', 'USGS');
     const html = '<!doctype html><meta charset="utf-8"><link rel="stylesheet" href="/maplibre-gl.css">' +
-        '<style>html,body,#map{margin:0;height:100%}</style><div id="map"></div><script src="/maplibre-gl.js"></script>';
+        '<style>html,body,#map{margin:0;height:100%}</style><div id="map"></div><script src="/maplibre-gl.js"></script><script src="/pmtiles.js"></script>';
     pages = http.createServer((asked, reply) => {
+      if (asked.url === '/dem.pmtiles') {  // as a static host serves a file
+        const [, first, last] = asked.headers.range.match(/bytes=(\d+)-(\d+)/).map(Number), data = fs.readFileSync(archive);
+        const part = data.subarray(first, last + 1);
+        reply.writeHead(206, { 'Content-Range': `bytes ${first}-${first + part.length - 1}/${data.length}`, 'Content-Length': part.length });
+        return reply.end(part);
+      }
+      if (asked.url === '/pmtiles.js') return reply.end(fs.readFileSync(path.join(kModules, 'pmtiles/dist/pmtiles.js')));
       const file = asked.url.match(/^\/(maplibre-gl\.(js|css))$/);
       reply.setHeader('Content-Type', !file ? 'text/html' : file[2] === 'js' ? 'text/javascript' : 'text/css');
       reply.end(file ? fs.readFileSync(path.join(kModules, 'maplibre-gl/dist', file[1])) : html);
@@ -181,17 +193,22 @@ describe('a map with terrain', { skip: kHaveBrowser ? false : 'needs TERRACE_CHR
     await browser?.close();
     pages?.close();
     await server?.stop();
+    fs.rmSync(scratch, { recursive: true });
   });
 
-  for (const query of ['', '?encoding=terrarium&size=512']) {
+  for (const query of ['', '?encoding=terrarium&size=512', 'pmtiles']) {
     it(`tells the heights of the DEM${query && ` with ${query}`}`, { timeout: 120000 }, async () => {
-      const seen = await page.evaluate(async ({ url, centre }) => {
+      const isArchive = query === 'pmtiles';
+      if (isArchive) await server.stop();  // the file alone
+      const seen = await page.evaluate(async ({ url, centre, isArchive }) => {
+        if (isArchive) maplibregl.addProtocol('pmtiles', new pmtiles.Protocol().tile);
+        const of = isArchive ? { url: `pmtiles://${location.origin}/dem.pmtiles`, encoding: 'mapbox', tileSize: 256 } : { url };
         window.shown?.remove();
         window.shown = new maplibregl.Map({
           container: 'map', center: centre, zoom: 14, pitch: 60, maxPitch: 80, fadeDuration: 0,
           style: {
             version: 8,
-            sources: { dem: { type: 'raster-dem', url }, shade: { type: 'raster-dem', url } },
+            sources: { dem: { type: 'raster-dem', ...of }, shade: { type: 'raster-dem', ...of } },
             layers: [{ id: 'ground', type: 'background', paint: { 'background-color': '#808080' } },
                      { id: 'shade', type: 'hillshade', source: 'shade' }],
             terrain: { source: 'dem', exaggeration: 1 },
@@ -206,9 +223,9 @@ describe('a map with terrain', { skip: kHaveBrowser ? false : 'needs TERRACE_CHR
         const heights = points.map((point) => shown.queryTerrainElevation(point) + shown.transform.elevation);
         const source = shown.getSource('dem');
         return { points, heights, errors, maxzoom: source.maxzoom, tileSize: source.tileSize, encoding: source.encoding };
-      }, { url: `${server.url}/jacksboro/tiles.json${query}`, centre });
+      }, { url: `${server.url}/jacksboro/tiles.json${query}`, centre, isArchive });
       assert.deepEqual(seen.errors, []);
-      assert.deepEqual([seen.tileSize, seen.encoding], query ? [512, 'terrarium'] : [256, 'mapbox']);
+      assert.deepEqual([seen.tileSize, seen.encoding], query && !isArchive ? [512, 'terrarium'] : [256, 'mapbox']);
       const expected = asMapLibreReads(seen.points, 11);
       const off = seen.heights.map((height, i) => Math.abs(height - expected[i]));
       const relief = Math.max(...expected) - Math.min(...expected);

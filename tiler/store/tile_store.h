@@ -63,6 +63,9 @@ class StoreBase {
   // stopped, and values may be left. kUnavailable: the medium does not respond, and values may be left.
   virtual Result<std::size_t> Erase(const TileSelection& selection, const std::stop_token& stop) = 0;
 
+  // Returns when everything that was inserted before the call is written or dropped.
+  virtual void Flush() {}
+
   // Drops values that wait to be written, and accepts no more: the process ends, and has no time left.
   virtual void Abandon() = 0;
 };

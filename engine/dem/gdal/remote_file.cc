@@ -1,14 +1,25 @@
 #include "engine/dem/gdal/remote_file.h"
 
 #include <cpl_vsi.h>
+#include <cpl_vsi_error.h>
 
 #include <mutex>
+#include <string_view>
 #include <utility>
 
 #include "engine/dem/gdal/gdal_runtime.h"
 #include "engine/dem/gdal/source_policy.h"
 
 namespace terrace::dem {
+namespace {
+
+// Whether a failed look-up says that there is no such file, and not that the store does not answer or refuses. Stores
+// that are not remote state no error.
+bool IsAbsence(int error, std::string_view message) {
+  return error == VSIE_None || error == VSIE_AWSObjectNotFound || message.find("response code: 404") != message.npos;
+}
+
+}  // namespace
 
 struct RemoteFile::Impl {
   Impl(std::string p, VSILFILE* f, std::uint64_t s) : path(std::move(p)), file(f), size(s) {}
@@ -36,7 +47,15 @@ Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
   ForgetGdalError();
   VSICurlPartialClearCache(path.c_str());
   VSIStatBufL status{};
-  if (VSIStatL(path.c_str(), &status) != 0) return MakeError(ErrorCode::kNotFound, "{} is not there", path);
+  if (VSIStatL(path.c_str(), &status) != 0) {
+    // Only opening states why, and not what GDAL remembers.
+    VSICurlPartialClearCache(path.c_str());
+    VSIErrorReset();
+    if (VSILFILE* const there = VSIFOpenExL(path.c_str(), "rb", /*bSetError=*/TRUE)) VSIFCloseL(there);
+    const std::string why = VSIGetLastErrorMsg();
+    if (IsAbsence(VSIGetLastErrorNo(), why)) return MakeError(ErrorCode::kNotFound, "{} is not there", path);
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be looked up now: {}", path, why);
+  }
   VSILFILE* const file = VSIFOpenL(path.c_str(), "rb");
   if (file == nullptr) {
     return MakeError(ErrorCode::kUnavailable, "{} cannot be opened now: {}", path, TakeGdalError());

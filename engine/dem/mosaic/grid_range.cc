@@ -57,6 +57,24 @@ std::optional<Box> ProjectedBox(const Georeference& georeference, const geo::Lat
   return box;
 }
 
+// Where the samples of a tile may lie in a raster grid, in pixels.
+struct TileBoxes {
+  std::vector<Box> boxes;
+  bool leaves_columns = false;  // some may lie west or east of the grid
+};
+
+TileBoxes BoxesOf(const Georeference& georeference, const geo::Lattice& lattice, const geo::TileKey& key, int width,
+                  int height, bool wraps) {
+  const auto leaves = [&](const Box& box) { return box.west < 0 || box.east > width; };
+  if (georeference.is_geographic_grid() && georeference.is_affine()) {
+    TileBoxes tile{GeographicBoxes(georeference, lattice, key)};
+    tile.leaves_columns = !wraps && std::ranges::all_of(tile.boxes, leaves);
+    return tile;
+  }
+  if (const auto box = ProjectedBox(georeference, lattice, key)) return {{*box}, leaves(*box)};
+  return {{{0, 0, static_cast<double>(width), static_cast<double>(height)}}, true};
+}
+
 }  // namespace
 
 BlockRange RasterGrid::Ranges(const Box& pixels) const {
@@ -125,14 +143,7 @@ std::vector<std::size_t> RasterGrid::MembersBelow(const geo::TileKey& top, const
     factor = std::max(factor, AveragingFactor(SamplesPerCell(lattices[static_cast<std::size_t>(level)], spacing_)));
   }
   const geo::Lattice& lattice = lattices[static_cast<std::size_t>(top.level)];
-  std::vector<Box> boxes;
-  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
-    boxes = GeographicBoxes(georeference_, lattice, top);
-  } else if (const auto box = ProjectedBox(georeference_, lattice, top)) {
-    boxes = {*box};
-  } else {
-    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
-  }
+  std::vector<Box> boxes = BoxesOf(georeference_, lattice, top, width_, height_, wraps_).boxes;
   std::set<std::size_t> members;
   for (Box& box : boxes) {
     // Tiles have a halo of one node of at most a 32nd of their size. Interpolation, blocks of averages and the samples
@@ -191,21 +202,11 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
     return range;
   }
   const int factor = AveragingFactor(SamplesPerCell(lattice, spacing_));
-  std::vector<Box> boxes;
-  if (georeference_.is_geographic_grid() && georeference_.is_affine()) {
-    boxes = GeographicBoxes(georeference_, lattice, key);
-    leaves |=
-        !wraps_ && std::ranges::none_of(boxes, [&](const Box& box) { return box.west >= 0 && box.east <= width_; });
-  } else if (const auto box = ProjectedBox(georeference_, lattice, key)) {
-    boxes = {*box};
-    leaves |= box->west < 0 || box->east > width_;
-  } else {
-    boxes = {{0, 0, static_cast<double>(width_), static_cast<double>(height_)}};
-    leaves = true;
-  }
+  TileBoxes tile = BoxesOf(georeference_, lattice, key, width_, height_, wraps_);
+  leaves |= tile.leaves_columns;
   BlockRange blocks;
   bool blends = false;
-  for (Box& box : boxes) {
+  for (Box& box : tile.boxes) {
     leaves |= box.south < 0 || box.north > height_;
     if (options_.feather_m > 0) {
       blends |= MayBlend(box, factor);

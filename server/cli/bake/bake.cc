@@ -32,8 +32,8 @@ CLI::Validator NumberAbove0(const std::string& what) {
 
 CLI::Validator OneForm() {
   const auto check = [](const std::string& text) {
-    const bool valid = text == kChunks || text == kFolder || text == kSingle;
-    return valid ? std::string() : fmt::format("must be chunks, folder or single, not \"{}\"", text);
+    const bool valid = text == kChunks || text == kFolder || text == kSingle || text == k3tz;
+    return valid ? std::string() : fmt::format("must be chunks, folder, single or 3tz, not \"{}\"", text);
   };
   return CLI::Validator(check, "");
 }
@@ -46,14 +46,19 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->type_name("FILE");
   command.add_option("--dataset", arguments.dataset, "The dataset of the configuration that is baked")
       ->type_name("NAME");
-  command.add_option("-o,--out", arguments.out, "Where the bake goes: a folder, or for --form single a file")
+  command.add_option("-o,--out", arguments.out, "Where the bake goes: a folder, or for --form single and 3tz a file")
       ->type_name("PLACE");
+  command
+      .add_option("--into-cache", arguments.into_cache,
+                  "Instead of --out: the disk_cache of a server, which then answers these tiles from disk; the server "
+                  "must not run meanwhile")
+      ->type_name("DIR");
   command
       .add_option("--form", arguments.form,
                   "chunks: files of a few thousand tiles, for terrace serve and updates; folder: a file a tile, for "
-                  "static hosts; single: one PMTiles file")
+                  "static hosts; single: one PMTiles file; 3tz: one file of 3D Tiles")
       ->check(OneForm())
-      ->type_name("chunks|folder|single")
+      ->type_name("chunks|folder|single|3tz")
       ->capture_default_str()
       ->group(kWhat);
   command.add_option("--format", arguments.format, "terrain, glb or png; several with commas share the work")
@@ -124,6 +129,12 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
       ->check(CLI::Validator(whole, ""))
       ->type_name("N")
       ->group(kHow);
+  command
+      .add_option("--codings", arguments.codings,
+                  "With --into-cache: the content codings of the tiles, gzip, br, zstd or identity, several with "
+                  "commas; by default gzip,br, which browsers ask for")
+      ->type_name("NAMES")
+      ->group(kHow);
   command.add_option("--shard", arguments.shard, "Bakes one of N parts, 0 to N-1, into the same place as the others")
       ->type_name("I/N")
       ->group(kHow);
@@ -189,6 +200,7 @@ void AddBake(CLI::App& app, int& exit_code) {
       "  terrace bake alps.tif --out alps-2 --update alps\n"
       "  terrace bake alps.tif --out /mnt/alps --queue redis://10.0.0.5:6379/0 --job alps    (on many machines)\n"
       "  terrace bake status --queue redis://10.0.0.5:6379/0 --job alps --watch\n"
+      "  terrace bake --config terrace.json --dataset maui --into-cache /var/cache/terrace\n"
       "  terrace bake alps.tif --dry-run\n\n"
       "A bake that was interrupted goes on when the same command is run again: finished files are checked and\n"
       "kept. The manifest is written last. Exit codes: 0 complete; 1 files failed or are missing, and are listed;\n"

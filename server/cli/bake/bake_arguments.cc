@@ -148,10 +148,27 @@ Result<bake::Order> OrderOf(const BakeArguments& arguments) {
     return MakeError(ErrorCode::kInvalidArgument, "--form {} has one format, and --format names {}; bake each alone",
                      arguments.form, order.formats.size());
   }
-  if (arguments.form == kFolder && has(tiler::TileFormat::kGlb)) {
-    return MakeError(ErrorCode::kInvalidArgument, "--form folder takes terrain and png; glb needs chunks or single");
+  if (arguments.form == k3tz && !has(tiler::TileFormat::kGlb)) {
+    return MakeError(ErrorCode::kInvalidArgument, "--form 3tz holds 3D Tiles: give --format glb");
   }
   return order;
+}
+
+Result<std::vector<tiler::Coding>> CodingsOf(const std::string& text) {
+  if (text.empty()) return std::vector{tiler::Coding::kGzip, tiler::Coding::kBrotli};
+  std::vector<tiler::Coding> codings;
+  for (const std::string& name : PartsOf(text, ',')) {
+    const auto* const known = std::ranges::find(tiler::kCodings, name, tiler::NameOf);
+    if (known == tiler::kCodings.end() && name != "identity") {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--codings {}: must be gzip, br, zstd, identity, or several with commas", text);
+    }
+    codings.push_back(name == "identity" ? tiler::Coding::kIdentity : *known);
+    if (std::ranges::count(codings, codings.back()) > 1) {
+      return MakeError(ErrorCode::kInvalidArgument, "--codings {}: has {} twice", text, name);
+    }
+  }
+  return codings;
 }
 
 Result<bake::Shard> ShardOf(const std::string& text) {

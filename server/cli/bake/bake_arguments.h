@@ -9,17 +9,20 @@
 #include "bake/order.h"
 #include "config/config.h"
 #include "engine/core/result.h"
+#include "tiler/coding.h"
 
 namespace terrace::cli {
 
 inline constexpr const char* kChunks = "chunks";
 inline constexpr const char* kFolder = "folder";
 inline constexpr const char* kSingle = "single";
+inline constexpr const char* k3tz = "3tz";
 
 struct BakeArguments {
   std::vector<std::string> dems;
   std::string config, dataset;
   std::string out, form = kChunks, update;
+  std::string into_cache, codings;
   std::string format = "terrain", levels, bbox, extensions;  // as written; empty: not given
   double error = 0, fraction = 0;                            // 0: not given
   unsigned threads = 0;                                      // 0: one for each processor
@@ -35,6 +38,7 @@ struct BakeArguments {
 // kInvalidArgument: the message names the flag and what would be right. Checks what needs no source.
 Result<bake::Order> OrderOf(const BakeArguments& arguments);
 Result<bake::Shard> ShardOf(const std::string& text);
+Result<std::vector<tiler::Coding>> CodingsOf(const std::string& text);
 
 // The dataset, and the configuration of the program: of a file, or of DEMs that form one dataset. All errors.
 struct BakeInput {

@@ -21,8 +21,10 @@ Result<void> CheckExportPlace(const std::string& out) {
 Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop) {
   const auto archive = archive::Archive::Open(baked);
   if (!archive) return tl::unexpected(archive.error());
-  const Result<void> written = arguments.form == kSingle ? archive::WriteSingle(**archive, arguments.out, stop)
-                                                         : archive::WriteFolder(**archive, arguments.out, stop);
+  const auto write = arguments.form == kSingle   ? archive::WriteSingle
+                     : arguments.form == kFolder ? archive::WriteFolder
+                                                 : archive::Write3tz;
+  const Result<void> written = write(**archive, arguments.out, stop);
   if (!written) return written;
   std::error_code ignored;
   fs::remove_all(baked, ignored);

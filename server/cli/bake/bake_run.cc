@@ -25,12 +25,14 @@
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/bake/bake_export.h"
 #include "server/cli/bake/bake_queue.h"
+#include "server/cli/bake/seed_cache.h"
 #include "server/cli/bake/stop_signals.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
+#include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -289,6 +291,14 @@ std::string WrongTogether(const BakeArguments& arguments) {
                ? "there is nothing to bake; name a DEM ('terrace bake dem.tif --out PLACE') or --config"
                : "give DEMs, or a configuration with --config, not both";
   }
+  if (given(arguments.into_cache)) {
+    if (given(arguments.out) || given(arguments.update) || arguments.finish || arguments.form != kChunks ||
+        arguments.no_gzip) {
+      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --finish and --no-gzip";
+    }
+    return {};
+  }
+  if (given(arguments.codings)) return "--codings is for --into-cache";
   if (!arguments.dry_run && !given(arguments.out)) return "--out PLACE is missing: where the bake goes";
   if (arguments.out.starts_with("/vsi")) {
     return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
@@ -317,6 +327,7 @@ std::string WrongTogether(const BakeArguments& arguments) {
 }  // namespace
 
 int Bake(const BakeArguments& arguments) {
+  tiler::BuildId();  // before GDAL loads further libraries, as the server takes it: it is part of the keys of a cache
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
   const StopSignals signals;
@@ -327,6 +338,8 @@ int Bake(const BakeArguments& arguments) {
   }
   const auto order = OrderOf(arguments);
   if (!order) return Fail(order.error());
+  const auto codings = CodingsOf(arguments.codings);
+  if (!codings) return Fail(codings.error());
   const auto shard = ShardOf(arguments.shard);
   if (!shard) return Fail(shard.error());
   if (!arguments.catalogue.empty()) return PlanFromCatalogue(arguments, *order);
@@ -342,7 +355,8 @@ int Bake(const BakeArguments& arguments) {
   if (!manifests) return Fail(manifests.error());
   std::vector<bake::Target> targets;
   std::uint64_t tiles = 0;
-  for (const archive::Manifest& manifest : *manifests) {
+  const bool is_seed = !arguments.into_cache.empty();
+  for (const archive::Manifest& manifest : is_seed ? InCodings(*manifests, *codings) : *manifests) {
     targets.push_back({{}, manifest});
     tiles += bake::CountTiles(manifest.available);
   }
@@ -362,6 +376,7 @@ int Bake(const BakeArguments& arguments) {
                                  Grouped(tiles)),
                      kExitUsage);
   }
+  if (is_seed) return SeedCache(arguments, input->config.disk_cache, pipeline, std::move(targets), *shard, signals);
   return BakeInto(arguments, pipeline, std::move(targets), *shard, signals);
 }
 

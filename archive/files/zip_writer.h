@@ -1,0 +1,52 @@
+// Writes a 3TZ file: a zip file with an index of its entries, which finds an entry without reading the directory
+// (3D Tiles Archive Format 1.3; APPNOTE.TXT of zip 6.3, with zip64 where 32 bits do not suffice).
+//
+// libzip does not tell where it puts an entry, and minizip goes back into the file for each; the index needs the
+// places, and OutputFile writes forwards. Sizes and checksums are known before, so that little is left to write.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "archive/files/output_file.h"
+#include "engine/core/result.h"
+
+namespace terrace::archive {
+
+// Used by one thread at a time. The same entries in the same order make the same bytes. Keeps 24 bytes for each entry
+// in memory. Destroyed without Finish: removes what it wrote. Errors: those of OutputFile.
+class ZipWriter {
+ public:
+  static Result<ZipWriter> Create(const std::string& path);
+
+  // An entry as it is. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
+  Result<void> Add(std::string_view name, std::string_view bytes);
+  // What proto::Gzip wrote, as a deflated entry of what it compresses. kInvalidArgument: it is not.
+  Result<void> AddGzip(std::string_view name, std::string_view gzip);
+
+  // Writes the index as the last entry, and renames the file. kInvalidArgument: two entries have one name.
+  Result<void> Finish();
+
+ private:
+  struct Indexed {
+    std::uint64_t low = 0, high = 0;  // MD5 of the name, as two little-endian numbers: the order of the index
+    std::uint64_t offset = 0;         // of the local header
+  };
+  struct Content {
+    std::uint16_t method = 0;  // 0: stored, 8: deflated
+    std::uint32_t crc32 = 0, size = 0;
+    std::string_view bytes;  // as stored
+  };
+
+  ZipWriter(OutputFile out, SpoolFile directory) : out_(std::move(out)), directory_(std::move(directory)) {}
+  Result<void> Put(std::string_view name, const Content& content);
+
+  OutputFile out_;
+  SpoolFile directory_;  // the central directory, which comes after all entries
+  std::uint64_t directory_bytes_ = 0, entries_ = 0;
+  std::vector<Indexed> index_;
+};
+
+}  // namespace terrace::archive

@@ -1,0 +1,183 @@
+#include "server/cli/bake/seed_cache.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <stop_token>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+#include "archive/tile_writer.h"
+#include "bake/order.h"
+#include "server/cli/bake/bake_display.h"
+#include "server/cli/common/command.h"
+#include "server/store/disk_cache.h"
+
+namespace terrace::cli {
+namespace {
+
+using tiler::CacheKey;
+
+// What one seeding knows of its cache.
+struct Seed {
+  std::shared_ptr<tiler::TileStore> store;
+  std::size_t capacity_bytes = 0;
+  std::atomic<std::uint64_t> bytes{0};  // in the cache, about
+  std::stop_source stop;                // also: the cache is full
+
+  // The cache deletes its oldest records when it is full, and a file of them at a time.
+  bool is_full() const { return bytes >= capacity_bytes - capacity_bytes / 8; }
+};
+
+// The key, checksum and columns of a record.
+constexpr std::uint64_t kRecordOverheadBytes = 160;
+
+class SeedWriter final : public archive::TileWriter {
+ public:
+  SeedWriter(Seed& seed, archive::Manifest manifest)
+      : seed_(seed), manifest_(std::move(manifest)), dropped_before_(seed.store->stats().dropped) {}
+
+  Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange&) override {
+    if (seed_.is_full()) {
+      seed_.stop.request_stop();
+      return MakeError(ErrorCode::kCancelled, "the cache is full");
+    }
+    seed_.bytes += tile.bytes.size() + kRecordOverheadBytes;
+    ++summary_.tiles;
+    summary_.bytes += tile.bytes.size();
+    seed_.store->Insert(CacheKey{bake::RequestOf(manifest_, key), manifest_.dataset.generation},
+                        std::make_shared<const tiler::EncodedTile>(tile));
+    return {};
+  }
+
+  Result<archive::UnitSummary> Finish() override {
+    seed_.store->Flush();
+    const tiler::StoreStats stats = seed_.store->stats();
+    if (!stats.on || stats.dropped != dropped_before_) {
+      return MakeError(ErrorCode::kUnavailable,
+                       "the cache cannot be written; look at its disk, and run the same command again");
+    }
+    return summary_;
+  }
+
+ private:
+  Seed& seed_;
+  const archive::Manifest manifest_;
+  const std::uint64_t dropped_before_;
+  archive::UnitSummary summary_;
+};
+
+std::uint64_t BytesOfFiles(const std::filesystem::path& folder) {
+  std::uint64_t bytes = 0;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::uintmax_t size = entry.file_size(ignored);
+    if (!ignored) bytes += size;
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::vector<archive::Manifest> InCodings(const std::vector<archive::Manifest>& manifests,
+                                         const std::vector<tiler::Coding>& codings) {
+  std::vector<archive::Manifest> all;
+  for (const archive::Manifest& manifest : manifests) {
+    const bool is_compressed = manifest.kind.coding != tiler::Coding::kIdentity;
+    for (const tiler::Coding coding : is_compressed ? codings : std::vector{tiler::Coding::kIdentity}) {
+      all.push_back(manifest);
+      all.back().kind.coding = coding;
+    }
+  }
+  return all;
+}
+
+int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& limits,
+              const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets, const bake::Shard& shard,
+              const StopSignals& signals) {
+  const std::string& folder = arguments.into_cache;
+  config::DiskCacheConfig tiles_alone = limits;
+  tiles_alone.directory = folder;
+  tiles_alone.refinement_bytes = 0;
+  if (limits.tile_bytes == 0) {
+    return cli::Fail("--into-cache: disk_cache of the configuration has no room for tiles: tile_bytes is 0",
+                     kExitUsage);
+  }
+  // Opened with a lower limit than its server's, the cache would lose tiles.
+  if (const std::uint64_t there = BytesOfFiles(std::filesystem::path(folder) / "tiles"); there > limits.tile_bytes) {
+    return cli::Fail(
+        fmt::format("--into-cache {}: has {} of tiles, and the limit is {} (disk_cache.tile_bytes); give the "
+                    "configuration of its server with --config",
+                    folder, Bytes(static_cast<double>(there)), Bytes(static_cast<double>(limits.tile_bytes))),
+        kExitUsage);
+  }
+  constexpr std::size_t kOpenFiles = 256;
+  Result<server::DiskCache> cache = server::OpenDiskCache(tiles_alone, kOpenFiles, /*waits_for_room=*/true);
+  if (!cache) {
+    return cli::Fail(fmt::format("--into-cache: {}; a server must not run meanwhile", cache.error().message),
+                     kExitUsage);
+  }
+  Seed seed;
+  seed.store = cache->tiles;
+  seed.capacity_bytes = limits.tile_bytes;
+  seed.bytes = seed.store->stats().bytes;
+  if (!seed.store->stats().on) {
+    return cli::Fail(fmt::format("--into-cache {}: cannot be opened; see the warning above", folder), kExitFailure);
+  }
+  for (bake::Target& target : targets) {
+    target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::TileWriter>> {
+      return std::make_unique<SeedWriter>(seed, manifest);
+    };
+    target.has = [&seed, generation = target.manifest.dataset.generation](const tiler::TileRequest& request) {
+      return seed.store->Find({request, generation}).has_value();
+    };
+  }
+  const std::stop_callback stop(signals.token(), [&seed] { seed.stop.request_stop(); });
+  const bake::UnitPlan plan = bake::UnitPlan::Make(targets, shard);
+  bake::Counters counters;
+  bake::BakeOptions options;
+  options.threads = arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
+  options.stop = seed.stop.get_token();
+  std::vector<bake::UnitReport> reports;
+  {
+    const BakeDisplay display(pipeline.datasets().front().name, plan.tiles, plan.files, counters);
+    reports = bake::Bake(pipeline, targets, plan, options, counters);
+  }
+  seed.store->Flush();
+  const std::uint64_t built = counters.tiles, kept = counters.passed;
+  if (signals.signal() != 0) {
+    std::fprintf(stderr,
+                 "terrace: stopped after %s tiles, which stay in the cache; run the same command again to go on\n",
+                 Grouped(built).c_str());
+    return 128 + signals.signal();
+  }
+  if (seed.is_full()) {
+    return cli::Fail(fmt::format("{}: is full after {} of {} tiles; raise disk_cache.tile_bytes ({} now) in the "
+                                 "configuration of the server, and give it with --config, or limit --levels or --bbox",
+                                 folder, Grouped(built + kept), Grouped(plan.tiles),
+                                 Bytes(static_cast<double>(seed.capacity_bytes))),
+                     kExitFailure);
+  }
+  bool is_whole = true;
+  for (const bake::UnitReport& report : reports) {
+    if (report.outcome != bake::UnitOutcome::kFailed) continue;
+    is_whole = false;
+    std::fprintf(stderr, "terrace: unit %s failed: %s\n", report.entry.name.c_str(), report.message.c_str());
+  }
+  if (arguments.json) {
+    fmt::print("{{\"cache\":\"{}\",\"complete\":{},\"tiles\":{},\"built_tiles\":{},\"kept_tiles\":{},\"bytes\":{}}}\n",
+               folder, is_whole, plan.tiles, built, kept, counters.bytes.load());
+  } else {
+    fmt::print("{}: {} tiles: {} built ({}), {} were there\n", folder, Grouped(plan.tiles), Grouped(built),
+               Bytes(static_cast<double>(counters.bytes)), Grouped(kept));
+  }
+  return is_whole ? kExitOk : kExitFailure;
+}
+
+}  // namespace terrace::cli

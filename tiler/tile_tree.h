@@ -1,0 +1,37 @@
+// The 3D Tiles documents of a dataset's GLB tiles: what a tileset and its subtrees say, whoever holds the tiles.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "engine/dem/dem_types.h"
+#include "engine/geo/tile_key.h"
+#include "proto/documents/implicit_tree.h"
+#include "proto/height_span.h"
+
+namespace terrace::tiler {
+
+// The tiles of a dataset and the heights in them. `available` must outlive it.
+struct TileTree {
+  std::string version, attribution;
+  const std::vector<std::vector<geo::TileRange>>& available;  // by level, from 0
+  dem::GeoBounds bounds;                                      // of the data; west > east: across the antimeridian
+  double error_fraction = 0.5;
+  int deepest_level = 0;                                       // of the sources; skirts depend on it
+  std::function<dem::HeightRange(const geo::TileKey&)> range;  // contains all samples of a tile
+  std::function<int(int level)> error_step;                    // of a level's tiles on its ladder
+};
+
+// The implicit trees, and the named tiles above them. `available` has tiles on level 0.
+std::vector<proto::TreeRoot> TreesOf(const TileTree& tree);
+
+// tileset.json. The queries are appended to the URLs of contents and subtrees; may be empty. `has_versions`: after the
+// version, as `v`.
+std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>& roots,
+                        const std::string& content_query, const std::string& subtree_query, bool has_versions = true);
+
+// The subtree of `levels` levels below `top`, an available tile.
+std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels);
+
+}  // namespace terrace::tiler
