@@ -13,7 +13,7 @@ import { Watch } from "/viewer/watch.js";
 
 const kFlightSeconds = 2.5;
 
-const kFirstSun = "06-21T18:30";  // of this year: an evening with long shadows, if none was chosen
+const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right

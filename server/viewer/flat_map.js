@@ -19,8 +19,9 @@ function toY(latitude) {
 const toLongitude = (x) => (((x % 1) + 1) % 1) * 360 - 180;
 const toLatitude = (y) => (Math.atan(Math.sinh(Math.PI * (1 - 2 * y))) * 180) / Math.PI;
 
-// Paints colours over the heights of an image, in place. `metres`: size of a pixel on the ground.
-function paint(pixels, width, heights, metres) {
+// Paints colours over the heights of an image, in place. `metres`: size of a pixel on the ground. `isInside(x, y)`: pixels
+// outside the dataset become transparent.
+function paint(pixels, width, heights, metres, isInside) {
   const height = new Float32Array(width * width);
   const { data } = pixels;
   for (let i = 0; i < height.length; ++i) {
@@ -37,6 +38,7 @@ function paint(pixels, width, heights, metres) {
       const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
       const colour = heightColour(height[i], heights);
       for (let k = 0; k < 3; ++k) data[4 * i + k] = colour[k] * shade;
+      if (!isInside(x, y)) data[4 * i + 3] = 0;
     }
   }
 }
@@ -65,6 +67,7 @@ class FlatMap {
     const [west, south, east, north] = dataset.bounds;
     const [left, right] = [toX(west), toX(east) + (east < west ? 1 : 0)];
     const [top, bottom] = [toY(north), toY(south)];
+    this.box = { left, right, top, bottom };
     this.centre = [(left + right) / 2, (top + bottom) / 2];
     const { clientWidth, clientHeight } = this.canvas.parentElement;
     this.scale = Math.min(clientWidth / (right - left), clientHeight / (bottom - top));  // pixels of the whole world
@@ -90,11 +93,19 @@ class FlatMap {
     context.drawImage(image, 0, 0);
     const pixels = context.getImageData(0, 0, tile.width, tile.height);
     const metres = (40075017 * Math.cos((toLatitude((y + 0.5) / 2 ** z) * Math.PI) / 180)) / 2 ** z / tile.width;
-    paint(pixels, tile.width, dataset.heights, metres);
+    const share = (of, pixel) => (of + (pixel + 0.5) / tile.width) / 2 ** z;
+    paint(pixels, tile.width, dataset.heights, metres, (i, j) => this.#isInside(share(x, i), share(y, j)));
     context.putImageData(pixels, 0, 0);
     if (dataset !== this.dataset) return;
     this.#tiles.set(key, tile);
     this.draw();
+  }
+
+  // `x`, `y`: a place in the world, or the nearest one in a square of `margin` around it.
+  #isInside(x, y, margin = 0) {
+    const { left, right, top, bottom } = this.box;
+    const isAcross = [x, x + 1].some((place) => place > left - margin && place < right + margin);
+    return isAcross && y > top - margin && y < bottom + margin;
   }
 
   draw() {
@@ -115,7 +126,10 @@ class FlatMap {
     const [left, top] = [this.centre[0] * this.scale - width / 2, this.centre[1] * this.scale - height / 2];
     for (let y = Math.max(0, Math.floor(top / size)); y < side && y * size < top + height; ++y) {
       for (let x = Math.floor(left / size); x * size < left + width; ++x) {
-        const tile = this.#tile(z, ((x % side) + side) % side, y);
+        const column = ((x % side) + side) % side;
+        const half = 0.5 / side;
+        if (!this.#isInside(column / side + half, y / side + half, half)) continue;
+        const tile = this.#tile(z, column, y);
         if (tile) context.drawImage(tile, Math.floor(x * size - left), Math.floor(y * size - top), Math.ceil(size) + 1, Math.ceil(size) + 1);
       }
     }

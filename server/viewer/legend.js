@@ -3,7 +3,7 @@ import { heightTicks, kColourings } from "/viewer/colours.js";
 import { formatHeight } from "/viewer/numbers.js";
 
 const kNames = { height: "Colours by height", slope: "Colours by slope, degrees", aspect: "Colours by the direction that the ground faces" };
-const kNearest = 0.24;  // of the width, between two numbers
+const kShareOfLetter = 0.024;  // of the width of the strip
 
 // `colouring`: a key of kColourings. `heights`: {min, max} of the dataset.
 export function drawLegend(figure, colouring, heights) {
@@ -20,7 +20,14 @@ export function drawLegend(figure, colouring, heights) {
 
 // The ends are the dataset's own; round heights between them where there is room.
 function ticksOfHeights(heights) {
-  const inner = heightTicks(heights).filter(([at]) => at > kNearest && at < 1 - kNearest);
-  const apart = inner.filter(([at], i) => i === 0 || at - inner[i - 1][0] >= kNearest);
-  return [[0, heights.min], ...apart, [1, heights.max]].map(([at, metres]) => [at, formatHeight(metres)]);
+  const text = (metres) => formatHeight(metres);
+  const room = (a, b) => (kShareOfLetter * (text(a).length + text(b).length)) / 2 + kShareOfLetter;
+  const ticks = [[0, heights.min]];
+  const end = (metres) => kShareOfLetter * (text(metres).length / 2);  // the texts at the ends are inside
+  for (const [at, metres] of heightTicks(heights)) {
+    const [last, value] = ticks.at(-1);
+    const before = last + (ticks.length === 1 ? end(value) : 0);
+    if (at - before > room(value, metres) && 1 - end(heights.max) - at > room(metres, heights.max)) ticks.push([at, metres]);
+  }
+  return [...ticks, [1, heights.max]].map(([at, metres]) => [at, text(metres)]);
 }

@@ -38,8 +38,8 @@ vec3 sunlit(vec3 normalENU, vec3 towards) {
   float facing = max(0.0, (dot(normalENU, towards) + 0.06) / 1.06);
   vec3 direct = mix(vec3(1.0, 0.50, 0.22), vec3(1.0, 0.97, 0.91), smoothstep(0.0, 0.42, altitude));
   float strength = smoothstep(-0.03, 0.07, altitude) / pow(max(altitude, 0.10), 0.62);
-  vec3 skylight = mix(vec3(0.06, 0.08, 0.15), vec3(0.60, 0.66, 0.80), day) * (0.75 + 0.25 * normalENU.z);
-  return skylight + direct * strength * facing * 0.60;
+  vec3 skylight = mix(vec3(0.06, 0.08, 0.15), vec3(0.42, 0.48, 0.64), day) * (0.75 + 0.25 * normalENU.z);
+  return skylight + direct * strength * facing * 0.62;
 }
 
 vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles) {

@@ -1,6 +1,6 @@
-// The light and what is above the ground: the sun of a date, its shadows, the sky's colours, and stars.
+// The light and what is above the ground: the sun of a date, the sky's colours, and stars.
 import {
-  Cartesian3, DirectionalLight, DynamicAtmosphereLightingType, ShadowMode, SkyBox, SunLight,
+  Cartesian3, DirectionalLight, DynamicAtmosphereLightingType, SkyBox, SunLight,
 } from "/viewer/cesium/index.js";
 
 const kStarsFrom = 2e6;  // metres from the ground; nearer, the air hides them
@@ -14,12 +14,12 @@ function drawStars(seed) {
   const context = canvas.getContext("2d");
   context.fillStyle = "#05080d";
   context.fillRect(0, 0, 1024, 1024);
-  for (let i = 0; i < 1500; ++i) {
+  for (let i = 0; i < 2600; ++i) {
     const bright = random() ** 9;
     const warm = random();
     context.fillStyle = `rgb(${205 + 50 * warm} 222 ${255 - 50 * warm} / ${0.12 + 0.85 * bright})`;
     context.beginPath();
-    context.arc(random() * 1024, random() * 1024, 0.55 + 0.9 * bright, 0, 7);
+    context.arc(random() * 1024, random() * 1024, 0.35 + 0.75 * bright, 0, 7);
     context.fill();
   }
   return canvas;
@@ -29,11 +29,6 @@ export class Sky {
   // `look`: the uniforms of the terrain's material.
   constructor(scene, look) {
     Object.assign(this, { scene, look });
-    const { shadowMap } = scene;
-    shadowMap.softShadows = true;
-    shadowMap.darkness = 0.8;
-    shadowMap.normalOffset = true;
-    shadowMap.size = 2048;
   }
 
   // A direction towards the sun, Earth-centred; undefined: light from the north-west everywhere.
@@ -48,25 +43,14 @@ export class Sky {
       scene.light = new SunLight();
       scene.atmosphere.dynamicLighting = DynamicAtmosphereLightingType.NONE;
     }
-    this.#cast();
+    scene.requestRender();
   }
 
-  // Distances change with the camera: stars from afar, shadows near the ground. `distance`: metres to the ground in view.
+  // Stars are drawn when they are first seen from afar. `distance`: metres to the ground in view.
   adapt(distance) {
     if (distance > kStarsFrom && !this.scene.skyBox && this.scene.globe.tilesLoaded) {
       const sources = Object.fromEntries(kFaces.map((face, i) => [face, drawStars(i + 1)]));
       this.scene.skyBox = new SkyBox({ sources });
     }
-    this.distance = distance;
-    this.#cast();
-  }
-
-  #cast() {
-    const { scene } = this;
-    const on = this.look.sunny === 1 && this.distance < 3e5 && this.look.wire === 0;
-    scene.shadowMap.enabled = on;
-    scene.globe.shadows = on ? ShadowMode.ENABLED : ShadowMode.DISABLED;
-    if (on) scene.shadowMap.maximumDistance = this.distance * 4;
-    scene.requestRender();
   }
 }
