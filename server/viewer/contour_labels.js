@@ -3,8 +3,8 @@
 import { Cartesian2, Cartesian3, Cartographic, Math as CesiumMath, SceneTransforms } from "/viewer/cesium/index.js";
 
 const kSpacing = 150;  // pixels between labels
-const kMostTriangles = 4000;  // of one tile that are looked at
-const kMost = 28;
+const kMaxTriangles = 4000;  // of one tile that are looked at
+const kMaxLabels = 28;
 
 function groundOf(world) {
   const { longitude, latitude, height } = Cartographic.fromCartesian(world);
@@ -37,7 +37,7 @@ export function placeLabels(scene, spacing, format) {
     const { encoding, vertices, indices } = mesh;
     const heightAt = (index) => encoding.decodeHeight(vertices, index);
     const triangles = mesh.indexCountWithoutSkirts / 3;
-    const step = Math.max(1, Math.floor(triangles / kMostTriangles));
+    const step = Math.max(1, Math.floor(triangles / kMaxTriangles));
     for (let t = 0; t < triangles; t += step) {
       const corners = [0, 1, 2].map((i) => indices[3 * t + i]);
       const heights = corners.map(heightAt);
@@ -56,7 +56,7 @@ export function placeLabels(scene, spacing, format) {
       const away = Cartesian3.distance(camera.positionWC, worlds[0]);
       if (!hit || Cartesian3.distance(camera.positionWC, hit) < away * 0.99) continue;
       labels.push({ text: format(height), ground: { ...ground, height }, ahead: { ...ahead, height } });
-      if (labels.length >= kMost) return labels;
+      if (labels.length >= kMaxLabels) return labels;
     }
   }
   return labels;

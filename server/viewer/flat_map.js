@@ -6,7 +6,7 @@ import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
 
 const kTile = 256;
-const kMostTiles = 300;  // in memory
+const kMaxTiles = 300;  // in memory
 const byId = (id) => document.getElementById(id);
 
 // Web Mercator: the whole world is 1 wide and 1 high.
@@ -77,7 +77,7 @@ class FlatMap {
   #tile(z, x, y) {
     const key = `${z}/${x}/${y}`;
     if (this.#tiles.has(key)) return this.#tiles.get(key);
-    if (this.#tiles.size > kMostTiles) this.#tiles.delete(this.#tiles.keys().next().value);
+    if (this.#tiles.size > kMaxTiles) this.#tiles.delete(this.#tiles.keys().next().value);
     this.#tiles.set(key, undefined);
     this.#load(key, z, x, y, this.dataset).catch(() => {});  // a missing tile stays blank
     return undefined;
