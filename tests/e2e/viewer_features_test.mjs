@@ -56,7 +56,7 @@ describe('features of the viewer', () => {
   let server, browser, page;
 
   const write = (...datasets) => fs.writeFileSync(config, JSON.stringify({ datasets }));
-  const settled = () => page.waitForFunction(() => terrace.state.ready && !terrace.globe.loading &&
+  const settled = () => page.waitForFunction(() => window.terrace?.state.ready && !terrace.globe.loading &&
     terrace.globe.drawn().tiles > 1 && !document.querySelector('.curtain'), undefined, kWait);
   const read = (id) => page.locator(id).innerText();
 
@@ -95,7 +95,7 @@ describe('features of the viewer', () => {
       return terrace.state.measure.add({ longitude: -84.2, latitude: 36.3, height: 400 });
     });
     await page.locator('#plot .ground.fill').waitFor({ timeout: 30000, state: 'attached' });
-    const [, straight, along] = /^([\d.,]+) m straight, ([\d.]+) /.exec(await read('#dock-text')) ?? /^([\d.,]+)/.exec('0');
+    const [, straight, along] = /^([\d.,]+) m straight, ([\d.,]+) /.exec(await read('#dock-text')) ?? /^([\d.,]+)/.exec('0');
     // 0.1 degrees of longitude at 36.3 N are 8986 m on the ellipsoid.
     assert.equal(straight, '8,986', `${await read('#dock-text')} ${along}`);
     await page.locator('#plot').focus();
