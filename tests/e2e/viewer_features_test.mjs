@@ -106,6 +106,7 @@ describe('features of the viewer', () => {
 
   it('tell what hides a place', async () => {
     await page.locator('#tool-sight').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'sight', undefined, kWait);
     await page.evaluate(() => {
       terrace.state.measure.add({ longitude: -84.3, latitude: 36.3, height: 400 });
       return terrace.state.measure.add({ longitude: -84.2, latitude: 36.3, height: 400 });
