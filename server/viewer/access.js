@@ -52,6 +52,18 @@ export class Access {
       return undefined;
     }
   }
+
+  // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where
+  // the dataset has none.
+  async profile(dataset, corners, samples) {
+    const path = corners.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
+    const query = new URLSearchParams({ path, samples });
+    const reply = await fetch(`${dataset.urls.heights}?${query}`, { headers: this.headers });
+    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
+    const { results } = await reply.json();
+    return results.map(({ elevation, distance, location }) =>
+      ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
+  }
 }
 
 function headersOf(token) {

@@ -2,16 +2,26 @@
 import { Access, UnknownToken } from "/viewer/access.js";
 import { boxOf, firstRegion, suggestedFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
+import { formatHeight } from "/viewer/numbers.js";
 import { Panel, fractionOfStep, stepOfFraction } from "/viewer/panel.js";
+import { fromLocalMeanTime, sunDirection } from "/viewer/sun.js";
+import { onTheme } from "/viewer/theme.js";
 import { TokenCard } from "/viewer/token_card.js";
 import { Traffic } from "/viewer/traffic.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
+import { Watch } from "/viewer/watch.js";
 
 const kFlightSeconds = 2.5;
 
-// `wanted`: a view of a dataset that is not in the list; it may be there with a token.
+const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
+const kCoarser = 8;  // between the errors on the left and on the right, at first
+
+// `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
+// of the line. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
+// missing. `isGone`: the server has no more this dataset.
 const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
-                wireframe: false, tiles3d: false, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
+                wireframe: false, tiles3d: false, right: undefined, colouring: "height", sun: undefined,
+                hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
 
 const access = new Access();
@@ -24,12 +34,21 @@ const panel = new Panel({
   exaggeration: (factor) => { globe.exaggeration = factor; remember(); },
   contours: (on) => setSwitches({ ...state, contours: on }),
   wireframe: (on) => setSwitches({ ...state, wireframe: on }),
-  tiles3d: (on) => { setSwitches({ ...state, tiles3d: on }); return show(); },
+  tiles3d: (on) => { setSwitches({ ...state, tiles3d: on, right: undefined }); return show(); },
+  compare: (on) => { setSwitches({ ...state, tiles3d: false, right: on ? coarserThan(state.fraction) : undefined }); return show(); },
+  right: (fraction) => { setSwitches({ ...state, right: fraction }); return show(); },
+  colouring: (name) => setColouring(name),
+  sunny: (on) => setSun(on ? `${new Date().getFullYear()}-${kFirstSun}` : undefined),
+  sun: (text) => setSun(text),
+  tool: (name) => useTool(name),
+  link: () => copyLink(),
   split: (share) => { globe.split = share; remember(); },
 });
 const card = new TokenCard((token) => useToken(token));
 const traffic = new Traffic();
 const globe = makeGlobe();
+
+const watch = new Watch({ list: () => list(), onLost: () => lose(), onList: (wasLost) => follow(wasLost) });
 
 function complain(problem) {
   state.problems.push(String(problem));
@@ -43,7 +62,7 @@ function ask(reason) {
 
 function makeGlobe() {
   try {
-    return new Globe(document.getElementById("globe"), complain);
+    return new Globe(document.getElementById("globe"), complain, missTile);
   } catch (error) {
     complain(`This browser cannot draw the globe: ${error.message}`);
     throw error;
@@ -54,17 +73,25 @@ function defaultFraction(dataset) {
   return fractionOfStep(stepOfFraction(suggestedFraction(firstRegion(dataset))));
 }
 
+function coarserThan(fraction) {
+  return fractionOfStep(stepOfFraction(fraction * kCoarser));
+}
+
 async function show() {
   const { dataset } = state;
   if (!dataset) return;
+  state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);
   traffic.reset();
+  lightSun();
   try {
-    await globe.show(dataset, state.fraction, state.tiles3d, access.headers);
+    await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
     panel.setMessage(undefined);
     state.ready = true;
   } catch (error) {
+    state.hasFailed = true;
+    if (watch.isLost) return;
     if (await access.isRefused(dataset.urls.layer).catch(() => false)) ask(`${dataset.name} needs a token.`);
     else complain(`${dataset.name} could not be loaded: ${error.message ?? error}`);
   }
@@ -89,14 +116,117 @@ function choose(name) {
 
 function refetch(fraction) {
   state.fraction = fraction;
+  panel.setSwitches(state);
   return show();
 }
 
-function setSwitches({ contours, wireframe, tiles3d }) {
-  Object.assign(state, { contours, wireframe, tiles3d });
+// The server does not answer: the picture stays, and comes to life again with the server.
+function lose() {
+  panel.setMessage("The server does not answer. The page goes on as soon as it does.");
+}
+
+// The server has answered with its list. Shows the dataset anew if it has another version, or if tiles could not be read.
+function follow(wasLost) {
+  const { dataset } = state;
+  if (!dataset || !state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
+  const current = state.datasets.find(({ name }) => name === dataset.name);
+  if (!current) {
+    state.isGone = true;
+    return panel.setMessage(`${dataset.name} is no longer on this server. What is drawn is what it was.`);
+  }
+  const isNew = current.version !== dataset.version;
+  const isBack = state.isGone;
+  state.dataset = current;
+  state.isGone = false;
+  if (isNew) panel.note(`${dataset.name} has a new version.`);
+  if (wasLost || isBack) panel.setMessage(undefined);
+  if (isNew || isBack || (state.hasFailed && wasLost)) return show();
+}
+
+// A tile could not be read: the server may be gone, or the dataset may have changed. If neither is so, tries again later.
+function missTile(problem) {
+  if (state.hasFailed) return;
+  state.hasFailed = true;
+  watch.check().then(() => {
+    if (watch.isLost || state.isGone || !state.hasFailed) return;
+    complain(problem);
+    setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
+  });
+}
+
+function setColouring(name) {
+  state.colouring = globe.colouring = name;
+  panel.setColouring(name);
+  remember();
+}
+
+function lightSun() {
+  const { longitude } = boxOf(firstRegion(state.dataset).bounds);
+  globe.sky.sun = state.sun && sunDirection(fromLocalMeanTime(state.sun, longitude));
+}
+
+function setSun(text) {
+  state.sun = text;
+  panel.setSun(text);
+  if (state.dataset) lightSun();
+  remember();
+}
+
+// Measuring is loaded when it is first used.
+async function useTool(name) {
+  const { Measure } = await import("/viewer/measure.js");
+  state.measure ??= new Measure({ globe, access, dataset: () => state.dataset, onMode: setMode });
+  state.measure.toggle(name);
+}
+
+function setMode(name) {
+  panel.setTool(name);
+  read(undefined);
+}
+
+async function copyLink() {
+  remember();
+  try {
+    await navigator.clipboard.writeText(location.href);
+    panel.note("The link to this view is copied.");
+  } catch {
+    panel.note("The address bar has the link to this view.");
+  }
+}
+
+const kKeys = {
+  c: () => setSwitches({ ...state, contours: !state.contours }),
+  w: () => setSwitches({ ...state, wireframe: !state.wireframe }),
+  x: () => document.getElementById("compare").click(),
+  d: () => useTool("distance"),
+  l: () => useTool("sight"),
+  Home: () => document.getElementById("home").click(),
+  Escape: () => state.measure?.end(),
+  Backspace: () => state.measure?.undo(),
+  "?": () => document.getElementById("help").click(),
+};
+
+// Whether the page uses this key, pressed on the globe.
+function pressKey(key) {
+  const act = kKeys[key.length === 1 ? key.toLowerCase() : key];
+  act?.();
+  return act !== undefined;
+}
+
+// Labels of contours are placed when the view is at rest; their part of the page is loaded when it is first used.
+async function labelContours() {
+  if (!state.contours || globe.loading) return;
+  const { placeLabels } = await import("/viewer/contour_labels.js");
+  if (state.contours) globe.overlay.setLabels(placeLabels(globe.scene, 5 * globe.interval, formatHeight));
+}
+
+function setSwitches({ contours, wireframe, tiles3d, right }) {
+  Object.assign(state, { contours, wireframe, tiles3d, right });
   globe.contours = contours;
   globe.wireframe = wireframe;
   globe.adaptToCamera();
+  if (!contours) globe.overlay.setLabels([]);
+  state.labelled = undefined;
   panel.setSwitches(state);
   remember();
 }
@@ -122,6 +252,8 @@ async function apply(view) {
   if (named && view.camera) globe.camera = view.camera;
   else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);
+  setColouring(view.colouring);
+  setSun(view.sun);
   await show();
   if (!state.wanted) return;
   if (state.moreWithToken) ask(`${view.dataset} needs a token, or is not on this server.`);
@@ -130,16 +262,22 @@ async function apply(view) {
 
 function refresh() {
   state.drawn = globe.drawn();
-  panel.setStats(state.drawn, traffic, state.tiles3d ? globe.tiles3d.drawn() : undefined);
+  const isSplit = state.tiles3d || state.right !== undefined;
+  panel.setStats(state.drawn, traffic, isSplit ? globe.tiles3d.drawn() : undefined, state.right !== undefined);
   panel.setInterval(state.contours ? globe.interval : 0);
   panel.setActivity(globe.loading ? "loading" : "");
+  // The labels belong to one camera and one set of tiles.
+  const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${state.drawn.keys}`;
+  if (globe.loading || view === state.labelled) return;
+  state.labelled = view;
+  labelContours();
 }
 
 // Throws UnknownToken.
 async function list(token) {
   const { datasets, moreWithToken } = await access.list(token);
   Object.assign(state, { datasets, moreWithToken });
-  panel.setDatasets(datasets, moreWithToken);
+  panel.setDatasets(datasets, moreWithToken, state.dataset?.name);
 }
 
 async function useToken(token) {
@@ -166,16 +304,29 @@ async function listAtStart() {
   }
 }
 
+async function read(position) {
+  state.picked = position;
+  panel.setReadout(position);
+  if (!position) return;
+  const height = await access.heightAt(state.dataset, position.longitude, position.latitude);
+  if (state.picked === position) panel.setReadout(position, height);
+}
+
 async function start() {
   panel.setActivity("loading");
-  globe.onPick((position) => panel.setReadout(state.picked = position));
+  globe.onKey = pressKey;
+  globe.onPick(read);
+  onTheme((isLight) => (globe.isLight = isLight));
   globe.scene.camera.moveEnd.addEventListener(remember);
   addEventListener("hashchange", () => apply(decodeView(location.hash)));
   try {
     await listAtStart();
   } catch (error) {
-    return complain(`The list of datasets could not be read: ${error.message}. Is the server running?`);
+    complain(`The list of datasets could not be read: ${error.message}. Is the server running?`);
+    watch.isLost = true;
+    return watch.start();
   }
+  watch.start();
   if (state.datasets.length > 0) return apply(decodeView(location.hash));
   if (state.moreWithToken) return ask("The datasets of this server need a token.");
   complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");

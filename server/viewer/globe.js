@@ -1,12 +1,15 @@
 // The CesiumJS part of the page: the widget, its terrain, the camera, picking, and statistics of the drawn tiles.
 import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
-  HeadingPitchRange, Math as CesiumMath, PointPrimitiveCollection, Resource, ScreenSpaceEventHandler,
+  HeadingPitchRange, Math as CesiumMath, Resource, ScreenSpaceEventHandler,
   ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
-import { makeTerrainMaterial, niceInterval, setHeights } from "/viewer/material.js";
+import { niceInterval } from "/viewer/colours.js";
+import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.js";
+import { Overlay } from "/viewer/overlay.js";
+import { Sky } from "/viewer/sky.js";
 import { Tiles3d } from "/viewer/tiles3d.js";
 
 // Renderers without a GPU, for which antialiasing is too slow.
@@ -16,22 +19,24 @@ const kWorldMiddle = [82, 18];  // longitude and latitude at the centre of a vie
 export class Globe {
   #latest = 0;  // number of the latest show(): of overlapping calls only the latest may set the terrain
 
-  // `onError` gets a sentence for the user.
-  constructor(container, onError) {
+  // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read.
+  constructor(container, onError, onTileError) {
     const credits = document.createElement("div");  // the page states the attribution itself
     this.widget = new CesiumWidget(container, {
-      baseLayer: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
+      baseLayer: false, skyBox: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
       requestRenderMode: true, maximumRenderTimeChange: Infinity, useBrowserRecommendedResolution: false,
     });
     this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
     this.scene = this.widget.scene;
     this.container = container;
-    this.onError = onError;
+    Object.assign(this, { onError, onTileError });
     this.contours = false;
     this.interval = 0;
     this.#dressScene();
     this.tiles3d = new Tiles3d(this.scene, this.material.uniforms);
-    this.marker = this.scene.primitives.add(new PointPrimitiveCollection());
+    this.sky = new Sky(this.scene, this.material.uniforms);
+    this.overlay = new Overlay(this.scene, container);
+    this.onClick = undefined;  // while set, gets clicked ground instead of onPick's callback
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
     this.scene.renderError.addEventListener((_, error) => onError(`Drawing stopped: ${error.message ?? error}`));
@@ -39,8 +44,6 @@ export class Globe {
 
   #dressScene() {
     const { globe, screenSpaceCameraController: controller } = this.scene;
-    this.scene.sun.show = false;
-    this.scene.moon.show = false;
     this.scene.skyAtmosphere.atmosphereLightIntensity = 22;
     this.scene.backgroundColor = Color.fromCssColorString("#05080d");
     controller.tiltEventTypes.push(CameraEventType.RIGHT_DRAG);
@@ -51,6 +54,7 @@ export class Globe {
     this.scene.fog.renderable = false;
     if (kSoftware.test(this.#renderer())) this.scene.msaaSamples = 1;
     globe.showWaterEffect = false;
+    globe.show = false;  // nothing is asked for before there is a dataset
     globe.material = this.material = makeTerrainMaterial();
   }
 
@@ -60,16 +64,16 @@ export class Globe {
     return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
 
-  // Shows `dataset` at `fraction` of the level error, its 3D Tiles too if `compare`. `headers` go with every request.
-  // Throws a readable message if the server does not describe it.
-  async show(dataset, fraction, compare, headers) {
+  // Shows `dataset` at `fraction` of the level error, and its 3D Tiles at `compared` unless that is undefined. `headers`
+  // go with every request. Throws a readable message if the server does not describe it.
+  async show(dataset, fraction, compared, headers) {
     const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
     const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
     // If layer.json is missing, CesiumJS assumes an old server of height maps.
     if (!provider.availability) throw new Error(`${url} does not describe any terrain`);
     if (turn !== this.#latest) return;
-    provider.errorEvent.addEventListener((failure) => this.onError(failure.message));
+    provider.errorEvent.addEventListener((failure) => turn === this.#latest && this.onTileError(failure.message));
 
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
@@ -78,16 +82,17 @@ export class Globe {
     this.material.uniforms.box = { x, y, z, w };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
     this.widget.terrainProvider = provider;
+    this.scene.globe.show = true;
     this.adaptToCamera();
-    const tileset = `${dataset.urls.tileset}?fraction=${fraction}`;
-    await this.compare(compare ? new Resource({ url: tileset, headers }) : undefined);
+    const tileset = `${dataset.urls.tileset}?fraction=${compared}`;
+    await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
   }
 
   // 3D Tiles from this resource to the right of the splitter; without one, terrain everywhere.
   async compare(tileset) {
     this.material.uniforms.split = tileset ? 1 : 0;
     this.#hideAir();
-    if (tileset) await this.tiles3d.show(tileset, this.onError);
+    if (tileset) await this.tiles3d.show(tileset, this.onTileError);
     else this.tiles3d.hide();
     this.scene.requestRender();
   }
@@ -184,6 +189,24 @@ export class Globe {
 
   set exaggeration(factor) {
     this.scene.verticalExaggeration = factor;
+    this.material.uniforms.exaggeration = factor;
+    this.scene.requestRender();
+  }
+
+  // "height", "slope" or "aspect".
+  set colouring(name) {
+    setColouring(this.material, name);
+    this.#renderFrames(3);  // CesiumJS uses a new image in the second frame
+  }
+
+  #renderFrames(count) {
+    const stop = this.scene.postRender.addEventListener(() => (--count > 0 ? this.scene.requestRender() : stop()));
+    this.scene.requestRender();
+  }
+
+  // Around the dataset: paper instead of slate.
+  set isLight(on) {
+    this.material.uniforms.paper = on ? 1 : 0;
     this.scene.requestRender();
   }
 
@@ -199,6 +222,7 @@ export class Globe {
     uniforms.relief = CesiumMath.clamp(Math.pow(distance / 45000, 0.55), 1.15, 14);
     uniforms.farness = CesiumMath.clamp((Math.log10(distance) - 6.2) / 0.8, 0, 1);
     uniforms.hazeDistance = Math.max(150000, distance * 5);
+    this.sky.adapt(distance);
     uniforms.graticule = CesiumMath.toRadians(distance > 3e6 ? 10 : distance > 2e5 ? 1 : 0.1);
     this.scene.requestRender();
   }
@@ -209,20 +233,20 @@ export class Globe {
     const { canvas, camera } = this.scene;
     const handler = new ScreenSpaceEventHandler(canvas);
     const middle = () => ({ x: canvas.clientWidth / 2, y: canvas.clientHeight / 2 });
-    steerByKeyboard(this.container, camera, () => callback(this.pick(middle())));
-    handler.setInputAction(({ position }) => callback(this.pick(position)), ScreenSpaceEventType.LEFT_CLICK);
+    const click = (position) => {
+      const ground = this.pick(position);
+      if (this.onClick) return this.onClick(ground);
+      this.overlay.setMarker("picked", ground);
+      callback(ground);
+    };
+    steerByKeyboard(this.container, camera, () => click(middle()), (key) => this.onKey?.(key) ?? false);
+    handler.setInputAction(({ position }) => click(position), ScreenSpaceEventType.LEFT_CLICK);
   }
 
   pick(windowPosition) {
     const ray = this.scene.camera.getPickRay(windowPosition);
     const point = ray && this.scene.globe.pick(ray, this.scene);
-    this.marker.removeAll();
-    this.scene.requestRender();
     if (!point) return undefined;
-    this.marker.add({
-      position: point, pixelSize: 9, color: Color.fromCssColorString("#f7e3b4"), outlineColor: Color.BLACK,
-      outlineWidth: 2, disableDepthTestDistance: 5e6,
-    });
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
              height: ground.height / this.exaggeration };

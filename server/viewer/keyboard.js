@@ -1,5 +1,5 @@
 // Controls the camera by keyboard while the globe has the focus: arrows move, Shift and arrows turn, plus and minus
-// zoom, Enter shows the height at the centre.
+// zoom, Enter shows the height at the centre; the page defines other keys.
 import { Cartesian3, Math as CesiumMath } from "/viewer/cesium/index.js";
 
 const kTurn = CesiumMath.toRadians(4);
@@ -24,14 +24,15 @@ function turn(camera, right, up) {
 const kArrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const kZooms = { "+": 1, "=": 1, "-": -1 };
 
-export function steerByKeyboard(element, camera, onEnter) {
+// `onKey(key)` returns whether the page has used the key.
+export function steerByKeyboard(element, camera, onEnter, onKey) {
   element.tabIndex = 0;
   element.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key in kArrows) (event.shiftKey ? turn : travel)(camera, ...kArrows[event.key]);
     else if (event.key in kZooms) camera.zoomIn(kZooms[event.key] * 0.2 * camera.positionCartographic.height);
     else if (event.key === "Enter") onEnter();
-    else return;
+    else if (!onKey(event.key)) return;
     event.preventDefault();
   });
 }

@@ -1,54 +1,7 @@
-// The material of the globe: colours by height, shading by the tiles' vertex normals, and contour lines. The light is
-// in the local north-west of every point, as on a printed map, so no hemisphere is dark.
+// The material of the globe: colours by height, slope or aspect, shading by the tiles' vertex normals, and contour lines.
+// Without a sun, the light is in the local north-west of every point, as on a printed map, so no hemisphere is dark.
 import { Material } from "/viewer/cesium/index.js";
-
-// Depth and height as fractions of the dataset's range, and sRGB. Low ground has most of the colours, because most land
-// is low.
-const kSea = [
-  [0.0, 5, 16, 48], [0.25, 10, 44, 98], [0.5, 20, 78, 138], [0.75, 38, 112, 168], [0.93, 78, 154, 196],
-  [1.0, 136, 196, 212],
-];
-const kLand = [
-  [0.0, 74, 122, 84], [0.07, 98, 144, 88], [0.16, 146, 166, 98], [0.28, 200, 184, 118], [0.42, 198, 154, 94],
-  [0.56, 166, 116, 74], [0.7, 134, 96, 76], [0.82, 158, 142, 136], [0.92, 222, 219, 217], [1.0, 255, 255, 255],
-];
-// If the lowest height is above this, it counts as land below the ellipsoid, not as a sea floor.
-const kShallowestSeaFloor = -200;
-// Datasets of land store the sea as a plain: level ground below this fraction of the heights is drawn as water, if the
-// dataset reaches sea level.
-const kWaterShare = 0.025;
-const kHighestSea = 50;
-const kMinRelief = 300;
-
-function colourAt(stops, t) {
-  const next = Math.max(1, stops.findIndex((stop) => stop[0] >= t));
-  const [t0, ...a] = stops[next - 1];
-  const [t1, ...b] = stops[next];
-  const s = Math.min(1, Math.max(0, (t - t0) / (t1 - t0)));
-  return a.map((channel, i) => Math.round(channel + s * (b[i] - channel)));
-}
-
-// sRGB colour of a height in a dataset whose heights run from `min` to `max`, metres.
-export function heightColour(height, { min, max }) {
-  if (min > kShallowestSeaFloor) return colourAt(kLand, (height - min) / (max - min));
-  return height < 0 ? colourAt(kSea, 1 - height / min) : colourAt(kLand, Math.pow(height / Math.max(max, 1), 0.8));
-}
-
-function waterline({ min, max }) {
-  const coastal = min > kShallowestSeaFloor && min < kHighestSea && max - min > kMinRelief;
-  return coastal ? min + kWaterShare * (max - min) : -1e5;
-}
-
-// A one-pixel-high strip of the ramp, min on the left.
-export function drawRamp(canvas, heights) {
-  const pixels = canvas.getContext("2d").createImageData(canvas.width, 1);
-  for (let x = 0; x < canvas.width; ++x) {
-    const height = heights.min + (x / (canvas.width - 1)) * (heights.max - heights.min);
-    pixels.data.set([...heightColour(height, heights), 255], 4 * x);
-  }
-  canvas.getContext("2d").putImageData(pixels, 0, 0);
-  return canvas;
-}
+import { kColourings, kSteepest, waterline } from "/viewer/colours.js";
 
 export const kRampWidth = 2048;
 
@@ -60,6 +13,7 @@ const vec3 kShadow = vec3(0.30, 0.33, 0.46);
 const vec3 kSunlight = vec3(1.0, 0.97, 0.90);
 const vec3 kAir = vec3(0.45, 0.62, 0.82);
 const vec3 kWater = vec3(0.20, 0.45, 0.62);
+const vec3 kPaper = vec3(0.72, 0.76, 0.80);
 const vec3 kElsewhere = vec3(0.105, 0.135, 0.175);
 
 // 1 on a line, 0 between lines; value is in units of the spacing. Fades where lines would be denser than every fourth
@@ -74,6 +28,18 @@ float lines(float value, float widthPixels) {
 // Brightness of a surface relative to level ground, lit from a compass direction (x east, y north), 40 degrees high.
 float lit(vec3 normalENU, vec2 towards) {
   return max(0.0, dot(normalENU, vec3(towards * 0.766, 0.643))) / 0.643;
+}
+
+// Light of a sun in direction towards, relative to bright daylight. The shadow's edge is soft, as it is under a real sky. A
+// low sun is orange, and exposure makes up for part of its weakness.
+vec3 sunlit(vec3 normalENU, vec3 towards) {
+  float altitude = towards.z;
+  float day = smoothstep(-0.14, 0.10, altitude);
+  float facing = max(0.0, (dot(normalENU, towards) + 0.06) / 1.06);
+  vec3 direct = mix(vec3(1.0, 0.50, 0.22), vec3(1.0, 0.97, 0.91), smoothstep(0.0, 0.42, altitude));
+  float strength = smoothstep(-0.03, 0.07, altitude) / pow(max(altitude, 0.10), 0.62);
+  vec3 skylight = mix(vec3(0.06, 0.08, 0.15), vec3(0.42, 0.48, 0.64), day) * (0.75 + 0.25 * normalENU.z);
+  return skylight + direct * strength * facing * 0.62;
 }
 
 vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles) {
@@ -94,17 +60,32 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
   float towardsShore = (metres - heightRange.x) / max(water - heightRange.x, 1e-3);
   colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, towardsShore)));
+
+  // Slope and aspect of the ground itself: without exaggeration, and from the triangle where tiles have no normals.
+  vec3 facet = czm_inverseViewRotation * cross(dFdx(position), dFdy(position));
+  facet = vec3(dot(facet, east), dot(facet, north), dot(facet, up));
+  vec3 ground = shading > 0.5 ? normal : facet * sign(facet.z);
+  ground = normalize(vec3(ground.xy / exaggeration, max(ground.z, 1e-6)));
+  if (colouring > 0.5) {
+    float degreesOfSlope = degrees(acos(clamp(ground.z, 0.0, 1.0)));
+    float aspect = fract(atan(ground.x, ground.y) / czm_twoPi);
+    float along = colouring < 1.5 ? clamp(degreesOfSlope / ${kSteepest}.0, 0.0, 1.0) : aspect;
+    colour = texture(theme, vec2(mix(0.5, ${kRampWidth}.0 - 0.5, along) / ${kRampWidth}.0, 0.5)).rgb;
+    if (colouring > 1.5) colour = mix(vec3(0.72), colour, smoothstep(0.5, 4.0, degreesOfSlope));
+  }
   normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
 
   // Bare rock where it is too steep for soil or snow.
   float luminance = dot(colour, vec3(0.299, 0.587, 0.114));
-  colour = mix(colour, vec3(0.46, 0.42, 0.39) * (0.5 + luminance), smoothstep(0.18, 0.5, steepness) * 0.55);
+  colour = mix(colour, vec3(0.46, 0.42, 0.39) * (0.5 + luminance), smoothstep(0.18, 0.5, steepness) * (colouring > 0.5 ? 0.0 : 0.55));
 
   // Most of the light from the north-west, some from its two neighbours so that ridges along it keep their form.
   float light = 0.7 * lit(normal, vec2(-0.707, 0.707)) + 0.15 * lit(normal, vec2(-1.0, 0.0)) +
                 0.15 * lit(normal, vec2(0.0, 1.0));
   vec3 shade = mix(kShadow, vec3(1.0), smoothstep(-0.15, 1.05, light)) + kSunlight * 0.28 * max(0.0, light - 1.0);
-  shade = mix(vec3(1.0), shade, shading);
+  if (sunny > 0.5) shade = sunlit(shading > 0.5 ? normal : vec3(0.0, 0.0, 1.0), vec3(dot(sun, east), dot(sun, north), dot(sun, up)));
+  else shade = mix(vec3(1.0), shade, shading);
+  shade = mix(shade, mix(vec3(1.0), shade, 0.55), step(0.5, colouring));  // colours with a meaning must stay readable
   colour *= shade;
 
   if (contourInterval > 0.0) {
@@ -122,16 +103,19 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   if (!tiles && split > 0.5 && gl_FragCoord.x > czm_splitPosition && max(beyond.x, beyond.y) < 0.0) discard;
   float outside = smoothstep(0.0, 0.012 * (box.z + box.w), max(beyond.x, beyond.y));
   float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
-  colour = mix(colour, (kElsewhere + 0.06 * grid) * mix(vec3(1.0), shade, 0.6), outside * (1.0 - wire));
+  vec3 elsewhere = mix(kElsewhere + 0.06 * grid, kPaper - 0.07 * grid, paper);
+  colour = mix(colour, elsewhere * mix(vec3(1.0), shade, sunny > 0.5 ? 0.35 : 0.6), outside * (1.0 - wire));
 
   // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground
   // the air is between the viewer and the distance.
   vec3 toEye = normalize(czm_viewerPositionWC - positionWC);
   vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
-  colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire));
+  colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire) * (1.0 - sunny));
   float rim = pow(1.0 - clamp(dot(up, toEye), 0.0, 1.0), 4.0) * farness;
   float haze = (1.0 - exp(-pow(length(positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
-  colour = mix(colour, kAir, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
+  float daylight = sunny > 0.5 ? smoothstep(-0.10, 0.25, dot(sun, up)) : 1.0;
+  vec3 air = mix(vec3(0.05, 0.07, 0.12), mix(vec3(0.72, 0.50, 0.38), kAir, sunny > 0.5 ? smoothstep(0.05, 0.4, dot(sun, up)) : 1.0), daylight);
+  colour = mix(colour, air, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
 
   return mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
 }`;
@@ -140,7 +124,8 @@ const kSource = /* glsl */ `
 ${kLook}
 czm_material czm_getMaterial(czm_materialInput materialInput) {
   czm_material material = czm_getDefaultMaterial(materialInput);
-  material.diffuse = terrainColour(materialInput.height, materialInput.positionToEyeEC, materialInput.normalEC, false);
+  // CesiumJS gives the height after exaggeration.
+  material.diffuse = terrainColour(materialInput.height / exaggeration, materialInput.positionToEyeEC, materialInput.normalEC, false);
   material.alpha = 1.0;
   return material;
 }`;
@@ -162,6 +147,12 @@ export function makeTerrainMaterial() {
         farness: 0,          // 0 near the ground, 1 with the whole globe in view
         hazeDistance: 1e6,   // metres at which air hides most of the ground
         wire: 0,             // 1 while the surface is drawn as lines
+        paper: 0,            // 1 in the light theme, around the dataset
+        exaggeration: 1,     // vertical scale of the geometry
+        colouring: 0,        // 0 by height, 1 by slope, 2 by aspect
+        theme: document.createElement("canvas"),  // the ramp of slope or aspect
+        sunny: 0,            // 1 while the sun of a date lights the ground
+        sun: { x: 0, y: 0, z: 1 },  // direction towards the sun, Earth-centred
         split: 0,            // 1 while 3D Tiles are drawn to the right of the splitter
       },
       source: kSource,
@@ -173,14 +164,19 @@ export function setHeights(material, heights) {
   const canvas = document.createElement("canvas");
   canvas.width = kRampWidth;
   canvas.height = 1;
-  material.uniforms.ramp = drawRamp(canvas, heights);
+  material.uniforms.ramp = kColourings.height.draw(canvas, heights);
   material.uniforms.water = waterline(heights);
   material.uniforms.heightRange = { x: heights.min, y: Math.max(heights.max, heights.min + 1) };
 }
 
-// 1, 2 or 5 times a power of ten.
-export function niceInterval(metres) {
-  const power = 10 ** Math.floor(Math.log10(metres));
-  const lead = metres / power;
-  return (lead < 1.5 ? 1 : lead < 3.5 ? 2 : lead < 7.5 ? 5 : 10) * power;
+const kOrder = Object.keys(kColourings);
+
+// `name`: a key of kColourings.
+export function setColouring(material, name) {
+  const canvas = document.createElement("canvas");
+  canvas.width = kRampWidth;
+  canvas.height = 1;
+  const number = Math.max(0, kOrder.indexOf(name));
+  if (number > 0) material.uniforms.theme = kColourings[name].draw(canvas);
+  material.uniforms.colouring = number;
 }

@@ -1,5 +1,8 @@
 // The controls and the numbers beside the globe. Uses the page's elements, but not CesiumJS.
-import { drawRamp } from "/viewer/material.js";
+import { drawLegend } from "/viewer/legend.js";
+import {
+  formatBytes, formatCompact, formatFraction, formatHeight, formatMetres, formatNumber, formatPosition,
+} from "/viewer/numbers.js";
 import { Splitter } from "/viewer/splitter.js";
 import { kPhases } from "/viewer/traffic.js";
 
@@ -11,61 +14,81 @@ export const stepOfFraction = (fraction) =>
   Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
 const byId = (id) => document.getElementById(id);
-const number = new Intl.NumberFormat("en");
-const plain = { format: (value) => number.format(value).replace("-", "−") };
-const compact = new Intl.NumberFormat("en", { notation: "compact", maximumSignificantDigits: 3 });
-
-function formatMetres(metres) {
-  const size = Math.abs(metres);
-  const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
-  if (size >= 10000) return `${plain.format(Math.round(metres / 100) / 10)} km`;
-  return `${plain.format(Number(metres.toFixed(digits)))} m`;
-}
-
-function formatBytes(bytes) {
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
-}
-
-function formatFraction(fraction) {
-  return fraction >= 1 ? `${Number(fraction.toFixed(2))} ×` : `1/${Number((1 / fraction).toFixed(1))}`;
-}
-
-function formatPosition({ longitude, latitude, height }) {
-  const angle = (value, positive, negative) => `${Math.abs(value).toFixed(5)}° ${value < 0 ? negative : positive}`;
-  return `${angle(latitude, "N", "S")}  ${angle(longitude, "E", "W")}  ${plain.format(Number(height.toFixed(1)))} m`;
-}
+const kSwitches = ["contours", "wireframe", "tiles3d", "compare", "sunny"];
 
 export class Panel {
-  // `actions`: dataset(name), home(), whole(), token(), fraction(value), exaggeration(value), contours(on), wireframe(on),
-  // tiles3d(on), split(share).
+  // `actions`: dataset(name), home(), whole(), token(), fraction(value), right(value), exaggeration(value), colouring(name),
+  // contours(on), wireframe(on), tiles3d(on), compare(on), sunny(on), sun(text), split(share), tool(name), link().
   constructor(actions) {
     byId("dataset").addEventListener("change", (event) => actions.dataset(event.target.value));
     byId("home").addEventListener("click", actions.home);
     byId("whole").addEventListener("click", actions.whole);
     byId("use-token").addEventListener("click", actions.token);
-    Object.assign(byId("fraction"), { min: kCoarsest, max: kFinest, step: 1 });
-    let settle;
-    byId("fraction").addEventListener("input", (event) => {
-      const fraction = fractionOfStep(event.target.valueAsNumber);
-      this.setFraction(fraction);
-      clearTimeout(settle);  // steps passed during a drag should not be fetched
-      settle = setTimeout(() => actions.fraction(fraction), 250);
-    });
+    for (const name of ["fraction", "right"]) {
+      Object.assign(byId(name), { min: kCoarsest, max: kFinest, step: 1 });
+      let settle;
+      byId(name).addEventListener("input", (event) => {
+        const fraction = fractionOfStep(event.target.valueAsNumber);
+        this.setFraction(fraction, name);
+        clearTimeout(settle);  // steps passed during a drag should not be fetched
+        settle = setTimeout(() => actions[name](fraction), 250);
+      });
+    }
     byId("exaggeration").addEventListener("input", (event) => {
       this.setExaggeration(event.target.valueAsNumber);
       actions.exaggeration(event.target.valueAsNumber);
     });
-    for (const name of ["contours", "wireframe", "tiles3d"]) {
+    byId("colouring").addEventListener("change", (event) => actions.colouring(event.target.value));
+    for (const id of ["sun-date", "sun-hour"]) byId(id).addEventListener("input", () => this.#readSun(actions));
+    for (const tool of ["distance", "sight"]) byId(`tool-${tool}`).addEventListener("click", () => actions.tool(tool));
+    byId("link").addEventListener("click", actions.link);
+    byId("help").addEventListener("click", () => byId("keys").showModal());
+    for (const name of kSwitches) {
       byId(name).addEventListener("change", (event) => actions[name](event.target.checked));
     }
     this.splitter = new Splitter(byId("splitter"), actions.split);
     if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
+    if (innerHeight < 760) byId("costs").open = false;
   }
 
-  // `moreWithToken`: a token may show others.
-  setDatasets(datasets, moreWithToken) {
-    byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+  #readSun(actions) {
+    const hour = byId("sun-hour").valueAsNumber;
+    const two = (value) => String(Math.floor(value)).padStart(2, "0");
+    if (byId("sun-date").value) actions.sun(`${byId("sun-date").value}T${two(hour)}:${two((hour % 1) * 60)}`);
+  }
+
+  // `text`: "2026-06-21T18:30"; undefined: no sun.
+  setSun(text) {
+    byId("sunny").checked = Boolean(text);
+    byId("sun-field").hidden = !text;
+    if (!text) return;
+    const [hour, minute] = text.slice(11).split(":").map(Number);
+    byId("sun-date").value = text.slice(0, 10);
+    byId("sun-hour").value = hour + minute / 60;
+    byId("sun-value").textContent = text.slice(11);
+    byId("sun-hour").setAttribute("aria-valuetext", text.slice(11));
+  }
+
+  setTool(name) {
+    for (const tool of ["distance", "sight"]) byId(`tool-${tool}`).setAttribute("aria-pressed", String(tool === name));
+  }
+
+  // A passing remark.
+  note(text) {
+    byId("note").textContent = text;
+    byId("note").hidden = !text;
+    clearTimeout(this.noteTimer);
+    this.noteTimer = setTimeout(() => (byId("note").hidden = true), 4000);
+  }
+
+  // `moreWithToken`: a token may show others. `shown`: name of the dataset that is drawn.
+  setDatasets(datasets, moreWithToken, shown) {
+    const names = datasets.map(({ name }) => name).join("\n");
     byId("use-token").hidden = !moreWithToken;
+    if (names === this.names) return;  // an open list must not close
+    this.names = names;
+    byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    if (shown) byId("dataset").value = shown;
   }
 
   // `hasPart`: the first view shows a part of the dataset.
@@ -73,17 +96,22 @@ export class Panel {
     byId("dataset").value = name;
     byId("whole").hidden = !hasPart;
     document.title = `${name} · terrace`;
-    drawRamp(byId("ramp"), heights);
-    byId("lowest").textContent = formatMetres(heights.min);
-    byId("highest").textContent = formatMetres(heights.max);
+    this.heights = heights;
+    this.setColouring(byId("colouring").value);
     byId("attribution").textContent = [attribution, "drawn with CesiumJS"].filter(Boolean).join(" · ");
   }
 
-  setFraction(fraction) {
-    byId("fraction").value = stepOfFraction(fraction);
+  setColouring(name) {
+    byId("colouring").value = name;
+    if (this.heights) drawLegend(byId("legend"), name, this.heights);
+  }
+
+  // `name`: "fraction", or "right" of the line.
+  setFraction(fraction, name = "fraction") {
+    byId(name).value = stepOfFraction(fraction);
     const text = `${formatFraction(fraction)} of the level's`;
-    byId("fraction-value").textContent = text;
-    byId("fraction").setAttribute("aria-valuetext", text);
+    byId(`${name}-value`).textContent = text;
+    byId(name).setAttribute("aria-valuetext", text);
   }
 
   setExaggeration(factor) {
@@ -91,11 +119,16 @@ export class Panel {
     byId("exaggeration-value").textContent = factor === 1 ? "true to scale" : `${factor} ×`;
   }
 
-  setSwitches({ contours, wireframe, tiles3d }) {
+  setSwitches({ contours, wireframe, tiles3d, fraction, right }) {
     byId("contours").checked = contours;
     byId("wireframe").checked = wireframe;
     byId("tiles3d").checked = tiles3d;
-    byId("splitter").hidden = !tiles3d;
+    byId("compare").checked = right !== undefined;
+    byId("right-field").hidden = right === undefined;
+    byId("splitter").hidden = !tiles3d && right === undefined;
+    const names = right === undefined ? ["quantized-mesh", "3D Tiles"] : [fraction, right].map((value) => `error ${formatFraction(value)}`);
+    byId("splitter").querySelectorAll("span").forEach((label, i) => (label.textContent = names[i]));
+    if (right !== undefined) this.setFraction(right, "right");
   }
 
   setInterval(metres) {
@@ -106,9 +139,11 @@ export class Panel {
     if (byId("activity").textContent !== text) byId("activity").textContent = text;
   }
 
-  setReadout(position) {
+  // `measured`: metres at full resolution, beside the height of the drawn triangle.
+  setReadout(position, measured) {
     byId("readout").hidden = !position;
-    byId("readout").textContent = position ? formatPosition(position) : "";
+    const data = measured === undefined ? "" : `  ·  data ${formatHeight(measured)}`;
+    byId("readout").textContent = position ? formatPosition(position) + data : "";
   }
 
   setMessage(text) {
@@ -116,8 +151,8 @@ export class Panel {
     byId("message").textContent = text ?? "";
   }
 
-  // `tiles3d`: statistics of the drawn 3D Tiles, if any.
-  setStats(drawn, traffic, tiles3d) {
+  // `tiles3d`: statistics of the drawn 3D Tiles, if any. `isErrors`: they are there for their error.
+  setStats(drawn, traffic, tiles3d, isErrors) {
     const error = (keys) => {
       const worst = traffic.worstError(keys);
       return worst === undefined ? "–" : formatMetres(worst);
@@ -125,17 +160,17 @@ export class Panel {
     const perTile = (phase) => traffic.milliseconds[phase] / Math.max(1, traffic.computed);
     const total = kPhases.reduce((sum, phase) => sum + perTile(phase), 0);
     const rows = tiles3d ? [
-      ["", "mesh", "3D Tiles"],
-      ["Triangles, skirts too", compact.format(drawn.withSkirts), compact.format(tiles3d.triangles)],
-      ["Tiles shown", plain.format(drawn.tiles), plain.format(tiles3d.tiles)],
-      ["Tiles fetched", plain.format(traffic.tiles), plain.format(traffic.tiles3d.tiles)],
+      ["", ...(isErrors ? ["left", "right"] : ["mesh", "3D Tiles"])],
+      ["Triangles, skirts too", formatCompact(drawn.withSkirts), formatCompact(tiles3d.triangles)],
+      ["Tiles shown", formatNumber(drawn.tiles), formatNumber(tiles3d.tiles)],
+      ["Tiles fetched", formatNumber(traffic.tiles), formatNumber(traffic.tiles3d.tiles)],
       ["Over the wire", formatBytes(traffic.bytes), formatBytes(traffic.tiles3d.bytes)],
       ["Worst error shown", error(drawn.keys), error(tiles3d.keys)],
     ] : [
-      ["Triangles", compact.format(drawn.triangles)],
-      ["Vertices", compact.format(drawn.vertices)],
+      ["Triangles", formatCompact(drawn.triangles)],
+      ["Vertices", formatCompact(drawn.vertices)],
       ["Tiles shown", `${drawn.tiles} · level ${drawn.deepest}`],
-      ["Tiles fetched", plain.format(traffic.tiles)],
+      ["Tiles fetched", formatNumber(traffic.tiles)],
       ["Over the wire", formatBytes(traffic.bytes)],
       ["Cache hits", traffic.answers ? `${Math.round((100 * traffic.hits) / traffic.answers)} %` : "–"],
       ["Worst error shown", error(drawn.keys)],

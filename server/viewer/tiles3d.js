@@ -2,7 +2,7 @@
 // so that both can be compared. Both refine at the same distance: the tileset's geometric errors are eight times the
 // level errors that CesiumJS assumes for terrain, and so is the tolerance set here.
 import {
-  Cartesian2, Cartesian4, Cesium3DTileset, CustomShader, LightingModel, SplitDirection, TextureUniform,
+  Cartesian2, Cartesian3, Cartesian4, Cesium3DTileset, CustomShader, LightingModel, SplitDirection, TextureUniform,
   UniformType,
 } from "/viewer/cesium/index.js";
 import { kLook, kRampWidth } from "/viewer/material.js";
@@ -28,10 +28,13 @@ void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
 const kTypes = {
   heightRange: UniformType.VEC2, box: UniformType.VEC4, water: UniformType.FLOAT, contourInterval: UniformType.FLOAT,
   relief: UniformType.FLOAT, shading: UniformType.FLOAT, graticule: UniformType.FLOAT, farness: UniformType.FLOAT,
-  hazeDistance: UniformType.FLOAT, wire: UniformType.FLOAT, split: UniformType.FLOAT,
+  hazeDistance: UniformType.FLOAT, wire: UniformType.FLOAT, split: UniformType.FLOAT, paper: UniformType.FLOAT,
+  exaggeration: UniformType.FLOAT, colouring: UniformType.FLOAT, sunny: UniformType.FLOAT, sun: UniformType.VEC3,
 };
+const kStrips = ["ramp", "theme"];
 
 function valueFor(type, value) {
+  if (type === UniformType.VEC3) return Cartesian3.fromElements(value.x, value.y, value.z);
   if (type === UniformType.VEC2) return Cartesian2.fromElements(value.x, value.y);
   if (type === UniformType.VEC4) return Cartesian4.fromElements(value.x, value.y, value.z, value.w);
   return value;
@@ -39,10 +42,12 @@ function valueFor(type, value) {
 
 function makeShader() {
   const uniforms = {
-    ramp: { type: UniformType.SAMPLER_2D, value: new TextureUniform({ typedArray: new Uint8Array(kTexels), width: kRampWidth, height: 1 }) },
     cameraLevel: { type: UniformType.FLOAT, value: 0 },
-    exaggeration: { type: UniformType.FLOAT, value: 1 },
   };
+  for (const name of kStrips) {
+    const value = new TextureUniform({ typedArray: new Uint8Array(kTexels), width: kRampWidth, height: 1 });
+    uniforms[name] = { type: UniformType.SAMPLER_2D, value };
+  }
   for (const [name, type] of Object.entries(kTypes)) {
     uniforms[name] = { type, value: valueFor(type, { x: 0, y: 1, z: 0, w: 0 }) };
     if (type === UniformType.FLOAT) uniforms[name].value = 0;
@@ -74,7 +79,7 @@ export class Tiles3d {
       tileset.tileFailed.addEventListener(({ message, url: tile }) => onError(`${tile} failed: ${message}`));
       this.shader = shader;
       this.tileset = this.scene.primitives.add(tileset);
-      this.#setRamp();
+      this.copied = {};
       this.#follow();
     } finally {
       if (turn === this.#latest) this.pending = false;
@@ -110,19 +115,24 @@ export class Tiles3d {
     return sum;
   }
 
-  #setRamp() {
-    const pixels = this.look.ramp.getContext("2d").getImageData(0, 0, kRampWidth, 1).data;
+  // Copies a strip of colours where the terrain's material has a new one.
+  #copyStrip(name) {
+    const canvas = this.look[name];
+    if (this.copied[name] === canvas) return;
+    this.copied[name] = canvas;
+    if (canvas.width !== kRampWidth) return;  // not drawn yet
+    const pixels = canvas.getContext("2d").getImageData(0, 0, kRampWidth, 1).data;
     const typedArray = new Uint8Array(pixels.buffer);
-    this.shader.setUniform("ramp", new TextureUniform({ typedArray, width: kRampWidth, height: 1 }));
+    this.shader.setUniform(name, new TextureUniform({ typedArray, width: kRampWidth, height: 1 }));
   }
 
   #follow() {
-    const { camera, ellipsoid, globe, verticalExaggeration } = this.scene;
+    const { camera, ellipsoid, globe } = this.scene;
     this.tileset.maximumScreenSpaceError = kErrorRatio * globe.maximumScreenSpaceError;
     this.tileset.debugWireframe = this.look.wire === 1;
     for (const [name, type] of Object.entries(kTypes)) this.shader.setUniform(name, valueFor(type, this.look[name]));
+    kStrips.forEach((name) => this.#copyStrip(name));
     const { x, y, z } = ellipsoid.transformPositionToScaledSpace(camera.positionWC);
     this.shader.setUniform("cameraLevel", x * x + y * y + z * z - 1);
-    this.shader.setUniform("exaggeration", verticalExaggeration);
   }
 }

@@ -19,9 +19,10 @@ export function run(...args) {
   return { code: done.status, out: done.stdout, err: done.stderr };
 }
 
-// Starts `terrace serve` on port 0. `log()` returns what it has written to stderr.
+// Starts `terrace serve`, on a free port unless the arguments name one. `log()` returns what it has written to stderr.
 export async function serve(...args) {
-  const child = spawn(binary, ['serve', '--listen', '127.0.0.1:0', ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
+  const listen = args.includes('--listen') ? [] : ['--listen', '127.0.0.1:0'];
+  const child = spawn(binary, ['serve', ...listen, ...args], { stdio: ['ignore', 'pipe', 'pipe'] });
   let out = '', err = '';
   child.stderr.on('data', (data) => (err += data));
   const exited = new Promise((resolve) => child.on('exit', (code, signal) => resolve({ code, signal })));

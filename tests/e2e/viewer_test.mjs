@@ -93,6 +93,7 @@ describe('the viewer', () => {
     const colours = new Set(await picture(page)).size;
     assert.ok(colours > 150, `${colours} colours`);
     assert.match(await page.title(), new RegExp(regional.name));
+    await page.evaluate(() => (document.getElementById('costs').open = true));
     assert.match(await page.locator('#stats').innerText(), /Triangles\s+[\d.]+/);
   });
 
@@ -153,7 +154,7 @@ describe('the viewer', () => {
   it('tells position and height of a click', async () => {
     await page.mouse.click(520, 320);
     const readout = await page.locator('#readout').innerText();
-    assert.match(readout, /^\d+\.\d+° [NS]\s+\d+\.\d+° [EW]\s+−?[\d,.]+ m$/);
+    assert.match(readout, /^\d+\.\d+° [NS]\s+\d+\.\d+° [EW]\s+−?[\d,.]+ m(\s+·\s+data −?[\d,.]+ m)?$/);
     const { height } = await page.evaluate(() => terrace.state.picked);
     assert.ok(height > regional.heights.min - 500 && height < regional.heights.max + 500, `${height} m`);
   });
@@ -201,7 +202,7 @@ describe('the viewer', () => {
   it('fits a phone', async () => {
     const phone = await openPage(browser, `${url}/#dataset=${regional.name}`, { width: 360, height: 640 });
     await settle(phone);
-    await phone.locator('summary').click();
+    await phone.locator('#panel > summary').click();
     const panel = await phone.locator('#panel').boundingBox();
     const inside = panel.x >= 0 && panel.x + panel.width <= 360 && panel.y >= 0 && panel.y + panel.height <= 640;
     assert.ok(inside, JSON.stringify(panel));

@@ -1,0 +1,220 @@
+// The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
+// colours by height and shading. Drag and wheel or arrow keys, plus and minus move it; a click reads a height.
+import { Access } from "/viewer/access.js";
+import { heightColour } from "/viewer/colours.js";
+import { drawLegend } from "/viewer/legend.js";
+import { formatPosition } from "/viewer/numbers.js";
+
+const kTile = 256;
+const kMaxTiles = 300;  // in memory
+const byId = (id) => document.getElementById(id);
+
+// Web Mercator: the whole world is 1 wide and 1 high.
+const kMaxLatitude = 85.0511;
+const toX = (longitude) => (longitude + 180) / 360;
+function toY(latitude) {
+  const sine = Math.sin((Math.max(-kMaxLatitude, Math.min(kMaxLatitude, latitude)) * Math.PI) / 180);
+  return 0.5 - Math.log((1 + sine) / (1 - sine)) / (4 * Math.PI);
+}
+const toLongitude = (x) => (((x % 1) + 1) % 1) * 360 - 180;
+const toLatitude = (y) => (Math.atan(Math.sinh(Math.PI * (1 - 2 * y))) * 180) / Math.PI;
+
+// Paints colours over the heights of an image, in place. `metres`: size of a pixel on the ground. `isInside(x, y)`: pixels
+// outside the dataset become transparent.
+function paint(pixels, width, heights, metres, isInside) {
+  const height = new Float32Array(width * width);
+  const { data } = pixels;
+  for (let i = 0; i < height.length; ++i) {
+    height[i] = -10000 + (data[4 * i] * 65536 + data[4 * i + 1] * 256 + data[4 * i + 2]) * 0.1;
+  }
+  const relief = Math.max(1.2, Math.min(12, metres / 40));
+  for (let y = 0; y < width; ++y) {
+    for (let x = 0; x < width; ++x) {
+      const i = y * width + x;
+      const [w, e] = [height[x > 0 ? i - 1 : i], height[x < width - 1 ? i + 1 : i]];
+      const [n, s] = [height[y > 0 ? i - width : i], height[y < width - 1 ? i + width : i]];
+      const [east, north] = [((w - e) / (2 * metres)) * relief, ((s - n) / (2 * metres)) * relief];
+      const light = (0.643 + 0.766 * (-0.707 * east + 0.707 * north)) / (0.643 * Math.hypot(east, north, 1));
+      const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
+      const colour = heightColour(height[i], heights);
+      for (let k = 0; k < 3; ++k) data[4 * i + k] = colour[k] * shade;
+      if (!isInside(x, y)) data[4 * i + 3] = 0;
+    }
+  }
+}
+
+class FlatMap {
+  #tiles = new Map();  // "z/x/y": canvas, or undefined while it is loading and where there is none
+
+  constructor(container, access) {
+    this.access = access;
+    this.canvas = document.createElement("canvas");
+    container.append(this.canvas);
+    container.tabIndex = 0;
+    new ResizeObserver(() => this.draw()).observe(container);
+    this.#steer(container);
+  }
+
+  async show(dataset) {
+    this.dataset = dataset;
+    this.#tiles.clear();
+    const reply = await fetch(dataset.urls.tiles_json ?? `/${encodeURIComponent(dataset.name)}/tiles.json`, { headers: this.access.headers });
+    if (!reply.ok) throw new Error(`the server answered ${reply.status} to tiles.json`);
+    const description = await reply.json();
+    if (this.dataset !== dataset) return;
+    this.template = description.tiles[0];
+    this.maxLevel = description.maxzoom ?? 14;
+    const [west, south, east, north] = dataset.bounds;
+    const [left, right] = [toX(west), toX(east) + (east < west ? 1 : 0)];
+    const [top, bottom] = [toY(north), toY(south)];
+    this.box = { left, right, top, bottom };
+    this.centre = [(left + right) / 2, (top + bottom) / 2];
+    const { clientWidth, clientHeight } = this.canvas.parentElement;
+    this.scale = Math.min(clientWidth / (right - left), clientHeight / (bottom - top));  // pixels of the whole world
+    this.draw();
+  }
+
+  #tile(z, x, y) {
+    const key = `${z}/${x}/${y}`;
+    if (this.#tiles.has(key)) return this.#tiles.get(key);
+    if (this.#tiles.size > kMaxTiles) this.#tiles.delete(this.#tiles.keys().next().value);
+    this.#tiles.set(key, undefined);
+    this.#load(key, z, x, y, this.dataset).catch(() => {});  // a missing tile stays blank
+    return undefined;
+  }
+
+  async #load(key, z, x, y, dataset) {
+    const url = this.template.replace("{z}", z).replace("{x}", x).replace("{y}", y);
+    const reply = await fetch(url, { headers: this.access.headers });
+    if (!reply.ok) return;
+    const image = await createImageBitmap(await reply.blob(), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
+    const tile = Object.assign(document.createElement("canvas"), { width: image.width, height: image.height });
+    const context = tile.getContext("2d", { willReadFrequently: true });
+    context.drawImage(image, 0, 0);
+    const pixels = context.getImageData(0, 0, tile.width, tile.height);
+    const metres = (40075017 * Math.cos((toLatitude((y + 0.5) / 2 ** z) * Math.PI) / 180)) / 2 ** z / tile.width;
+    const share = (of, pixel) => (of + (pixel + 0.5) / tile.width) / 2 ** z;
+    paint(pixels, tile.width, dataset.heights, metres, (i, j) => this.#isInside(share(x, i), share(y, j)));
+    context.putImageData(pixels, 0, 0);
+    if (dataset !== this.dataset) return;
+    this.#tiles.set(key, tile);
+    this.draw();
+  }
+
+  // `x`, `y`: a place in the world, or the nearest one in a square of `margin` around it.
+  #isInside(x, y, margin = 0) {
+    const { left, right, top, bottom } = this.box;
+    const isAcross = [x, x + 1].some((place) => place > left - margin && place < right + margin);
+    return isAcross && y > top - margin && y < bottom + margin;
+  }
+
+  draw() {
+    if (!this.template || this.frame) return;
+    this.frame = requestAnimationFrame(() => {
+      this.frame = undefined;
+      this.#paint();
+    });
+  }
+
+  #paint() {
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    Object.assign(this.canvas, { width, height });
+    const context = this.canvas.getContext("2d");
+    const z = Math.max(0, Math.min(this.maxLevel, Math.round(Math.log2(this.scale / kTile))));
+    const side = 2 ** z;
+    const size = this.scale / side;
+    const [left, top] = [this.centre[0] * this.scale - width / 2, this.centre[1] * this.scale - height / 2];
+    for (let y = Math.max(0, Math.floor(top / size)); y < side && y * size < top + height; ++y) {
+      for (let x = Math.floor(left / size); x * size < left + width; ++x) {
+        const column = ((x % side) + side) % side;
+        const half = 0.5 / side;
+        if (!this.#isInside(column / side + half, y / side + half, half)) continue;
+        const tile = this.#tile(z, column, y);
+        if (tile) context.drawImage(tile, Math.floor(x * size - left), Math.floor(y * size - top), Math.ceil(size) + 1, Math.ceil(size) + 1);
+      }
+    }
+  }
+
+  move(right, down) {
+    this.centre = [this.centre[0] + right / this.scale, Math.max(0, Math.min(1, this.centre[1] + down / this.scale))];
+    this.draw();
+  }
+
+  zoom(factor) {
+    this.scale = Math.max(kTile / 2, Math.min(kTile * 2 ** (this.maxLevel + 2), this.scale * factor));
+    this.draw();
+  }
+
+  // Longitude and latitude of a place on the page.
+  placeOf(x, y) {
+    const { clientWidth, clientHeight } = this.canvas.parentElement;
+    return [toLongitude(this.centre[0] + (x - clientWidth / 2) / this.scale), toLatitude(this.centre[1] + (y - clientHeight / 2) / this.scale)];
+  }
+
+  #steer(element) {
+    let last;
+    let moved = 0;
+    element.addEventListener("pointerdown", (event) => {
+      element.setPointerCapture(event.pointerId);
+      [last, moved] = [event, 0];
+    });
+    element.addEventListener("pointermove", (event) => {
+      if (!last) return;
+      moved += Math.abs(event.clientX - last.clientX) + Math.abs(event.clientY - last.clientY);
+      this.move(last.clientX - event.clientX, last.clientY - event.clientY);
+      last = event;
+    });
+    element.addEventListener("pointerup", (event) => {
+      last = undefined;
+      if (moved < 4) this.onPick?.(...this.placeOf(event.clientX, event.clientY));
+    });
+    element.addEventListener("wheel", (event) => {
+      this.zoom(2 ** (-event.deltaY / 300));
+      event.preventDefault();
+    }, { passive: false });
+    const arrows = { ArrowLeft: [-60, 0], ArrowRight: [60, 0], ArrowUp: [0, -60], ArrowDown: [0, 60] };
+    const zooms = { "+": 1.5, "=": 1.5, "-": 1 / 1.5 };
+    element.addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (event.key in arrows) this.move(...arrows[event.key]);
+      else if (event.key in zooms) this.zoom(zooms[event.key]);
+      else if (event.key === "Enter") this.onPick?.(toLongitude(this.centre[0]), toLatitude(this.centre[1]));
+      else return;
+      event.preventDefault();
+    });
+  }
+}
+
+export async function startFlatMap() {
+  document.body.classList.add("flat");
+  const access = new Access();
+  const map = new FlatMap(byId("globe"), access);
+  byId("globe").setAttribute("aria-label", "Map. Arrow keys move it, plus and minus zoom, Enter reads the height in the middle.");
+  const say = (text) => Object.assign(byId("note"), { textContent: text, hidden: !text });
+  const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
+  say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
+  try {
+    const { datasets } = await access.list();
+    if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
+    byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    const show = async (name) => {
+      const dataset = datasets.find((candidate) => candidate.name === name) ?? datasets[0];
+      byId("dataset").value = dataset.name;
+      document.title = `${dataset.name} · terrace`;
+      history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
+      byId("attribution").textContent = dataset.attribution ?? "";
+      drawLegend(byId("legend"), "height", dataset.heights);
+      await map.show(dataset).catch(fail);
+    };
+    byId("dataset").addEventListener("change", (event) => show(event.target.value));
+    byId("home").addEventListener("click", () => show(byId("dataset").value));
+    map.onPick = async (longitude, latitude) => {
+      const height = await access.heightAt(map.dataset, longitude, latitude);
+      byId("readout").hidden = false;
+      byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
+    };
+    await show(new URLSearchParams(location.hash.slice(1)).get("dataset"));
+  } catch (error) {
+    fail(error);
+  }
+}

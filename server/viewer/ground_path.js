@@ -1,0 +1,50 @@
+// Lengths and visibility along a path of heights. Plain numbers: no page, no CesiumJS.
+const kEarthRadius = 6371000;  // metres
+const kRefraction = 0.13;  // share of the Earth's curvature that the air's refraction undoes, for light by day
+
+// Metres by which the Earth falls away below a level line of sight.
+export function drop(distance) {
+  return ((1 - kRefraction) * distance * distance) / (2 * kEarthRadius);
+}
+
+// `points`: [{distance, height}] with metres from the start; height is undefined where nothing was measured. Returns
+// {length, along, up, down, min, max}: `length` over the ellipsoid, `along` over the ground.
+export function measurePath(points) {
+  const sum = { length: points.at(-1)?.distance ?? 0, along: 0, up: 0, down: 0, min: Infinity, max: -Infinity };
+  points.forEach(({ distance, height }, i) => {
+    if (height !== undefined) {
+      sum.min = Math.min(sum.min, height);
+      sum.max = Math.max(sum.max, height);
+    }
+    if (i === 0) return;
+    const run = distance - points[i - 1].distance;
+    const known = height !== undefined && points[i - 1].height !== undefined;
+    const rise = known ? height - points[i - 1].height : 0;
+    sum.along += Math.hypot(run, rise);
+    if (rise > 0) sum.up += rise;
+    else sum.down -= rise;
+  });
+  return sum;
+}
+
+// Whether each point of the ground is seen from `eye` metres above the first, and a target `target` metres above the
+// last. Returns {seen: [bool], isTargetSeen, obstacle}: `obstacle` is {distance, above}, the ground that stands highest
+// above the line to the target, if any does.
+export function lineOfSight(points, eye, target) {
+  const last = points.at(-1);
+  const origin = (points[0].height ?? 0) + eye;
+  const level = ({ distance, height }) => height - drop(distance);
+  const end = level({ ...last, height: (last.height ?? 0) + target });
+  let horizon = -Infinity;
+  let obstacle;
+  const seen = points.map((point, i) => {
+    if (i === 0 || point.height === undefined || point.distance === 0) return true;
+    const slope = (level(point) - origin) / point.distance;
+    const isSeen = slope >= horizon;
+    horizon = Math.max(horizon, slope);
+    const above = level(point) - (origin + (end - origin) * (point.distance / last.distance));
+    if (point !== last && above > (obstacle?.above ?? 0)) obstacle = { distance: point.distance, above };
+    return isSeen;
+  });
+  return { seen, isTargetSeen: obstacle === undefined, obstacle };
+}

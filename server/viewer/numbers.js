@@ -1,0 +1,29 @@
+// Numbers as the page writes them.
+const number = new Intl.NumberFormat("en");
+const short = new Intl.NumberFormat("en", { notation: "compact", maximumSignificantDigits: 3 });
+
+export const formatNumber = (value) => number.format(value).replace("-", "−");
+export const formatCompact = (value) => short.format(value);
+
+export function formatMetres(metres) {
+  const size = Math.abs(metres);
+  const digits = size >= 100 ? 0 : size >= 10 ? 1 : 2;
+  if (size >= 10000) return `${formatNumber(Math.round(metres / 100) / 10)} km`;
+  return `${formatNumber(Number(metres.toFixed(digits)))} m`;
+}
+
+// Heights are in metres however large they are.
+export const formatHeight = (metres) => `${formatNumber(Number(metres.toFixed(Math.abs(metres) < 10 ? 1 : 0)))} m`;
+
+export function formatBytes(bytes) {
+  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}
+
+export function formatFraction(fraction) {
+  return fraction >= 1 ? `${Number(fraction.toFixed(2))} ×` : `1/${Number((1 / fraction).toFixed(1))}`;
+}
+
+export function formatPosition({ longitude, latitude, height }) {
+  const angle = (value, positive, negative) => `${Math.abs(value).toFixed(5)}° ${value < 0 ? negative : positive}`;
+  return `${angle(latitude, "N", "S")}  ${angle(longitude, "E", "W")}  ${formatNumber(Number(height.toFixed(1)))} m`;
+}

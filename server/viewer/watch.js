@@ -1,0 +1,46 @@
+// Asks the server again and again what it has, so that the page follows restarts and new versions without a reload.
+const kCalmMs = 5000;
+const kFirstRetryMs = 500;
+const kLastRetryMs = 5000;
+
+export class Watch {
+  #timer;
+  #retryMs = kFirstRetryMs;
+  #running = false;
+
+  // `list`: fetches the datasets, throws if that fails. `onLost(error)`: it failed for the first time. `onList(wasLost)`:
+  // it succeeded.
+  constructor({ list, onLost, onList }) {
+    Object.assign(this, { list, onLost, onList, isLost: false });
+  }
+
+  start() {
+    document.addEventListener("visibilitychange", () => document.hidden || this.check());
+    this.#wait(kCalmMs);
+  }
+
+  // Asks now; a tile has failed, for example.
+  async check() {
+    if (this.#running) return;
+    this.#running = true;
+    clearTimeout(this.#timer);
+    try {
+      await this.list();
+      const wasLost = this.isLost;
+      this.isLost = false;
+      this.#retryMs = kFirstRetryMs;
+      await this.onList(wasLost);
+    } catch (error) {
+      if (!this.isLost) this.onLost(error);
+      this.isLost = true;
+      this.#retryMs = Math.min(kLastRetryMs, 1.5 * this.#retryMs);
+    } finally {
+      this.#running = false;
+      this.#wait(this.isLost ? this.#retryMs : kCalmMs);
+    }
+  }
+
+  #wait(milliseconds) {
+    this.#timer = setTimeout(() => (document.hidden ? this.#wait(kCalmMs) : this.check()), milliseconds);
+  }
+}

@@ -1,0 +1,194 @@
+// What the viewer adds to the picture: measuring, colours, the sun, labels, two errors, recovery, and the flat map.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { chromium } from 'playwright-core';
+import { samples, serve } from './harness.mjs';
+import { lineOfSight, measurePath } from '../../server/viewer/ground_path.js';
+import { fromLocalMeanTime, sunAltitude, sunDirection } from '../../server/viewer/sun.js';
+
+const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+                '--disable-background-networking', '--no-first-run'];
+const kWait = { timeout: 90000, polling: 200 };
+
+describe('numbers of the viewer', () => {
+  it('measure the ground of a tent', () => {
+    const points = [0, 300, 600].map((distance, i) => ({ distance, height: [0, 400, 0][i] }));
+    assert.deepEqual(measurePath(points), { length: 600, along: 1000, up: 400, down: 400, min: 0, max: 400 });
+  });
+
+  it('leave voids out', () => {
+    const points = [{ distance: 0, height: 5 }, { distance: 10 }, { distance: 20, height: 9 }];
+    assert.deepEqual(measurePath(points), { length: 20, along: 20, up: 0, down: 0, min: 5, max: 9 });
+  });
+
+  it('see over a plain, not through a wall, and not beyond the horizon', () => {
+    const plain = Array.from({ length: 101 }, (_, i) => ({ distance: 10 * i, height: 100 }));
+    assert.ok(lineOfSight(plain, 2, 0).seen.every(Boolean));
+    const walled = plain.map((point, i) => (i === 50 ? { ...point, height: 120 } : point));
+    const { seen, isTargetSeen, obstacle } = lineOfSight(walled, 2, 2);
+    assert.ok(!isTargetSeen && seen[50] && !seen[60]);
+    assert.equal(obstacle.distance, 500);
+    assert.ok(Math.abs(obstacle.above - 18) < 0.1, `${obstacle.above} m`);
+    assert.ok(lineOfSight(walled, 2, 60).isTargetSeen, 'a tower looks over the wall');
+    // From 2 m the sea is seen to 5.4 km: the square root of 2 R h / (1 - k).
+    const sea = Array.from({ length: 1001 }, (_, i) => ({ distance: 10 * i, height: 0 }));
+    const horizon = 10 * lineOfSight(sea, 2, 0).seen.indexOf(false);
+    assert.ok(Math.abs(horizon - 5412) < 60, `${horizon} m`);
+  });
+
+  it('put the sun where almanacs put it', () => {
+    const noon = (day, longitude) => sunDirection(fromLocalMeanTime(`${day}T12:00`, longitude));
+    // At solar noon the altitude is 90 degrees - latitude + declination; the equation of time moves noon by a few minutes.
+    assert.ok(Math.abs(sunAltitude(noon('2026-06-21', 8), 8, 46.5) - (90 - 46.5 + 23.44)) < 0.1);
+    assert.ok(Math.abs(sunAltitude(noon('2026-12-21', -120), -120, 46.5) - (90 - 46.5 - 23.44)) < 0.1);
+    assert.ok(sunAltitude(sunDirection(fromLocalMeanTime('2026-06-21T00:00', 8)), 8, 46.5) < -15);
+  });
+});
+
+describe('features of the viewer', () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-features-'));
+  const config = path.join(folder, 'terrace.json');
+  const dataset = { name: 'hills', sources: [path.join(samples, 'jacksboro.tif')] };
+  let server, browser, page;
+
+  const write = (...datasets) => fs.writeFileSync(config, JSON.stringify({ datasets }));
+  const settled = () => page.waitForFunction(() => window.terrace?.state.ready && !terrace.globe.loading &&
+    terrace.globe.drawn().tiles > 1 && !document.querySelector('.curtain'), undefined, kWait);
+  const read = (id) => page.locator(id).innerText();
+
+  before(async () => {
+    write(dataset);
+    server = await serve('--config', config);
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    page = await browser.newPage({ viewport: { width: 760, height: 480 } });
+    page.wrongs = [];
+    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+    await page.goto(`${server.url}/#dataset=hills&fraction=1`);
+    await settled();
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+    fs.rmSync(folder, { recursive: true });
+  });
+
+  it('keep colours true under exaggeration', async () => {
+    const uniform = () => page.evaluate(() => terrace.globe.material.uniforms.exaggeration);
+    assert.equal(await uniform(), 1);
+    await page.locator('#exaggeration').focus();
+    await page.keyboard.press('End');
+    assert.equal(await uniform(), 10);
+    await page.keyboard.press('Home');
+    assert.equal(await uniform(), 1);
+  });
+
+  it('measure a profile along the ground', async () => {
+    await page.locator('#tool-distance').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);
+    await page.evaluate(() => {
+      terrace.state.measure.add({ longitude: -84.3, latitude: 36.3, height: 400 });
+      return terrace.state.measure.add({ longitude: -84.2, latitude: 36.3, height: 400 });
+    });
+    await page.locator('#plot .ground.fill').waitFor({ timeout: 30000, state: 'attached' });
+    const [, straight, along] = /^([\d.,]+) m straight, ([\d.,]+) /.exec(await read('#dock-text')) ?? /^([\d.,]+)/.exec('0');
+    // 0.1 degrees of longitude at 36.3 N are 8982 m on the ellipsoid.
+    assert.equal(straight, '8,982', `${await read('#dock-text')} ${along}`);
+    await page.locator('#plot').focus();
+    await page.keyboard.press('End');
+    assert.match(await page.locator('#plot').getAttribute('aria-valuetext'), /^8,982 m: [\d,]+ m$/);
+    await page.locator('.marker.place').waitFor({ state: 'attached' });
+  });
+
+  it('tell what hides a place', async () => {
+    await page.locator('#tool-sight').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'sight', undefined, kWait);
+    await page.evaluate(() => {
+      terrace.state.measure.add({ longitude: -84.3, latitude: 36.3, height: 400 });
+      return terrace.state.measure.add({ longitude: -84.2, latitude: 36.3, height: 400 });
+    });
+    await page.waitForFunction(() => /^(Visible|Hidden)/.test(document.getElementById('dock-text').textContent), undefined, kWait);
+    await page.locator('#target').fill('9000');
+    await page.waitForFunction(() => /^Visible/.test(document.getElementById('dock-text').textContent), undefined, kWait);
+    await page.locator('#dock-close').click();
+    assert.equal(await page.locator('.overlay .line').count(), 0);
+  });
+
+  it('label contours at round heights', async () => {
+    await page.locator('#contours').check();
+    await page.waitForFunction(() => document.querySelectorAll('.contour-labels text').length > 2, undefined, kWait);
+    const interval = await page.evaluate(() => terrace.globe.interval);
+    for (const text of await page.locator('.contour-labels text').allTextContents()) {
+      assert.equal(Number(text.replace(/[^\d]/g, '')) % (5 * interval), 0, text);
+    }
+    await page.locator('#contours').uncheck();
+    assert.equal(await page.locator('.contour-labels text').count(), 0);
+  });
+
+  it('hold colours, sun and the second error in the address', async () => {
+    await page.locator('#colouring').selectOption('slope');
+    assert.match(await read('#ticks'), /30°/);
+    await page.locator('#sunny').check();
+    await page.locator('#compare').check();
+    await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, kWait);
+    const state = () => page.evaluate(() => [terrace.state.colouring, terrace.state.sun, terrace.state.right]);
+    const before = await state();
+    assert.match(page.url(), /colours=slope&sun=\d{4}-06-21T18:30&right=4/);
+    await page.reload();
+    await settled();
+    assert.deepEqual(await state(), before);
+    await page.locator('#compare').uncheck();
+    await page.locator('#sunny').uncheck();
+    await page.locator('#colouring').selectOption('height');
+  });
+
+  it('go on after the server was killed and started again', async () => {
+    await page.evaluate(() => (window.sameDocument = true));
+    const port = new URL(server.url).port;
+    await server.stop('SIGKILL');
+    await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
+    server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
+    await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
+    await page.locator('#fraction').focus();
+    await page.keyboard.press('End');
+    await page.waitForTimeout(500);
+    await settled();
+    assert.ok(await page.evaluate(() => window.sameDocument), 'without a reload');
+  });
+
+  it('follow a new version and tell of a dataset that is gone', async () => {
+    const version = await page.evaluate(() => terrace.state.dataset.version);
+    write({ ...dataset, error_fraction: 0.9 });
+    process.kill(server.pid, 'SIGHUP');
+    await page.waitForFunction((old) => terrace.state.dataset.version !== old, version, kWait);
+    await settled();
+    write({ ...dataset, name: 'others' });
+    process.kill(server.pid, 'SIGHUP');
+    await page.getByText('hills is no longer on this server').waitFor({ timeout: 30000 });
+    assert.ok(await page.evaluate(() => terrace.globe.drawn().tiles > 1), 'the picture stays');
+    write(dataset);
+    process.kill(server.pid, 'SIGHUP');
+    await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
+    assert.deepEqual(page.wrongs, []);
+  });
+
+  it('show a flat map without WebGL 2', async () => {
+    const plain = await chromium.launch({ executablePath: kChromium, args: ['--no-sandbox', '--disable-3d-apis'] });
+    const flat = await plain.newPage({ viewport: { width: 700, height: 450 } });
+    await flat.goto(`${server.url}/`);
+    await flat.getByText('no WebGL 2').waitFor({ timeout: 30000 });
+    await flat.waitForFunction(() => {
+      const canvas = document.querySelector('#globe canvas');
+      const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+      return new Set(new Uint32Array(data.buffer)).size > 500;
+    }, undefined, kWait);
+    await flat.locator('#globe').focus();
+    await flat.keyboard.press('Enter');
+    await flat.waitForFunction(() => / m$/.test(document.getElementById('readout').textContent), undefined, kWait);
+    await plain.close();
+  });
+});
