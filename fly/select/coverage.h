@@ -1,0 +1,25 @@
+// What part of the screen shows nothing, although the server has terrain there.
+#pragma once
+
+#include <cstdint>
+
+#include "fly/scene/view.h"
+#include "fly/select/select.h"
+
+namespace terrace::fly {
+
+// Counts of rays through a grid of 23 x 13 points of the screen that meet a tile.
+struct Coverage {
+  int rays = 0;
+  int missing = 0;    // a selected tile is not loaded, or failed
+  int uncovered = 0;  // no tile was selected: a fault of selection
+  int doubled = 0;    // more than one was
+
+  int holes() const { return missing + uncovered; }
+};
+
+// Sends rays to the lowest surface that the tiles' volumes allow, so that each point is inside the volume of the deepest
+// known tile there. Points in fog do not count. Call it after SelectTiles for the same frame.
+Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root);
+
+}  // namespace terrace::fly
