@@ -68,7 +68,7 @@ Result<TileContent> DecodeDraco(std::string_view bytes, const Json& accessor_of_
   content.vertices = mesh.num_points();
   content.triangles = mesh.num_faces();
   for (std::uint32_t i = 0; i < mesh.num_faces(); ++i) {
-    for (const draco::PointIndex index : mesh.face(draco::FaceIndex(i))) {
+    for (const draco::PointIndex& index : mesh.face(draco::FaceIndex(i))) {
       if (index.value() >= mesh.num_points()) return Damaged("Draco: an index names no vertex");
     }
   }
