@@ -23,10 +23,10 @@ struct FlightOptions {
   Lens lens;
   SelectOptions select;
   double frames_per_second = 60;
-  int clients = 1;                                        // client k of n starts at k / n of the path
-  int max_loads = 20;                                     // requests of a client at a time
+  int clients = 1;                                          // client k of n starts at k / n of the path
+  int max_loads = 20;                                       // requests of a client at a time
   std::uint64_t max_tile_bytes = std::uint64_t{512} << 20;  // decoded tiles that a client keeps
-  double first_view_limit_s = 30;  // then the client takes off with what it has
+  double first_view_limit_s = 30;                           // then the client takes off with what it has
   double arrival_limit_s = 10;
   int max_attempts = 6;  // of a tile that fails in a way that may pass
   HttpOptions http;      // threads and clients are set from the others

@@ -16,8 +16,8 @@ constexpr std::size_t kMaxTrack = 100'000;
 
 const char* NameOf(Outcome outcome) {
   static constexpr std::array<const char*, kOutcomes> kNames = {
-      "ok",      "refused (429, 503)", "not found (404, 410)", "other status", "no connection",
-      "timeout", "cut off",            "no HTTP",              "damaged tile"};
+      "ok",      "refused (429, 503)", "not found (404, 410)", "other status", "no connection", "timeout", "cut off",
+      "no HTTP", "damaged tile"};
   return kNames.at(static_cast<std::size_t>(outcome));
 }
 

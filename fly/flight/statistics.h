@@ -91,7 +91,8 @@ struct ClientRecord {
 struct Totals {
   std::array<std::uint64_t, kOutcomes> outcomes{};
   std::array<std::uint64_t, kCacheTiers> tiers{};
-  std::uint64_t tiles = 0, other_requests = 0, bytes = 0, triangles = 0, retries = 0, connections = 0, version_changes = 0;
+  std::uint64_t tiles = 0, other_requests = 0, bytes = 0, triangles = 0, retries = 0, connections = 0,
+                version_changes = 0;
   std::uint64_t incomplete_tiles = 0;
   std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, late_frames = 0, mixed_frames = 0;
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;

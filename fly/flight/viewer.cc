@@ -22,9 +22,9 @@ constexpr const char* kAcceptJson = "application/json,*/*;q=0.01";
 
 constexpr std::uint64_t kCoveragePeriod = 6;  // frames
 constexpr std::uint64_t kTrackPeriod = 10;
-constexpr double kWorstPixels = 9999;  // inside of a tile's volume the error has no bound
+constexpr double kWorstPixels = 9999;                   // inside of a tile's volume the error has no bound
 constexpr double kFirstPause = 0.5, kLongestPause = 8;  // seconds, where the server names none
-constexpr double kDocumentPause = 2;  // between two looks at a document that has changed
+constexpr double kDocumentPause = 2;                    // between two looks at a document that has changed
 constexpr int kDamagedAttempts = 2;
 
 // 0.75 to 1.25, spread evenly: clients that were refused together do not come back together.
@@ -33,9 +33,12 @@ double Spread(std::uint64_t i) { return 0.75 + 0.5 * std::fmod(static_cast<doubl
 bool IsTransient(const HttpReply& reply, Outcome outcome) {
   switch (outcome) {
     case Outcome::kOk:
-    case Outcome::kNotFound: return false;
-    case Outcome::kStatus: return reply.status >= 500;
-    default: return true;
+    case Outcome::kNotFound:
+      return false;
+    case Outcome::kStatus:
+      return reply.status >= 500;
+    default:
+      return true;
   }
 }
 
@@ -51,12 +54,17 @@ Viewer::Viewer(const FlightOptions& options, int number, HttpClient& http, Worke
 
 Outcome Viewer::OutcomeOf(const HttpReply& reply) {
   switch (reply.failure) {
-    case Failure::kNone: break;
-    case Failure::kConnect: return Outcome::kNoConnection;
-    case Failure::kTimeout: return Outcome::kTimeout;
-    case Failure::kCut: return Outcome::kCut;
+    case Failure::kNone:
+      break;
+    case Failure::kConnect:
+      return Outcome::kNoConnection;
+    case Failure::kTimeout:
+      return Outcome::kTimeout;
+    case Failure::kCut:
+      return Outcome::kCut;
     case Failure::kMalformed:
-    case Failure::kTooLarge: return Outcome::kNoHttp;
+    case Failure::kTooLarge:
+      return Outcome::kNoHttp;
   }
   if (reply.status >= 200 && reply.status < 300) return Outcome::kOk;
   if (reply.status == 429 || reply.status == 503) return Outcome::kRefused;
@@ -103,7 +111,9 @@ void Viewer::Ask(What what, Tile* tile, const std::string& uri) {
     if (what == What::kTile) statistics_.AddUrl(url->target);
   }
   const bool is_terrain = options_.format == Format::kTerrain;
-  const char* accept = what == What::kDocument ? kAcceptJson : what == What::kTile && is_terrain ? kAcceptTerrain : "*/*";
+  const char* accept = what == What::kDocument             ? kAcceptJson
+                       : what == What::kTile && is_terrain ? kAcceptTerrain
+                                                           : "*/*";
   const auto version = static_cast<std::uint32_t>(versions_.size());
   http_.Get(number_, *std::move(url), accept,
             [inbox = inbox_, &workers = workers_, format = options_.format, what, tile, version](HttpReply reply) {
@@ -216,8 +226,8 @@ void Viewer::TakeReady(Tile& tile) {
 
 // A URL with a version that is not the current one is answered with the current tile, which must not be stored.
 void Viewer::CheckVersion(const Arrival& arrival, double now_s) {
-  const bool is_suspect = arrival.outcome == Outcome::kNotFound ||
-                          arrival.reply.cache_control.find("no-store") != std::string::npos;
+  const bool is_suspect =
+      arrival.outcome == Outcome::kNotFound || arrival.reply.cache_control.find("no-store") != std::string::npos;
   if (!is_suspect || tree_->version().empty() || asks_document_ || now_s < document_due_s_) return;
   asks_document_ = true;
   Ask(What::kDocument, nullptr, "");
@@ -237,7 +247,7 @@ void Viewer::FailOrWait(const Arrival& arrival, double now_s) {
   Tile& tile = *arrival.tile;
   ++tile.attempts;
   CheckVersion(arrival, now_s);
-  const int limit = arrival.outcome == Outcome::kRefused   ? 1'000'000  // a busy server is asked as long as it answers so
+  const int limit = arrival.outcome == Outcome::kRefused ? 1'000'000  // a busy server is asked as long as it answers so
                     : arrival.outcome == Outcome::kDamaged ? kDamagedAttempts
                                                            : options_.max_attempts;
   if (IsTransient(arrival.reply, arrival.outcome) && tile.attempts < limit) {
@@ -362,7 +372,8 @@ void Viewer::AdvancePhase(const FrameRecord& record, double now_s) {
     if (record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
     if (record.is_loaded || now_s - landing_s_ > options_.arrival_limit_s) phase_ = Phase::kDone;
   }
-  if (phase_ == Phase::kFlying && record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
+  if (phase_ == Phase::kFlying && record.is_refined && record_.first_view_s < 0)
+    record_.first_view_s = now_s - start_s_;
 }
 
 void Viewer::GiveUp(const std::string& why) {
@@ -390,7 +401,8 @@ void Viewer::Frame(double now_s, bool is_late) {
   const View view(pose, options_.lens);
   Selection selection;
   ++frame_;
-  SelectTiles(options_.select, view, [this](Tile& tile) { tree_->AddChildren(tile); }, frame_, tree_->root(), selection);
+  SelectTiles(
+      options_.select, view, [this](Tile& tile) { tree_->AddChildren(tile); }, frame_, tree_->root(), selection);
   FrameRecord record = Describe(selection, view);
   record.is_late = is_late;
   StartLoads(selection);

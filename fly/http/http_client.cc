@@ -80,9 +80,7 @@ class HttpClient::Impl {
     threads_.clear();  // joins; only then may the coroutines be destroyed
   }
 
-  void Start(std::shared_ptr<Call> call) {
-    asio::co_spawn(io_, Run(std::move(call)), asio::detached);
-  }
+  void Start(std::shared_ptr<Call> call) { asio::co_spawn(io_, Run(std::move(call)), asio::detached); }
 
  private:
   using Idle = std::map<Origin, std::vector<std::unique_ptr<Connection>>>;

@@ -13,8 +13,8 @@ namespace terrace::fly {
 
 struct HttpOptions {
   int threads = 1;
-  int clients = 1;  // each has connections of its own
-  double timeout_s = 30;  // of connecting, and of a request with its reply
+  int clients = 1;                   // each has connections of its own
+  double timeout_s = 30;             // of connecting, and of a request with its reply
   std::vector<std::string> headers;  // "Name: value", added to each request
   bool verifies_certificates = true;
 };

@@ -48,11 +48,12 @@ Result<Url> ParseUrl(std::string_view text) {
   }
   url.origin.port = colon == std::string_view::npos ? "" : std::string(authority.substr(colon + 1));
   if (url.origin.port.empty()) url.origin.port = url.origin.is_tls ? "443" : "80";
-  const bool is_number = std::all_of(url.origin.port.begin(), url.origin.port.end(), [](char c) { return c >= '0' && c <= '9'; });
+  const bool is_number =
+      std::all_of(url.origin.port.begin(), url.origin.port.end(), [](char c) { return c >= '0' && c <= '9'; });
   if (!is_number || url.origin.port.size() > 5) return wrong("the port is no number");
   if (url.origin.host.empty()) return wrong("it names no host");
-  const bool is_clean = std::none_of(url.target.begin(), url.target.end(),
-                                     [](unsigned char c) { return c <= ' ' || c == 0x7f; });
+  const bool is_clean =
+      std::none_of(url.target.begin(), url.target.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });
   if (!is_clean) return wrong("it contains blanks or control characters");
   return url;
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "engine/core/plain_number.h"
 #include "fly/report/map_plot.h"
 #include "fly/report/time_plot.h"
 
@@ -65,26 +66,31 @@ std::vector<double> ValuesOf(const std::vector<Second>& seconds, double (*value)
 }
 
 void AddCard(const std::string& value, const std::string& name, bool is_bad, std::string& html) {
-  fmt::format_to(std::back_inserter(html), R"(<div class="card"><b{}>{}</b><span>{}</span></div>)", is_bad ? R"( class="bad")" : "",
-                 EscapeHtml(value), EscapeHtml(name));
+  fmt::format_to(std::back_inserter(html), R"(<div class="card"><b{}>{}</b><span>{}</span></div>)",
+                 is_bad ? R"( class="bad")" : "", EscapeHtml(value), EscapeHtml(name));
 }
 
 std::string CardsOf(const Summary& summary) {
   const Totals& totals = summary.totals;
   std::string html = R"(<div class="cards">)";
   const bool is_one = summary.clients.size() == 1;
-  AddCard(Time(summary.worst_first_view_s), is_one ? "until the first full view" : "until the first full view, slowest client",
+  AddCard(Time(summary.worst_first_view_s),
+          is_one ? "until the first full view" : "until the first full view, slowest client",
           summary.never_full + summary.never_opened > 0, html);
-  AddCard(fmt::format("{:.1f} %", 100 * summary.refined_share), "of the frames fully refined", summary.refined_share < 0.9, html);
+  AddCard(fmt::format("{:.1f} %", 100 * summary.refined_share), "of the frames fully refined",
+          summary.refined_share < 0.75, html);
   AddCard(fmt::format("{:.1f} px", summary.frame_p99_px), "worst error on screen in 99 % of the frames", false, html);
-  AddCard(fmt::format("{}", totals.hole_frames), fmt::format("frames with holes, of {} examined", totals.measured_frames), totals.hole_frames > 0, html);
+  AddCard(fmt::format("{}", totals.hole_frames),
+          fmt::format("frames with holes, of {} examined", totals.measured_frames), totals.hole_frames > 0, html);
   AddCard(Time(summary.p50_s), "p50 of a tile's latency", false, html);
   AddCard(Time(summary.p99_s), "p99 of a tile's latency", false, html);
-  AddCard(fmt::format("{}", totals.tiles), fmt::format("tiles, {:.1f} a second", summary.tiles_per_second), false, html);
+  AddCard(fmt::format("{}", totals.tiles), fmt::format("tiles, {:.1f} a second", summary.tiles_per_second), false,
+          html);
   AddCard(fmt::format("{:.2f} MB", static_cast<double>(totals.bytes) / 1e6), "received", false, html);
   AddCard(fmt::format("{:.2f} M", static_cast<double>(totals.triangles) / 1e6), "triangles", false, html);
   const auto refused = totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)];
-  AddCard(fmt::format("{}", summary.errors + refused), "requests failed or refused", summary.errors + refused > 0, html);
+  AddCard(fmt::format("{}", summary.errors + refused), "requests failed or refused", summary.errors + refused > 0,
+          html);
   return html + "</div>";
 }
 
@@ -115,7 +121,8 @@ TimePlot TilesPlot(const std::vector<Second>& seconds) {
   plot.series = {
       {"in memory", "var(--c)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[0]); }), Shape::kBars},
       {"lower tier", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[1]); }), Shape::kBars},
-      {"joined a build", "var(--b)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[2]); }), Shape::kBars},
+      {"joined a build", "var(--b)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[2]); }),
+       Shape::kBars},
       {"built", "var(--d)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[3]); }), Shape::kBars},
       {"not stated", "var(--e)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[4]); }), Shape::kBars}};
   return plot;
@@ -127,9 +134,11 @@ TimePlot LatencyPlot(const std::vector<Second>& seconds) {
   plot.unit = "ms, logarithmic";
   plot.note = "From the request to the last byte.";
   plot.is_logarithmic = true;
-  plot.series = {{"p99", "var(--d)", ValuesOf(seconds, [](const Second& s) {
-                    return s.latencies_s.empty() ? kNone : 1000 * Percentile(s.latencies_s, 0.99);
-                  })},
+  plot.series = {{"p99", "var(--d)",
+                  ValuesOf(seconds,
+                           [](const Second& s) {
+                             return s.latencies_s.empty() ? kNone : 1000 * Percentile(s.latencies_s, 0.99);
+                           })},
                  {"p50", "var(--a)", ValuesOf(seconds, [](const Second& s) {
                     return s.latencies_s.empty() ? kNone : 1000 * Percentile(s.latencies_s, 0.5);
                   })}};
@@ -142,9 +151,10 @@ TimePlot RefinedPlot(const std::vector<Second>& seconds) {
   plot.unit = "%";
   plot.note = "Frames that showed every tile that the view asks for.";
   plot.least_top = 100;
-  plot.series = {{"refined", "var(--c)", ValuesOf(seconds, [](const Second& s) {
-                    return s.frames == 0 ? kNone : 100.0 * s.refined / s.frames;
-                  }), Series::Shape::kArea}};
+  plot.series = {
+      {"refined", "var(--c)",
+       ValuesOf(seconds, [](const Second& s) { return s.frames == 0 ? kNone : 100.0 * s.refined / s.frames; }),
+       Series::Shape::kArea}};
   return plot;
 }
 
@@ -156,8 +166,11 @@ TimePlot ErrorPlot(const FlightOptions& options, const std::vector<Second>& seco
   plot.is_logarithmic = true;
   plot.limit = options.select.max_error_px;
   plot.limit_name = "refined above";
-  plot.series = {{"assumed", "var(--b)", ValuesOf(seconds, [](const Second& s) { return s.frames == 0 || s.worst_px <= 0 ? kNone : s.worst_px; })},
-                 {"stated", "var(--a)", ValuesOf(seconds, [](const Second& s) { return s.worst_stated_px <= 0 ? kNone : s.worst_stated_px; })}};
+  plot.series = {
+      {"assumed", "var(--b)",
+       ValuesOf(seconds, [](const Second& s) { return s.frames == 0 || s.worst_px <= 0 ? kNone : s.worst_px; })},
+      {"stated", "var(--a)",
+       ValuesOf(seconds, [](const Second& s) { return s.worst_stated_px <= 0 ? kNone : s.worst_stated_px; })}};
   return plot;
 }
 
@@ -177,7 +190,8 @@ TimePlot BytesPlot(const std::vector<Second>& seconds) {
   plot.title = "Received";
   plot.unit = "kB a second";
   plot.note = "Heads and bodies as sent, compressed.";
-  plot.series = {{"kB", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.bytes) / 1000; }), Series::Shape::kBars}};
+  plot.series = {{"kB", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.bytes) / 1000; }),
+                  Series::Shape::kBars}};
   return plot;
 }
 
@@ -186,12 +200,16 @@ TimePlot FailurePlot(const std::vector<Second>& seconds) {
   plot.title = "Refused and failed requests";
   plot.unit = "a second";
   plot.note = "Refused ones are asked again when Retry-After says.";
-  plot.series = {{"refused (429, 503)", "var(--b)", ValuesOf(seconds, [](const Second& s) { return double(s.outcomes[1]); }), Series::Shape::kBars},
-                 {"failed", "var(--d)", ValuesOf(seconds, [](const Second& s) {
-                    double sum = 0;
-                    for (std::size_t i = 2; i < kOutcomes; ++i) sum += s.outcomes[i];
-                    return sum;
-                  }), Series::Shape::kBars}};
+  plot.series = {{"refused (429, 503)", "var(--b)",
+                  ValuesOf(seconds, [](const Second& s) { return double(s.outcomes[1]); }), Series::Shape::kBars},
+                 {"failed", "var(--d)",
+                  ValuesOf(seconds,
+                           [](const Second& s) {
+                             double sum = 0;
+                             for (std::size_t i = 2; i < kOutcomes; ++i) sum += s.outcomes[i];
+                             return sum;
+                           }),
+                  Series::Shape::kBars}};
   return plot;
 }
 
@@ -219,10 +237,9 @@ BarPlot LatencyHistogram(const std::vector<float>& latencies_s) {
   constexpr double kBounds[] = {1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000};
   double below = 0;
   for (const double bound : kBounds) {
-    const auto count = static_cast<double>(std::count_if(latencies_s.begin(), latencies_s.end(), [&](float s) {
-      return s * 1000 > below && s * 1000 <= bound;
-    }));
-    plot.labels.push_back(bound < 1000 ? fmt::format("{:g} ms", bound) : fmt::format("{:g} s", bound / 1000));
+    const auto count = static_cast<double>(std::count_if(
+        latencies_s.begin(), latencies_s.end(), [&](float s) { return s * 1000 > below && s * 1000 <= bound; }));
+    plot.labels.push_back(bound < 1000 ? PlainNumber(bound) + " ms" : PlainNumber(bound / 1000) + " s");
     plot.series[0].values.push_back(count);
     below = bound;
   }
@@ -236,15 +253,18 @@ std::string TablesOf(const Totals& totals) {
   std::string html = "<h2>Requests</h2><table>";
   for (std::size_t i = 0; i < kOutcomes; ++i) {
     if (i > 0 && totals.outcomes[i] == 0) continue;
-    fmt::format_to(std::back_inserter(html), R"(<tr><td>{}</td><td class="n">{}</td></tr>)", NameOf(static_cast<Outcome>(i)), totals.outcomes[i]);
+    fmt::format_to(std::back_inserter(html), R"(<tr><td>{}</td><td class="n">{}</td></tr>)",
+                   NameOf(static_cast<Outcome>(i)), totals.outcomes[i]);
   }
-  fmt::format_to(std::back_inserter(html),
-                 R"(<tr><td>retries</td><td class="n">{}</td></tr><tr><td>connections opened</td><td class="n">{}</td></tr><tr><td>version changes</td><td class="n">{}</td></tr></table>)",
-                 totals.retries, totals.connections, totals.version_changes);
+  fmt::format_to(
+      std::back_inserter(html),
+      R"(<tr><td>retries</td><td class="n">{}</td></tr><tr><td>connections opened</td><td class="n">{}</td></tr><tr><td>version changes</td><td class="n">{}</td></tr></table>)",
+      totals.retries, totals.connections, totals.version_changes);
   if (totals.messages.empty()) return html;
   html += "<h2>Messages</h2><table>";
   for (const auto& [message, count] : totals.messages) {
-    fmt::format_to(std::back_inserter(html), R"(<tr><td class="n">{}</td><td>{}</td></tr>)", count, EscapeHtml(message));
+    fmt::format_to(std::back_inserter(html), R"(<tr><td class="n">{}</td><td>{}</td></tr>)", count,
+                   EscapeHtml(message));
   }
   return html + "</table>";
 }
@@ -255,18 +275,21 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
                    const Statistics& statistics) {
   const std::vector<Second> seconds = statistics.seconds();
   const std::vector<AskedTile> asked = statistics.asked();
-  std::string html = R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
+  std::string html =
+      R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
   html += "<title>Flight over " + EscapeHtml(options.document.Text()) + "</title>" + kStyle + "</head><body><main>";
-  fmt::format_to(std::back_inserter(html),
-                 R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km way, {:.0f} s each &middot; {} x {} px, {:g}&deg;, refined above {:g} px</p>)",
-                 EscapeHtml(options.document.Text()), options.clients, options.clients == 1 ? "" : "s", options.path.length_m() / 1000,
-                 options.duration_s, options.lens.width_px, options.lens.height_px, options.lens.field_of_view,
-                 options.select.max_error_px);
+  fmt::format_to(
+      std::back_inserter(html),
+      R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km way, {:.0f} s each &middot; {} x {} px, {}&deg;, refined above {} px</p>)",
+      EscapeHtml(options.document.Text()), options.clients, options.clients == 1 ? "" : "s",
+      options.path.length_m() / 1000, options.duration_s, options.lens.width_px, options.lens.height_px,
+      PlainNumber(options.lens.field_of_view), PlainNumber(options.select.max_error_px));
   html += BannerOf(summary, judgements) + CardsOf(summary) + "<h2>The flight</h2>";
   html += MapOf(asked, statistics.track()) + R"(<div class="plots">)";
-  std::vector<TimePlot> plots = {TilesPlot(seconds), LatencyPlot(seconds), RefinedPlot(seconds),
-                                 ErrorPlot(options, seconds), QueuePlot(seconds), BytesPlot(seconds)};
-  if (summary.errors + summary.totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)] > 0) plots.push_back(FailurePlot(seconds));
+  std::vector<TimePlot> plots = {TilesPlot(seconds),          LatencyPlot(seconds), RefinedPlot(seconds),
+                                 ErrorPlot(options, seconds), QueuePlot(seconds),   BytesPlot(seconds)};
+  if (summary.errors + summary.totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)] > 0)
+    plots.push_back(FailurePlot(seconds));
   for (TimePlot& plot : plots) {
     plot.marks = statistics.version_changes();
     plot.marks_name = "new version of the dataset";

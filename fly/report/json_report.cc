@@ -53,7 +53,8 @@ Json SummaryJson(const Summary& summary) {
   json["bytes"] = totals.bytes;
   json["triangles"] = totals.triangles;
   json["connections"] = totals.connections;
-  json["latency_s"] = {{"p50", Rounded(summary.p50_s)}, {"p99", Rounded(summary.p99_s)}, {"max", Rounded(summary.max_s)}};
+  json["latency_s"] = {
+      {"p50", Rounded(summary.p50_s)}, {"p99", Rounded(summary.p99_s)}, {"max", Rounded(summary.max_s)}};
   json["cache"] = Counts(totals.tiers, TierKey);
   json["outcomes"] = Counts(totals.outcomes, OutcomeKey);
   json["errors"] = summary.errors;
@@ -92,7 +93,8 @@ std::string JsonOf(const FlightOptions& options, const Summary& summary, const J
   json["summary"] = SummaryJson(summary);
   json["requirements"] = Json::array();
   for (const Judgement& judgement : judgements.all) {
-    json["requirements"].push_back({{"requirement", judgement.requirement.text}, {"value", judgement.shown}, {"holds", judgement.holds}});
+    json["requirements"].push_back(
+        {{"requirement", judgement.requirement.text}, {"value", judgement.shown}, {"holds", judgement.holds}});
   }
   json["seconds"] = Json::array();
   for (const Second& second : seconds) json["seconds"].push_back(SecondJson(second));

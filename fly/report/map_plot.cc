@@ -9,6 +9,7 @@
 #include <set>
 #include <tuple>
 
+#include "engine/core/plain_number.h"
 #include "fly/report/time_plot.h"
 #include "fly/scene/volume.h"
 
@@ -44,8 +45,8 @@ Frame FrameOf(const std::vector<GeodeticPoint>& track) {
   frame.longitude = track.front().longitude + (west + east) / 2;
   frame.latitude = (south + north) / 2;
   frame.squeeze = std::max(0.05, std::cos(geo::ToRadians(frame.latitude)));
-  // Ten times the height of the camera on each side: what it sees in detail.
-  const double around = std::clamp(height * 10 / 111'000, 0.02, 60.0);
+  // Five times the height of the camera on each side: what it sees in detail.
+  const double around = std::clamp(height * 5 / 111'000, 0.02, 60.0);
   frame.pixels_per_degree = std::min((kHeight - 2 * kMargin) / (north - south + 2 * around),
                                      (kWidth - 2 * kMargin) / ((east - west) * frame.squeeze + 2 * around));
   return frame;
@@ -57,15 +58,18 @@ void AddTile(const Frame& frame, const geo::TileKey& key, const std::string& col
   const double left = std::max(x - width / 2, -5.0), right = std::min(x + width / 2, kWidth + 5);
   const double top = std::max(frame.Y(r.north), -5.0), bottom = std::min(frame.Y(r.south), kHeight + 5);
   if (left >= right || top >= bottom) return;
-  fmt::format_to(std::back_inserter(svg), R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"><title>{}</title></rect>)",
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"><title>{}</title></rect>)",
                  left, top, right - left, bottom - top, color, geo::ToString(key));
 }
 
 void AddScaleBar(const Frame& frame, std::string& svg) {
   const double pixels_per_km = frame.pixels_per_degree / 111.2;
   const double km = RoundUp(120 / pixels_per_km) / 2;
-  fmt::format_to(std::back_inserter(svg), R"(<path class="bar" d="M{0:.1f} {1:.1f}v6h{2:.1f}v-6"/><text class="tick" x="{3:.1f}" y="{4:.1f}" text-anchor="middle">{5:g} km</text>)",
-                 20.0, kHeight - 24, km * pixels_per_km, 20 + km * pixels_per_km / 2, kHeight - 28, km);
+  fmt::format_to(
+      std::back_inserter(svg),
+      R"(<path class="bar" d="M{0:.1f} {1:.1f}v6h{2:.1f}v-6"/><text class="tick" x="{3:.1f}" y="{4:.1f}" text-anchor="middle">{5} km</text>)",
+      20.0, kHeight - 24, km * pixels_per_km, 20 + km * pixels_per_km / 2, kHeight - 28, PlainNumber(km));
 }
 
 }  // namespace
@@ -74,7 +78,9 @@ std::string ColorOfLevel(int level, int shallowest, int deepest) {
   // Samples of the viridis map, which stays readable without colours.
   static constexpr std::array<std::array<int, 3>, 6> kMap = {
       {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {253, 231, 37}}};
-  const double way = deepest <= shallowest ? 1 : std::clamp(static_cast<double>(level - shallowest) / (deepest - shallowest), 0.0, 1.0);
+  const double way = deepest <= shallowest
+                         ? 1
+                         : std::clamp(static_cast<double>(level - shallowest) / (deepest - shallowest), 0.0, 1.0);
   const double at = way * (kMap.size() - 1);
   const auto low = std::min(static_cast<std::size_t>(at), kMap.size() - 2);
   const auto mix = [&](std::size_t channel) {
@@ -100,8 +106,10 @@ std::string MapOf(const std::vector<AskedTile>& asked, const std::vector<Geodeti
   for (const GeodeticPoint& point : track) {
     fmt::format_to(std::back_inserter(points), "{:.1f},{:.1f} ", frame.X(point.longitude), frame.Y(point.latitude));
   }
-  fmt::format_to(std::back_inserter(svg), R"(<polyline class="halo" points="{0}"/><polyline class="track" points="{0}"/>)", points);
-  fmt::format_to(std::back_inserter(svg), R"(<circle class="start" cx="{:.1f}" cy="{:.1f}" r="6"><title>start</title></circle>)",
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<polyline class="halo" points="{0}"/><polyline class="track" points="{0}"/>)", points);
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<circle class="start" cx="{:.1f}" cy="{:.1f}" r="6"><title>start</title></circle>)",
                  frame.X(track.front().longitude), frame.Y(track.front().latitude));
   AddScaleBar(frame, svg);
   std::string legend;
@@ -109,10 +117,11 @@ std::string MapOf(const std::vector<AskedTile>& asked, const std::vector<Geodeti
     fmt::format_to(std::back_inserter(legend), R"(<span class="key"><i style="background:{}"></i>{}{}</span>)",
                    ColorOfLevel(level, shallowest, deepest), level == shallowest ? "up to level " : "", level);
   }
-  return fmt::format(R"(<figure class="wide"><figcaption><b>The way over the tiles that were loaded</b><p>Each rectangle is a tile of )"
-                     R"(the first client or of others; the dot is the start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:g} {:g}" )"
-                     R"(role="img" aria-label="map">{}</svg></figure>)",
-                     legend, kWidth, kHeight, svg);
+  return fmt::format(
+      R"(<figure class="wide"><figcaption><b>The way over the tiles that were loaded</b><p>Each rectangle is a tile of )"
+      R"(the first client or of others; the dot is the start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:.0f} {:.0f}" )"
+      R"(role="img" aria-label="map">{}</svg></figure>)",
+      legend, kWidth, kHeight, svg);
 }
 
 }  // namespace terrace::fly

@@ -40,10 +40,14 @@ const Row& RowOf(Measure measure) {
 // The factor of a suffix; nothing if the unit has no such suffix.
 std::optional<double> FactorOf(Unit unit, std::string_view suffix) {
   switch (unit) {
-    case Unit::kSeconds: return suffix == "s" ? std::optional(1.0) : suffix == "ms" ? std::optional(0.001) : std::nullopt;
-    case Unit::kShare: return suffix == "%" ? std::optional(0.01) : std::nullopt;
-    case Unit::kPixels: return suffix == "px" || suffix.empty() ? std::optional(1.0) : std::nullopt;
-    case Unit::kCount: return suffix.empty() ? std::optional(1.0) : std::nullopt;
+    case Unit::kSeconds:
+      return suffix == "s" ? std::optional(1.0) : suffix == "ms" ? std::optional(0.001) : std::nullopt;
+    case Unit::kShare:
+      return suffix == "%" ? std::optional(0.01) : std::nullopt;
+    case Unit::kPixels:
+      return suffix == "px" || suffix.empty() ? std::optional(1.0) : std::nullopt;
+    case Unit::kCount:
+      return suffix.empty() ? std::optional(1.0) : std::nullopt;
   }
   return std::nullopt;
 }
@@ -52,16 +56,26 @@ double ValueOf(Measure measure, const Summary& summary) {
   const Totals& totals = summary.totals;
   const bool has_tiles = totals.tiles > 0, has_flight = totals.flying_frames > 0;
   switch (measure) {
-    case Measure::kFullView: return summary.never_full + summary.never_opened > 0 ? -1 : summary.worst_first_view_s;
-    case Measure::kP50: return has_tiles ? summary.p50_s : -1;
-    case Measure::kP99: return has_tiles ? summary.p99_s : -1;
-    case Measure::kRefined: return has_flight ? summary.refined_share : -1;
-    case Measure::kScreenError: return has_flight ? summary.frame_p99_px : -1;
-    case Measure::kHoles: return totals.measured_frames > 0 ? static_cast<double>(totals.hole_frames) : -1;
-    case Measure::kErrors: return static_cast<double>(summary.errors);
-    case Measure::kRefusals: return static_cast<double>(totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)]);
-    case Measure::kHits: return has_tiles ? static_cast<double>(totals.tiers[0]) / static_cast<double>(totals.tiles) : -1;
-    case Measure::kTiles: return has_tiles ? summary.tiles_per_second : -1;
+    case Measure::kFullView:
+      return summary.never_full + summary.never_opened > 0 ? -1 : summary.worst_first_view_s;
+    case Measure::kP50:
+      return has_tiles ? summary.p50_s : -1;
+    case Measure::kP99:
+      return has_tiles ? summary.p99_s : -1;
+    case Measure::kRefined:
+      return has_flight ? summary.refined_share : -1;
+    case Measure::kScreenError:
+      return has_flight ? summary.frame_p99_px : -1;
+    case Measure::kHoles:
+      return totals.measured_frames > 0 ? static_cast<double>(totals.hole_frames) : -1;
+    case Measure::kErrors:
+      return static_cast<double>(summary.errors);
+    case Measure::kRefusals:
+      return static_cast<double>(totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)]);
+    case Measure::kHits:
+      return has_tiles ? static_cast<double>(totals.tiers[0]) / static_cast<double>(totals.tiles) : -1;
+    case Measure::kTiles:
+      return has_tiles ? summary.tiles_per_second : -1;
   }
   return -1;
 }
@@ -69,10 +83,14 @@ double ValueOf(Measure measure, const Summary& summary) {
 std::string Show(Unit unit, double value) {
   if (value < 0) return "never";
   switch (unit) {
-    case Unit::kSeconds: return value < 1 ? fmt::format("{:.1f} ms", value * 1000) : fmt::format("{:.2f} s", value);
-    case Unit::kShare: return fmt::format("{:.2f} %", value * 100);
-    case Unit::kPixels: return fmt::format("{:.1f} px", value);
-    case Unit::kCount: return fmt::format("{:.0f}", value);
+    case Unit::kSeconds:
+      return value < 1 ? fmt::format("{:.1f} ms", value * 1000) : fmt::format("{:.2f} s", value);
+    case Unit::kShare:
+      return fmt::format("{:.2f} %", value * 100);
+    case Unit::kPixels:
+      return fmt::format("{:.1f} px", value);
+    case Unit::kCount:
+      return fmt::format("{:.0f}", value);
   }
   return {};
 }
@@ -98,10 +116,11 @@ Result<std::vector<Requirement>> ParseRequirements(std::string_view text) {
       }
     }
     if (!factor) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "--require: \"{}\" is no requirement; possible are full-view=2s, p50=10ms, p99=50ms, refined=95%, "
-                       "screen-error=20px, holes=0, errors=0, refusals=0, hits=80% and tiles=30, joined by commas",
-                       part);
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "--require: \"{}\" is no requirement; possible are full-view=2s, p50=10ms, p99=50ms, refined=95%, "
+          "screen-error=20px, holes=0, errors=0, refusals=0, hits=80% and tiles=30, joined by commas",
+          part);
     }
     requirements.push_back({row->measure, value * *factor, std::string(part)});
   }
@@ -120,7 +139,7 @@ Judgements Judge(const std::vector<Requirement>& requirements, const Summary& su
     judgement.requirement = requirement;
     judgement.value = ValueOf(requirement.measure, summary);
     judgement.holds = judgement.value >= 0 &&
-                    (row.is_minimum ? judgement.value >= requirement.bound : judgement.value <= requirement.bound);
+                      (row.is_minimum ? judgement.value >= requirement.bound : judgement.value <= requirement.bound);
     judgement.shown = Show(row.unit, judgement.value);
     judgements.all.push_back(std::move(judgement));
   }

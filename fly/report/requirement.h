@@ -11,16 +11,16 @@
 namespace terrace::fly {
 
 enum class Measure {
-  kFullView,   // worst time to the first full view; at most
-  kP50,        // latency of tiles; at most
+  kFullView,  // worst time to the first full view; at most
+  kP50,       // latency of tiles; at most
   kP99,
-  kRefined,    // share of refined frames; at least
+  kRefined,      // share of refined frames; at least
   kScreenError,  // pixels, 99 % of the frames; at most
-  kHoles,      // frames; at most
-  kErrors,     // failed requests without refusals; at most
-  kRefusals,   // 429 and 503; at most
-  kHits,       // share of tiles that the server had in memory; at least
-  kTiles,      // tiles a second; at least
+  kHoles,        // frames; at most
+  kErrors,       // failed requests without refusals; at most
+  kRefusals,     // 429 and 503; at most
+  kHits,         // share of tiles that the server had in memory; at least
+  kTiles,        // tiles a second; at least
 };
 
 struct Requirement {
@@ -34,7 +34,7 @@ Result<std::vector<Requirement>> ParseRequirements(std::string_view text);
 
 struct Judgement {
   Requirement requirement;
-  double value = 0;   // as `bound`; negative if there was nothing to measure, which fails
+  double value = 0;  // as `bound`; negative if there was nothing to measure, which fails
   bool holds = false;
   std::string shown;  // the value with its unit
 };

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "engine/core/plain_number.h"
+
 namespace terrace::fly {
 namespace {
 
@@ -16,10 +18,10 @@ constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - k
 // "0.05", "12", "3.4k", "12M"
 std::string Short(double value) {
   const double size = std::abs(value);
-  if (size >= 1e9) return fmt::format("{:.3g}G", value / 1e9);
-  if (size >= 1e6) return fmt::format("{:.3g}M", value / 1e6);
-  if (size >= 1e4) return fmt::format("{:.3g}k", value / 1e3);
-  return fmt::format("{:.4g}", value);
+  if (size >= 1e9) return PlainNumber(value / 1e9, 3) + "G";
+  if (size >= 1e6) return PlainNumber(value / 1e6, 3) + "M";
+  if (size >= 1e4) return PlainNumber(value / 1e3, 3) + "k";
+  return PlainNumber(value, 4);
 }
 
 class Scale {
@@ -50,9 +52,10 @@ class Scale {
 void AddGrid(const Scale& scale, std::string& svg) {
   for (const double tick : scale.Ticks()) {
     const double y = scale.Y(tick);
-    fmt::format_to(std::back_inserter(svg),
-                   R"(<line class="grid" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
-                   kLeft, kWidth - kRight, y, y, kLeft - 6, y + 4, Short(tick));
+    fmt::format_to(
+        std::back_inserter(svg),
+        R"(<line class="grid" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
+        kLeft, kWidth - kRight, y, y, kLeft - 6, y + 4, Short(tick));
   }
 }
 
@@ -60,8 +63,9 @@ void AddTimeTicks(std::size_t seconds, std::string& svg) {
   const double step = RoundUp(static_cast<double>(seconds) / 10);
   for (double t = 0; t <= static_cast<double>(seconds) + 1e-9; t += step) {
     const double x = kLeft + kPlotWidth * t / static_cast<double>(seconds);
-    fmt::format_to(std::back_inserter(svg), R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{:g}{}</text>)", x,
-                   kHeight - 8, t, t == 0 ? " s" : "");
+    fmt::format_to(std::back_inserter(svg),
+                   R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}{}</text>)", x, kHeight - 8,
+                   PlainNumber(t), t == 0 ? " s" : "");
   }
 }
 
@@ -69,7 +73,8 @@ void AddLine(const Series& series, const Scale& scale, double step, std::string&
   std::string points;
   const auto finish = [&] {
     if (!points.empty()) {
-      fmt::format_to(std::back_inserter(svg), R"(<polyline class="line" stroke="{}" points="{}"/>)", series.color, points);
+      fmt::format_to(std::back_inserter(svg), R"(<polyline class="line" stroke="{}" points="{}"/>)", series.color,
+                     points);
     }
     points.clear();
   };
@@ -93,8 +98,8 @@ void AddStacked(const Series& series, const Scale& scale, double step, std::vect
     const double value = std::isnan(series.values[i]) ? 0 : series.values[i];
     if (value <= 0) continue;
     const double x = kLeft + step * static_cast<double>(i), bottom = scale.Y(base[i]), top = scale.Y(base[i] + value);
-    fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", x + gap / 2, bottom, step - gap, top - bottom,
-                   gap - step);
+    fmt::format_to(std::back_inserter(path), "M{:.1f} {:.1f}h{:.1f}v{:.1f}h{:.1f}z", x + gap / 2, bottom, step - gap,
+                   top - bottom, gap - step);
     base[i] += value;
   }
   if (!path.empty()) fmt::format_to(std::back_inserter(svg), R"(<path fill="{}" d="{}"/>)", series.color, path);
@@ -112,8 +117,9 @@ std::string Legend(const std::vector<Series>& series) {
 std::string Frame(const std::string& title, const std::string& unit, const std::string& note, const std::string& legend,
                   const std::string& svg) {
   return fmt::format(R"(<figure><figcaption><b>{}</b> <span class="unit">{}</span><p>{}</p><div>{}</div></figcaption>)"
-                     R"(<svg viewBox="0 0 {:g} {:g}" role="img" aria-label="{}">{}</svg></figure>)",
-                     EscapeHtml(title), EscapeHtml(unit), EscapeHtml(note), legend, kWidth, kHeight, EscapeHtml(title), svg);
+                     R"(<svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg></figure>)",
+                     EscapeHtml(title), EscapeHtml(unit), EscapeHtml(note), legend, kWidth, kHeight, EscapeHtml(title),
+                     svg);
 }
 
 void AddAll(const std::vector<Series>& series, const Scale& scale, double step, std::size_t count, std::string& svg) {
@@ -146,11 +152,20 @@ std::string EscapeHtml(const std::string& text) {
   std::string escaped;
   for (const char c : text) {
     switch (c) {
-      case '&': escaped += "&amp;"; break;
-      case '<': escaped += "&lt;"; break;
-      case '>': escaped += "&gt;"; break;
-      case '"': escaped += "&quot;"; break;
-      default: escaped += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
     }
   }
   return escaped;
@@ -190,17 +205,20 @@ std::string SvgOf(const TimePlot& plot) {
   AddAll(plot.series, scale, step, count, svg);
   if (plot.limit >= 0) {
     const double y = scale.Y(plot.limit);
-    fmt::format_to(std::back_inserter(svg),
-                   R"(<line class="limit" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="limit" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
-                   kLeft, kWidth - kRight, y, y, kWidth - kRight - 4, y - 5, EscapeHtml(plot.limit_name));
+    fmt::format_to(
+        std::back_inserter(svg),
+        R"(<line class="limit" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="limit" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
+        kLeft, kWidth - kRight, y, y, kWidth - kRight - 4, y - 5, EscapeHtml(plot.limit_name));
   }
   for (const double mark : plot.marks) {
     const double x = kLeft + step * mark;
-    fmt::format_to(std::back_inserter(svg), R"(<line class="mark" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"><title>{}</title></line>)", x,
+    fmt::format_to(std::back_inserter(svg),
+                   R"(<line class="mark" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"><title>{}</title></line>)", x,
                    x, kTop, kHeight - kBottom, EscapeHtml(plot.marks_name));
   }
   std::string legend = Legend(plot.series);
-  if (!plot.marks.empty()) legend += R"(<span class="key"><i class="mark"></i>)" + EscapeHtml(plot.marks_name) + "</span>";
+  if (!plot.marks.empty())
+    legend += R"(<span class="key"><i class="mark"></i>)" + EscapeHtml(plot.marks_name) + "</span>";
   return Frame(plot.title, plot.unit, plot.note, legend, svg);
 }
 
@@ -211,7 +229,8 @@ std::string SvgOf(const BarPlot& plot) {
   std::string svg;
   AddGrid(scale, svg);
   for (std::size_t i = 0; i < plot.labels.size(); ++i) {
-    fmt::format_to(std::back_inserter(svg), R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
+    fmt::format_to(std::back_inserter(svg),
+                   R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
                    kLeft + step * (static_cast<double>(i) + 0.5), kHeight - 8, EscapeHtml(plot.labels[i]));
   }
   AddAll(plot.series, scale, step, count, svg);

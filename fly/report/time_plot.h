@@ -9,8 +9,8 @@ namespace terrace::fly {
 
 struct Series {
   std::string name;
-  std::string color;  // a CSS colour or variable
-  std::vector<double> values;  // one a second; NaN leaves a gap
+  std::string color;                                              // a CSS colour or variable
+  std::vector<double> values;                                     // one a second; NaN leaves a gap
   enum class Shape { kLine, kArea, kBars } shape = Shape::kLine;  // areas and bars are stacked in their order
 };
 
@@ -22,8 +22,8 @@ struct TimePlot {
   bool is_logarithmic = false;  // values below the lowest decade are drawn on it
   double limit = -1;            // a line across; negative: none
   std::string limit_name;
-  double least_top = 0;            // the scale reaches at least this
-  std::vector<double> marks;       // seconds, lines from top to bottom
+  double least_top = 0;       // the scale reaches at least this
+  std::vector<double> marks;  // seconds, lines from top to bottom
   std::string marks_name;
 };
 

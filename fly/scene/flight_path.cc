@@ -34,8 +34,9 @@ double Metres(const GeodeticPoint& a, const GeodeticPoint& b) {
 double HeadingFromTo(const GeodeticPoint& a, const GeodeticPoint& b) {
   const double turn = geo::ToRadians(b.longitude - a.longitude);
   const double lat_a = geo::ToRadians(a.latitude), lat_b = geo::ToRadians(b.latitude);
-  return geo::ToDegrees(std::atan2(std::sin(turn) * std::cos(lat_b), std::cos(lat_a) * std::sin(lat_b) -
-                                                                         std::sin(lat_a) * std::cos(lat_b) * std::cos(turn)));
+  return geo::ToDegrees(
+      std::atan2(std::sin(turn) * std::cos(lat_b),
+                 std::cos(lat_a) * std::sin(lat_b) - std::sin(lat_a) * std::cos(lat_b) * std::cos(turn)));
 }
 
 // Times by speed, headings along the way, and longitudes that do not jump.
@@ -79,9 +80,10 @@ std::optional<std::vector<double>> Numbers(std::string_view line) {
 
 Result<void> AddPoint(const std::vector<double>& n, std::string_view where, FlightPath& path) {
   if (n.size() != 3 && n.size() != 5 && n.size() != 6) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {} numbers; a point is lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch",
-                     where, n.size());
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: {} numbers; a point is lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch", where,
+        n.size());
   }
   const std::size_t first = n.size() == 6 ? 1 : 0;
   FlightPath::Point point;
@@ -197,8 +199,8 @@ FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const Flight
   for (int i = 0; i <= kSteps; ++i) {
     const double bearing = geo::ToRadians(i * 360.0 / kSteps);
     const double to = std::asin(std::sin(lat) * std::cos(angle) + std::cos(lat) * std::sin(angle) * std::cos(bearing));
-    const double east = std::atan2(std::sin(bearing) * std::sin(angle) * std::cos(lat),
-                                   std::cos(angle) - std::sin(lat) * std::sin(to));
+    const double east =
+        std::atan2(std::sin(bearing) * std::sin(angle) * std::cos(lat), std::cos(angle) - std::sin(lat) * std::sin(to));
     path.points.push_back({0, {{geo::ToDegrees(lon + east), geo::ToDegrees(to), center.height_m}, 0, 0}});
   }
   Unwrap(path);
@@ -220,7 +222,8 @@ Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed) {
     if (!numbers) return MakeError(ErrorCode::kInvalidArgument, "{}: not only numbers", where);
     if (numbers->empty()) continue;
     if (columns != 0 && numbers->size() != columns) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where, numbers->size(), columns);
+      return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where,
+                       numbers->size(), columns);
     }
     columns = numbers->size();
     if (Result<void> added = AddPoint(*numbers, where, path); !added) return tl::unexpected(added.error());

@@ -27,8 +27,8 @@ std::optional<double> HitDistance(const geo::Vec3& origin, const geo::Vec3& ray,
 
 GeodeticPoint PointOn(const geo::Vec3& p, const Surface& surface, double height_m) {
   const double across = std::hypot(p.x, p.y) / (surface.equatorial * surface.equatorial);
-  return {geo::ToDegrees(std::atan2(p.y, p.x)), geo::ToDegrees(std::atan2(p.z / (surface.polar * surface.polar), across)),
-          height_m};
+  return {geo::ToDegrees(std::atan2(p.y, p.x)),
+          geo::ToDegrees(std::atan2(p.z / (surface.polar * surface.polar), across)), height_m};
 }
 
 const Tile* ChildAt(const Tile& tile, const GeodeticPoint& point) {

@@ -18,8 +18,8 @@ struct Coverage {
   int holes() const { return missing + uncovered; }
 };
 
-// Sends rays to the lowest surface that the tiles' volumes allow, so that each point is inside the volume of the deepest
-// known tile there. Points in fog do not count. Call it after SelectTiles for the same frame.
+// Sends rays to the lowest surface that the tiles' volumes allow, so that each point is inside the volume of the
+// deepest known tile there. Points in fog do not count. Call it after SelectTiles for the same frame.
 Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root);
 
 }  // namespace terrace::fly

@@ -95,9 +95,7 @@ Selector::Measures Selector::Measure(const Tile& tile) const {
 }
 
 // What is right below the camera counts as visible: it is what the camera sees next if it turns.
-bool Selector::IsVisible(const Volume& volume) const {
-  return view_.Sees(volume) || IsBelow(volume, view_.geodetic());
-}
+bool Selector::IsVisible(const Volume& volume) const { return view_.Sees(volume) || IsBelow(volume, view_.geodetic()); }
 
 // The children's volumes fit more tightly than the tile's own.
 bool Selector::IsOutOfSight(const Tile& tile) const {

@@ -4,7 +4,8 @@
 // A tile is refined while its geometric error takes more than `max_error_px` pixels on the screen at its distance.
 // Refined tiles are drawn once all of them are loaded; until then an ancestor is drawn instead of them: they are
 // kicked. Detail that was drawn in the frame before never vanishes: then new siblings do not wait for each other, and a
-// tile that is not loaded yet is a hole. With `forbid_holes` a culled sibling is loaded too before any of four is drawn.
+// tile that is not loaded yet is a hole. With `forbid_holes` a culled sibling is loaded too before any of four is
+// drawn.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +19,7 @@ namespace terrace::fly {
 
 struct SelectOptions {
   double max_error_px = 16;
-  double culled_error_px = 64;         // for the root, which is visited even if it is out of sight
+  double culled_error_px = 64;          // for the root, which is visited even if it is out of sight
   std::uint32_t descendant_limit = 20;  // more missing descendants than this: the tile itself is loaded first
   bool preload_ancestors = true;
   bool preload_siblings = true;

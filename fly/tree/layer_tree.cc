@@ -57,7 +57,8 @@ Result<Layer> ParseLayer(std::string_view text) {
   try {
     const Json json = Json::parse(text);
     if (json.value("projection", "EPSG:4326") != "EPSG:4326") {
-      return MakeError(ErrorCode::kInvalidArgument, "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
                        json.at("projection").dump());
     }
     if (!json.contains("available")) {
@@ -150,7 +151,8 @@ class LayerTree : public TileTree {
     return level < layer_.available.size() && layer_.available[level].Contains(key);
   }
 
-  static void AddTile(Tile& parent, const geo::TileKey& key, bool available, const HeightSpan& heights, double error_m) {
+  static void AddTile(Tile& parent, const geo::TileKey& key, bool available, const HeightSpan& heights,
+                      double error_m) {
     auto tile = std::make_unique<Tile>();
     tile->parent = &parent;
     tile->key = key;

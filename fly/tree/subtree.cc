@@ -17,7 +17,8 @@ constexpr std::uint32_t kMagic = 0x74627573;  // "subt"
 std::size_t Morton(std::uint32_t x, std::uint32_t y) {
   std::size_t index = 0;
   for (int bit = 0; bit < 24; ++bit) {
-    index |= static_cast<std::size_t>(x >> bit & 1) << (2 * bit) | static_cast<std::size_t>(y >> bit & 1) << (2 * bit + 1);
+    index |= static_cast<std::size_t>(x >> bit & 1) << (2 * bit) | static_cast<std::size_t>(y >> bit & 1)
+                                                                       << (2 * bit + 1);
   }
   return index;
 }
@@ -43,8 +44,7 @@ Result<Subtree3d> Subtree3d::Parse(std::string_view bytes, int levels) {
   ByteReader reader(bytes);
   const bool is_binary = reader.Get<std::uint32_t>() == kMagic && reader.Get<std::uint32_t>() == 1;
   const auto json_bytes = reader.Get<std::uint64_t>(), binary_bytes = reader.Get<std::uint64_t>();
-  if (!is_binary || !reader.ok() || json_bytes > reader.remaining() ||
-      binary_bytes > reader.remaining() - json_bytes) {
+  if (!is_binary || !reader.ok() || json_bytes > reader.remaining() || binary_bytes > reader.remaining() - json_bytes) {
     return Damaged("no binary subtree, or cut off");
   }
   const std::string_view text = reader.GetBytes(json_bytes), binary = reader.GetBytes(binary_bytes);

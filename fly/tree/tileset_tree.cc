@@ -70,7 +70,8 @@ std::optional<geo::TileKey> KeyOf(const Volume& volume) {
 }
 
 std::string Fill(std::string uri, const geo::TileKey& local) {
-  const std::pair<std::string_view, std::int64_t> values[] = {{"{level}", local.level}, {"{x}", local.x}, {"{y}", local.y}};
+  const std::pair<std::string_view, std::int64_t> values[] = {
+      {"{level}", local.level}, {"{x}", local.x}, {"{y}", local.y}};
   for (const auto& [name, value] : values) {
     const std::size_t at = uri.find(name);
     if (at != std::string::npos) uri.replace(at, name.size(), std::to_string(value));
@@ -94,7 +95,8 @@ Region PartOf(const Region& root, const geo::TileKey& local) {
   const Rectangle& r = root.rectangle();
   const auto parts = static_cast<double>(std::int64_t{1} << local.level);
   const double width = (r.east - r.west) / parts, height = (r.north - r.south) / parts;
-  const double west = r.west + width * static_cast<double>(local.x), south = r.south + height * static_cast<double>(local.y);
+  const double west = r.west + width * static_cast<double>(local.x),
+               south = r.south + height * static_cast<double>(local.y);
   return {{west, south, west + width, south + height}, root.min_height_m(), root.max_height_m()};
 }
 
@@ -108,7 +110,8 @@ void AddImplicitRoot(const Json& json, Tile& place) {
   tree->subtree_uri = tiling.at("subtrees").at("uri").get<std::string>();
   tree->subtree_levels = tiling.at("subtreeLevels").get<int>();
   tree->available_levels = tiling.at("availableLevels").get<int>();
-  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tree->available_levels < 1) Fail("levels of an implicit tiling");
+  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tree->available_levels < 1)
+    Fail("levels of an implicit tiling");
   tree->region = *region;
   place.content = Content::kStructure;
   place.always_refine = true;
@@ -132,7 +135,7 @@ void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile
   if (json.contains("content")) {
     tile.uri = json.at("content").at("uri").get<std::string>();
   } else {
-    // Without content: a mere volume if its error is not below the parent's, else the wish to show nothing.
+    // Without content: a mere volume if its error is not below the parent's, else nothing is to be shown.
     tile.content = Content::kEmpty;
     tile.state = LoadState::kReady;
     tile.always_refine = tile.geometric_error_m >= enclosing_error_m;

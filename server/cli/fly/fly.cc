@@ -119,7 +119,8 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
     }
   }
   options.document = *std::move(document);
-  options.format = options.document.target.find("tileset.json") != std::string::npos ? fly::Format::k3dTiles : fly::Format::kTerrain;
+  options.format =
+      options.document.target.find("tileset.json") != std::string::npos ? fly::Format::k3dTiles : fly::Format::kTerrain;
   if (options.document.target.find(".json") != std::string::npos && arguments.format == "3dtiles") {
     options.format = fly::Format::k3dTiles;
   }
@@ -160,10 +161,13 @@ int RunFly(const FlyArguments& arguments) {
   std::FILE* const log = arguments.json ? stderr : stdout;
   fmt::print(log, "{}: {:.1f} km in {:.0f} s, {} client{}\n", options->document.Text(), options->path.length_m() / 1000,
              options->duration_s, options->clients, options->clients == 1 ? "" : "s");
-  fly::Fly(*options, stop_requested, [&](std::size_t i) {
-    fmt::print(log, "{}\n", fly::LineOf(i, statistics.second(i)));
-    std::fflush(log);
-  }, statistics);
+  fly::Fly(
+      *options, stop_requested,
+      [&](std::size_t i) {
+        fmt::print(log, "{}\n", fly::LineOf(i, statistics.second(i)));
+        std::fflush(log);
+      },
+      statistics);
 
   const fly::Summary summary = fly::Summarize(*options, statistics);
   const fly::Judgements judgements = fly::Judge(*requirements, summary);
@@ -196,45 +200,107 @@ void AddFly(CLI::App& app, int& exit_code) {
   fly->group(kCommands);
   fly->footer(
       "Loads the tiles that cesium-native would load on this way, in real time, and prints a line each second.\n"
-      "Exit status 1: a requirement of --require failed, or nothing could be loaded. docs/flying.md explains each number.\n\n"
+      "Exit status 1: a requirement of --require failed, or nothing could be loaded. docs/flying.md explains each "
+      "number.\n\n"
       "Examples:\n"
       "  terrace fly http://127.0.0.1:8080/maui --circle -156.3,20.75,4500,20000 --report maui.html\n"
       "  terrace fly http://127.0.0.1:8080/alps --from 7.6,45.9,5000 --to 8.1,46.6,5000 --format 3dtiles\n"
-      "  terrace fly https://tiles.example.org/alps --path way.csv --clients 20 --require full-view=2s,p99=50ms,holes=0");
+      "  terrace fly https://tiles.example.org/alps --path way.csv --clients 20 --require "
+      "full-view=2s,p99=50ms,holes=0");
   FlyArguments& a = *arguments;
   fly->add_option("url", a.url, "URL of a dataset, or of its layer.json or tileset.json")->required()->type_name("URL");
   const char* const way = "Way";
-  fly->add_option("--path", a.path, "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a "
-                  "line, or GeoJSON with a LineString")->type_name("FILE")->group(way);
-  fly->add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")->type_name("LON,LAT,H")->group(way);
+  fly->add_option("--path", a.path,
+                  "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a "
+                  "line, or GeoJSON with a LineString")
+      ->type_name("FILE")
+      ->group(way);
+  fly->add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")
+      ->type_name("LON,LAT,H")
+      ->group(way);
   fly->add_option("--to", a.to, "End; the client flies back and forth")->type_name("LON,LAT,H")->group(way);
   fly->add_option("--circle", a.circle, "Circle around a place, metres")->type_name("LON,LAT,H,RADIUS")->group(way);
-  fly->add_option("--speed", a.speed, "Metres per second")->type_name("M/S")->check(CLI::Range(0.001, 1e7))->capture_default_str()->group(way);
-  fly->add_option("--pitch", a.pitch, "Degrees; 0 looks at the horizon, -90 down")->check(CLI::Range(-90.0, 90.0))->capture_default_str()->group(way);
+  fly->add_option("--speed", a.speed, "Metres per second")
+      ->type_name("M/S")
+      ->check(CLI::Range(0.001, 1e7))
+      ->capture_default_str()
+      ->group(way);
+  fly->add_option("--pitch", a.pitch, "Degrees; 0 looks at the horizon, -90 down")
+      ->check(CLI::Range(-90.0, 90.0))
+      ->capture_default_str()
+      ->group(way);
   fly->add_option("--duration", a.duration, "Seconds of the flight; default: once along the way, at least 10")
-      ->type_name("S")->check(CLI::Range(0.0, 7 * 86400.0))->group(way);
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 7 * 86400.0))
+      ->group(way);
   const char* const client = "Client";
-  fly->add_option("--format", a.format, "What to load")->check(CLI::IsMember({"terrain", "3dtiles"}))->capture_default_str()->group(client);
-  fly->add_option("--clients", a.clients, "Clients that fly at a time, spread evenly over the way")->check(CLI::Range(1, 1000))->capture_default_str()->group(client);
-  fly->add_option("--sse", a.sse, "Screen error in pixels from which a tile is refined")->type_name("PX")->check(CLI::Range(0.5, 1000.0))->capture_default_str()->group(client);
-  fly->add_option("--fps", a.fps, "Frames per second")->check(CLI::Range(1.0, 240.0))->capture_default_str()->group(client);
-  fly->add_option("--fov", a.fov, "Field of view in degrees, across the screen")->check(CLI::Range(1.0, 170.0))->capture_default_str()->group(client);
-  fly->add_option("--width", a.width, "Pixels of the screen")->check(CLI::Range(1, 32768))->capture_default_str()->group(client);
-  fly->add_option("--height", a.height, "Pixels of the screen")->check(CLI::Range(1, 32768))->capture_default_str()->group(client);
-  fly->add_option("--loads", a.loads, "Requests of a client at a time")->check(CLI::Range(1, 1000))->capture_default_str()->group(client);
-  fly->add_option("--cache", a.cache_mb, "Decoded tiles that a client keeps")->type_name("MIB")->check(CLI::Range(1, 65536))->capture_default_str()->group(client);
+  fly->add_option("--format", a.format, "What to load")
+      ->check(CLI::IsMember({"terrain", "3dtiles"}))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--clients", a.clients, "Clients that fly at a time, spread evenly over the way")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--sse", a.sse, "Screen error in pixels from which a tile is refined")
+      ->type_name("PX")
+      ->check(CLI::Range(0.5, 1000.0))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--fps", a.fps, "Frames per second")
+      ->check(CLI::Range(1.0, 240.0))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--fov", a.fov, "Field of view in degrees, across the screen")
+      ->check(CLI::Range(1.0, 170.0))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--width", a.width, "Pixels of the screen")
+      ->check(CLI::Range(1, 32768))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--height", a.height, "Pixels of the screen")
+      ->check(CLI::Range(1, 32768))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--loads", a.loads, "Requests of a client at a time")
+      ->check(CLI::Range(1, 1000))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--cache", a.cache_mb, "Decoded tiles that a client keeps")
+      ->type_name("MIB")
+      ->check(CLI::Range(1, 65536))
+      ->capture_default_str()
+      ->group(client);
   fly->add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn");
-  fly->add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")->type_name("HEADER")->group(client);
+  fly->add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")
+      ->type_name("HEADER")
+      ->group(client);
   fly->add_flag("--insecure", a.insecure, "Accept any TLS certificate");
-  fly->add_option("--timeout", a.timeout, "Seconds until a request without a complete reply is given up")->type_name("S")->check(CLI::Range(0.1, 3600.0))->capture_default_str()->group(client);
-  fly->add_option("--first-view-limit", a.first_view_limit, "Seconds that a client waits for a full view before it takes off")
-      ->type_name("S")->check(CLI::Range(0.1, 3600.0))->capture_default_str()->group(client);
+  fly->add_option("--timeout", a.timeout, "Seconds until a request without a complete reply is given up")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str()
+      ->group(client);
+  fly->add_option("--first-view-limit", a.first_view_limit,
+                  "Seconds that a client waits for a full view before it takes off")
+      ->type_name("S")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str()
+      ->group(client);
   const char* const output = "Report";
-  fly->add_option("--report", a.report, "Page with plots, without references to other files")->type_name("FILE.html")->group(output);
+  fly->add_option("--report", a.report, "Page with plots, without references to other files")
+      ->type_name("FILE.html")
+      ->group(output);
   fly->add_flag("--json", a.json, "Report as JSON on stdout; progress goes to stderr");
-  fly->add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")->type_name("FILE")->group(output);
-  fly->add_option("--require", a.require, "Exit status 1 unless all hold: full-view=2s, p50=10ms, p99=50ms, refined=95%, "
-                  "screen-error=20px, holes=0, errors=0, refusals=0, hits=80%, tiles=30")->type_name("LIST")->group(output);
+  fly->add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")
+      ->type_name("FILE")
+      ->group(output);
+  fly->add_option("--require", a.require,
+                  "Exit status 1 unless all hold: full-view=2s, p50=10ms, p99=50ms, refined=95%, "
+                  "screen-error=20px, holes=0, errors=0, refusals=0, hits=80%, tiles=30")
+      ->type_name("LIST")
+      ->group(output);
   fly->callback([arguments, &exit_code] { exit_code = RunFly(*arguments); });
 }
 
