@@ -82,6 +82,8 @@ Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root
       // The lower surface may lie below another tile, outside of that tile's volume.
       const Region& region = std::get<Region>(found.deepest->volume);
       if (height_m < region.min_height_m() || height_m > region.max_height_m()) continue;
+      // Without a child here the server has nothing below: the tile ends where the data do.
+      if (!found.deepest->children.empty() && found.drawn == 0) continue;
       ++coverage.rays;
       if (found.drawn == 0) ++coverage.uncovered;
       if (found.drawn > 0 && found.ready == 0) ++coverage.missing;
