@@ -1,5 +1,6 @@
 #include "fly/select/coverage.h"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -42,14 +43,19 @@ const Tile* ChildAt(const Tile& tile, const GeodeticPoint& point) {
 }
 
 struct Found {
-  const Tile* deepest = nullptr;  // with a region
+  const Tile* deepest = nullptr;                   // with a region
+  double min_height_m = -1e9, max_height_m = 1e9;  // that the regions of all tiles here share
   int drawn = 0, ready = 0;
 };
 
 Found FindAt(const Tile& root, const GeodeticPoint& point, std::uint64_t frame) {
   Found found;
   for (const Tile* tile = &root; tile != nullptr; tile = ChildAt(*tile, point)) {
-    if (std::holds_alternative<Region>(tile->volume)) found.deepest = tile;
+    if (const auto* region = std::get_if<Region>(&tile->volume)) {
+      found.deepest = tile;
+      found.min_height_m = std::max(found.min_height_m, region->min_height_m());
+      found.max_height_m = std::min(found.max_height_m, region->max_height_m());
+    }
     if (tile->visits[0].frame != frame || tile->visits[0].verdict != Verdict::kRendered) continue;
     ++found.drawn;
     if (tile->state == LoadState::kReady) ++found.ready;
@@ -76,12 +82,11 @@ Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root
         if (!distance) break;
         found = FindAt(root, PointOn(view.position() + ray * *distance, surface, height_m), frame);
         if (found.deepest == nullptr) break;
-        next_height_m = std::get<Region>(found.deepest->volume).min_height_m();
+        next_height_m = found.min_height_m;
       }
       if (!distance || found.deepest == nullptr || IsHiddenByFog(*distance, fog)) continue;
-      // The lower surface may lie below another tile, outside of that tile's volume.
-      const Region& region = std::get<Region>(found.deepest->volume);
-      if (height_m < region.min_height_m() || height_m > region.max_height_m()) continue;
+      // The range of a coarse mesh need not contain those of finer ones: outside of it, culling may be right.
+      if (height_m < found.min_height_m || height_m > found.max_height_m) continue;
       // Without a child here the server has nothing below: the tile ends where the data do.
       if (!found.deepest->children.empty() && found.drawn == 0) continue;
       ++coverage.rays;
