@@ -176,6 +176,7 @@ void Viewer::TakeDocument(const Arrival& arrival, double now_s) {
   document_due_s_ = now_s + kDocumentPause;
   if (arrival.outcome != Outcome::kOk) {
     document_due_s_ = now_s + PauseFor(arrival, ++document_attempts_);
+    document_problem_ = arrival.message;
     if (!tree_ && (!IsTransient(arrival.reply, arrival.outcome) ||
                    (arrival.outcome != Outcome::kRefused && document_attempts_ >= options_.max_attempts))) {
       GiveUp(fmt::format("{}: {}", options_.document.Text(), arrival.message));
@@ -388,7 +389,9 @@ void Viewer::Frame(double now_s, bool is_late) {
   if (phase_ == Phase::kDone) return;
   if (!tree_) {
     if (now_s - start_s_ > options_.first_view_limit_s) {
-      return GiveUp(fmt::format("{}: no document within {} s", options_.document.Text(), options_.first_view_limit_s));
+      const std::string& problem = document_problem_;
+      return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.Text(),
+                                options_.first_view_limit_s, problem.empty() ? "" : "; ", problem));
     }
     if (!asks_document_ && now_s >= document_due_s_) {
       asks_document_ = true;

@@ -78,6 +78,7 @@ class Viewer {
   bool asks_document_ = false;
   double document_due_s_ = 0;
   int document_attempts_ = 0;
+  std::string document_problem_;  // of the last attempt
 
   std::unique_ptr<TileTree> tree_;
   std::vector<std::string> versions_;

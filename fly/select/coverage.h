@@ -18,9 +18,9 @@ struct Coverage {
   int holes() const { return missing + uncovered; }
 };
 
-// Sends rays to the lowest surface that the volumes of all tiles there allow: where such a point is on the screen, none of
-// the tiles may be culled. Points in fog do not count, nor those where the deepest tile has no child: there the data end.
-// Call it after SelectTiles for the same frame.
+// Sends rays to the lowest surface that the volumes of all tiles there allow: where such a point is on the screen, none
+// of the tiles may be culled. Points in fog do not count, nor those where the deepest tile has no child: there the data
+// end. Call it after SelectTiles for the same frame.
 Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root);
 
 }  // namespace terrace::fly

@@ -140,7 +140,7 @@ class Faults(unittest.TestCase):
 
         def run(name, fault):
             options = ["--timeout", "1"] if name == "timeout" else []
-            results[name] = fly_with_fault(every(7, fault), *options, "--first-view-limit", "20")
+            results[name] = fly_with_fault(every(7, fault), *options, "--first-view-limit", "4")
 
         threads = [threading.Thread(target=run, args=(name, fault)) for name, (fault, _) in cases.items()]
         for thread in threads:
@@ -160,7 +160,7 @@ class Faults(unittest.TestCase):
         cases = {"silent": fault_proxy.silence, "closes": fault_proxy.close_at_once}
         for name, fault in cases.items():
             with self.subTest(name):
-                status, summary = fly_with_fault(lambda handler, number, fault=fault: fault(handler), "--timeout", "0.5", "--first-view-limit", "3",
+                status, summary = fly_with_fault(lambda handler, number, fault=fault: fault(handler), "--timeout", "0.5", "--first-view-limit", "2",
                                                  duration="1")
                 self.assertEqual(status, 1)
                 self.assertEqual(summary["tiles"], 0)
@@ -208,7 +208,7 @@ class Faults(unittest.TestCase):
 
     def test_says_that_a_slow_server_does_not_keep_up(self):
         with fault_proxy.FaultProxy(UPSTREAM, tiles_per_second=10) as proxy:
-            status, report = fly(proxy.address, "--require", "full-view=2s,p99=500ms,refined=90%", "--first-view-limit", "4", duration="4")
+            status, report = fly(proxy.address, "--require", "full-view=2s,p99=500ms,refined=90%", "--first-view-limit", "3", duration="3")
         summary = report["summary"]
         self.assertEqual(status, 1)
         self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False, False])

@@ -59,6 +59,17 @@ TEST(Volume, DistancesToRegionsAreLowerBounds) {
   }
 }
 
+// Parallels bend towards the equator: a plane through the corners would cut off the middle of the side.
+TEST(Volume, SidesTowardsTheEquatorAreNotCutOff) {
+  for (const std::int64_t row : {4, 10, 21, 27}) {
+    const Region region(RectangleOf({5, 37, row}), 0, 0);
+    const Rectangle& r = region.rectangle();
+    const double offset = 1e-4;  // degrees: 11 m
+    const GeodeticPoint camera{(r.west + r.east) / 2, row < 16 ? r.north + offset : r.south - offset, 0};
+    EXPECT_NEAR(std::sqrt(DistanceSquared(Volume(region), At(camera), camera)), 11.1, 0.2) << row;
+  }
+}
+
 TEST(Volume, ARegionBelowIsItsHeightAway) {
   const Region region(RectangleOf({8, 300, 180}), 100, 900);
   const Rectangle& r = region.rectangle();
