@@ -35,7 +35,7 @@ int Run(int argc, char** argv) {
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
       "  terrace info alps.tif                                the raster, and the levels that it can serve\n"
       "  terrace bake alps.tif --out alps                     all tiles, ahead of requests\n"
-      "  terrace fly http://127.0.0.1:8080/alps --circle 7.7,46,5000,20000   how it is served to a client that flies");
+      "  terrace fly URL --circle 7.7,46,5000,20000           a client that flies over a served dataset");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
   int exit_code = kExitOk;
