@@ -40,6 +40,8 @@ PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
 }.items() for name in names}
 # Plain values in the configuration's structs: config may include nothing else of these modules.
 VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
+# The client that flies: scene <- select; {select, content} <- tree; {tree, http} <- flight <- report <- cli/fly.
+FLY = ["fly/scene", "fly/select", "fly/content", "fly/tree", "fly/http", "fly/flight", "fly/report"]
 HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
 API = TILES + HTTP + ["server/api"]
@@ -62,6 +64,14 @@ MODULES = {
     "bake/queue": ["engine/core", "redis"],
     "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive", "bake/queue"],
     "redis": ["engine/core"],
+    "fly/scene": ["engine/core", "engine/geo"],
+    "fly/select": ["engine/core", "engine/geo", "fly/scene"],
+    "fly/content": ["engine/core"],
+    "fly/tree": ["engine/core", "engine/geo", "fly/scene", "fly/select", "fly/content"],
+    "fly/http": ["engine/core"],
+    "fly/flight": ["engine/core", "engine/geo"] + FLY[:5],
+    "fly/report": ["engine/core", "engine/geo"] + FLY[:6],
+    "server/cli/fly": ["engine/core", "server/cli/common"] + FLY,
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
@@ -79,7 +89,7 @@ MODULES = {
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
     "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/store", "server/cli/common"],
-    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
+    "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake", "server/cli/fly"],
 }
 
 # Library: its headers, and the files that may include them (regular expressions on paths). The first match counts.
@@ -89,12 +99,12 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|bake/.*\.cc|server/.*\.cc)"),
-    Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|(archive|bake|fly|proto|server)/.*\.cc)"),
+    Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
     Library("zlib", r"zlib\.h", r"proto/(compress|library_versions)\.cc"),
-    Library("Draco", r"draco/.*", r"proto/.*\.cc"),
+    Library("Draco", r"draco/.*", r"(proto/.*|fly/content/glb)\.cc"),
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
@@ -102,17 +112,17 @@ LIBRARIES = [
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
-    Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
-    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|redis/socket|server/net/.*)\.cc"),
+    Library("Beast", r"boost/beast.*", r"(server/http/request|fly/http/http_client)\.cc"),
+    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|fly/http/http_client|redis/socket|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
-    Library("Boost", r"boost/.*", r"server/"),
+    Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc)"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # Libraries that a module promises not to use: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|server)/"),
-    Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|redis|server|engine/dem)/"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|fly/(flight|http)|server)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|bake|fly/(flight|http)|tiler|redis|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",

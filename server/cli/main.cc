@@ -34,7 +34,8 @@ int Run(int argc, char** argv) {
       "  terrace serve alps.tif                               tiles and a viewer at http://127.0.0.1:8080/\n"
       "  terrace mesh alps.tif --out alps.obj --max-error 5   one mesh of the whole raster\n"
       "  terrace info alps.tif                                the raster, and the levels that it can serve\n"
-      "  terrace bake alps.tif --out alps                     all tiles, ahead of requests");
+      "  terrace bake alps.tif --out alps                     all tiles, ahead of requests\n"
+      "  terrace fly URL --circle 7.7,46,5000,20000           a client that flies over a served dataset");
   app.set_version_flag("--version", "terrace " TERRACE_VERSION);
   app.require_subcommand(1);
   int exit_code = kExitOk;
@@ -42,6 +43,7 @@ int Run(int argc, char** argv) {
   AddMesh(app, exit_code);
   AddInfo(app, exit_code);
   AddBake(app, exit_code);
+  AddFly(app, exit_code);
   if (argc == 1) {
     std::fputs(app.help().c_str(), stderr);
     return kExitUsage;

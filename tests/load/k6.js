@@ -1,7 +1,7 @@
 // For k6 (https://k6.io): viewers arrive at a rate that does not depend on the server. Each sends six requests of the
 // walk at a time, as a browser does, and pauses.
 //
-//   tests/load/walk.py http://HOST:PORT/DATASET --flight > walk.txt
+//   terrace fly http://HOST:PORT/DATASET --circle LON,LAT,H,RADIUS --urls walk.txt
 //   k6 run -e BASE=http://HOST:PORT -e WALK=$PWD/walk.txt -e VIEWERS=5 -e SECONDS=60 tests/load/k6.js
 // VIEWERS: new viewers a second. 503 with Retry-After is allowed during overload and counted separately. Any other 5xx,
 // and a request without a reply, fail the run.

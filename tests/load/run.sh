@@ -3,9 +3,9 @@
 #
 #   tests/load/run.sh http://HOST:PORT/DATASET [SECONDS] [CONNECTIONS]     default: 20 seconds, 32 connections
 # cold: every tile of the walk once. Start a new server, otherwise it has built some tiles already; the column "built"
-# shows the number. warm: the whole walk, with popular tiles more often, by wrk, for SECONDS. WALK_OPTIONS="--flight"
-# and others are passed to walk.py. With PID=... of the server the table has its processor time a request. Client and
-# server share a machine unless you separate them.
+# shows the number. warm: the whole walk, with popular tiles more often, by wrk, for SECONDS. WALK_OPTIONS are passed to
+# walk.py. TILES=FILE, as terrace fly --urls FILE writes it, is requested instead of a walk. With PID=... of the server the
+# table has its processor time a request. Client and server share a machine unless you separate them.
 set -euo pipefail
 export LC_ALL=C
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
@@ -19,7 +19,7 @@ WALK=$(mktemp)
 export WALK
 trap 'rm -f "$WALK"' EXIT
 read -ra walk_options <<< "${WALK_OPTIONS:-}"
-"$here/walk.py" "$dataset" "${walk_options[@]}" > "$WALK"
+if [[ -n ${TILES:-} ]]; then cp "$TILES" "$WALK"; else "$here/walk.py" "$dataset" "${walk_options[@]}" > "$WALK"; fi
 echo "$(wc -l < "$WALK") requests for $(sort -u "$WALK" | wc -l) tiles, $connections connections, $seconds s" >&2
 
 # Milliseconds of processor time that the server has used; 0 if PID is not set.

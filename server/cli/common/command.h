@@ -36,5 +36,6 @@ void AddServe(CLI::App& app, int& exit_code);
 void AddMesh(CLI::App& app, int& exit_code);
 void AddInfo(CLI::App& app, int& exit_code);
 void AddBake(CLI::App& app, int& exit_code);
+void AddFly(CLI::App& app, int& exit_code);
 
 }  // namespace terrace::cli

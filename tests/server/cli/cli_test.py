@@ -94,7 +94,7 @@ class Usage(unittest.TestCase):
         for arguments, message in ((["mesh", "a.tif", "--listen", "a:1"], "--listen; it is one of 'terrace serve'"),
                                    (["serve", "a.tif", "--points=5"], "--points; it is one of 'terrace mesh'"),
                                    (["--listen=a:1", "serve"], "--listen before the command; it is one of 'terrace serve'"),
-                                   (["mesh", "--port", "80"], "--port; did you mean --listen HOST:PORT of 'terrace serve'?"),
+                                   (["mesh", "--port", "80"], "--port; did you mean --listen HOST:PORT of 'terrace serve'"),
                                    (["serve", "--tokens=abc"], '--tokens; "tokens" stands in the configuration alone')):
             self.assertIn(f"terrace: unknown option {message}", run(*arguments).stderr, arguments)
 

@@ -1,0 +1,146 @@
+// What happened in a flight, second by second.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "engine/geo/tile_key.h"
+#include "fly/scene/view.h"
+
+namespace terrace::fly {
+
+// How a request ended.
+enum class Outcome {
+  kOk,
+  kRefused,   // 429 or 503: the client waits as long as Retry-After says
+  kNotFound,  // 404, 410
+  kStatus,    // another status than 2xx
+  kNoConnection,
+  kTimeout,
+  kCut,     // closed before the reply was complete
+  kNoHttp,  // bytes that are no HTTP reply, or too many
+  kDamaged  // a complete reply that does not decode
+};
+inline constexpr std::size_t kOutcomes = 9;
+const char* NameOf(Outcome outcome);  // as in reports: "ok", "refused (429, 503)", ...
+const char* KeyOf(Outcome outcome);   // as in JSON: "ok", "refused", ...
+
+// Where the server had the tile, from Server-Timing.
+enum class CacheTier { kHit, kLower, kJoin, kMiss, kUnknown };
+inline constexpr std::size_t kCacheTiers = 5;
+const char* NameOf(CacheTier tier);
+CacheTier ParseCacheTier(const std::string& server_timing);
+
+enum class Phase { kOpening, kFirstView, kFlying, kArrived, kDone };
+
+struct RequestRecord {
+  Outcome outcome = Outcome::kOk;
+  CacheTier tier = CacheTier::kUnknown;
+  bool is_tile = true;  // not a document or subtree
+  bool opened_connection = false;
+  double seconds = 0;
+  std::uint64_t bytes = 0;
+  std::uint32_t triangles = 0;
+  bool is_incomplete = false;  // the triangles do not cover the tile's rectangle
+};
+
+struct FrameRecord {
+  Phase phase = Phase::kFlying;
+  bool is_refined = false;
+  bool is_loaded = false;  // nothing is wanted any more, preloading included
+  bool is_mixed = false;   // shows tiles of more than one version
+  bool is_late = false;
+  double worst_px = 0;         // of the geometric errors of what is drawn
+  double worst_stated_px = 0;  // of the errors that the server stated
+  std::size_t drawn = 0, wanted = 0, in_flight = 0;
+  std::uint64_t triangles = 0;
+  bool is_measured = false;  // the numbers of rays below
+  int rays = 0, missing = 0, uncovered = 0;
+};
+
+struct Second {
+  std::array<std::uint32_t, kOutcomes> outcomes{};
+  std::array<std::uint32_t, kCacheTiers> tiers{};
+  std::uint32_t tiles = 0;
+  std::uint64_t bytes = 0, triangles = 0;
+  std::vector<float> latencies_s;  // of replies with tiles
+  std::uint32_t frames = 0, refined = 0, flying = 0, flying_refined = 0;
+  double worst_px = 0, worst_stated_px = 0;
+  std::size_t drawn = 0, wanted = 0, in_flight = 0;  // most
+  double worst_hole = 0;                             // share of the screen
+};
+
+struct AskedTile {
+  geo::TileKey key;
+  double seconds = 0;  // since the start
+  CacheTier tier = CacheTier::kUnknown;
+};
+
+struct ClientRecord {
+  double document_s = -1;    // until the document was read; -1: never
+  double first_view_s = -1;  // until the first full view; -1: never
+  double arrival_s = -1;     // from the end of the flight until the view was full; -1: never
+  std::string failure;       // why it did not fly
+};
+
+struct Totals {
+  std::array<std::uint64_t, kOutcomes> outcomes{};
+  std::array<std::uint64_t, kCacheTiers> tiers{};
+  std::uint64_t tiles = 0, other_requests = 0, bytes = 0, triangles = 0, retries = 0, connections = 0,
+                version_changes = 0;
+  std::uint64_t incomplete_tiles = 0;
+  std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, late_frames = 0, mixed_frames = 0;
+  std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
+  double worst_hole = 0;  // share of the screen
+  double worst_px = 0, worst_stated_px = 0;
+  std::vector<float> latencies_s, frame_worst_px;  // of tiles; of flying frames
+  std::map<std::string, std::uint64_t> messages;   // of what went wrong, at most 50 different ones
+};
+
+// Thread-safe.
+class Statistics {
+ public:
+  explicit Statistics(int clients);
+
+  void AddRequest(double now_s, const RequestRecord& record);
+  void AddFrame(double now_s, const FrameRecord& record);
+  void AddAsked(double now_s, const geo::TileKey& key, CacheTier tier);
+  void AddUrl(std::string url);
+  void AddRetry();
+  void AddVersionChange(double now_s, const std::string& from, const std::string& to);
+  void AddMessage(const std::string& message);
+  void SetClient(int client, const ClientRecord& record);
+  void AddCamera(const GeodeticPoint& point);
+
+  // Copies, for reports.
+  Totals totals() const;
+  Second second(std::size_t i) const;  // an empty one after the last
+  std::vector<Second> seconds() const;
+  std::vector<AskedTile> asked() const;
+  std::vector<std::string> urls() const;
+  std::vector<ClientRecord> clients() const;
+  std::vector<GeodeticPoint> track() const;
+  std::vector<double> version_changes() const;  // seconds since the start
+
+ private:
+  Second& At(double now_s);
+
+  mutable std::mutex mutex_;  // guards everything below
+  Totals totals_;
+  std::vector<Second> seconds_;
+  std::vector<AskedTile> asked_;
+  std::vector<std::string> urls_;
+  std::vector<ClientRecord> clients_;
+  std::vector<GeodeticPoint> track_;
+  std::vector<double> version_changes_;
+};
+
+// The value that a share of 0 to 1 of the values does not exceed; 0 without values.
+double Percentile(std::vector<float> values, double share);
+
+}  // namespace terrace::fly

@@ -1,0 +1,92 @@
+// One client: its tree of tiles, what it loads, and what it sees in each frame.
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "fly/flight/flight.h"
+#include "fly/flight/worker_pool.h"
+
+namespace terrace::fly {
+
+class Viewer {
+ public:
+  // `number` counts from 0. All references outlive the viewer; its callbacks do not: they keep what they need.
+  Viewer(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics);
+
+  // Draws a frame at `now_s` seconds since the start of all clients. One thread at a time.
+  void Frame(double now_s, bool is_late);
+
+  Phase phase() const { return phase_; }
+
+ private:
+  enum class What { kDocument, kSubtree, kTile };
+
+  // A reply, decoded on a worker.
+  struct Arrival {
+    What what = What::kTile;
+    Tile* tile = nullptr;
+    std::uint32_t version = 0;
+    HttpReply reply;
+    Outcome outcome = Outcome::kOk;
+    TileContent content;
+    std::string text;     // of a document or subtree
+    std::string message;  // what is wrong with it
+  };
+  struct Inbox {
+    std::mutex mutex;
+    std::vector<Arrival> arrivals;
+  };
+  struct Waiting {
+    Tile* tile;
+    double due_s;
+  };
+
+  void Ask(What what, Tile* tile, const std::string& uri);
+  static void Decode(Format format, Arrival& arrival);
+  static Outcome OutcomeOf(const HttpReply& reply);
+  void TakeArrivals(double now_s);
+  void Take(Arrival& arrival, double now_s);
+  void TakeDocument(const Arrival& arrival, double now_s);
+  void TakeTile(const Arrival& arrival, double now_s);
+  void TakeReady(Tile& tile);
+  void FailOrWait(const Arrival& arrival, double now_s);
+  double PauseFor(const Arrival& arrival, int attempts) const;
+  void CheckVersion(const Arrival& arrival, double now_s);
+  void WakeWaiting(double now_s);
+  void StartLoads(const Selection& selection);
+  void StartLoad(Tile& tile);
+  void Unload(std::uint64_t frame);
+  FrameRecord Describe(const Selection& selection, const View& view);
+  void Advance(const FrameRecord& record, double now_s);
+  void AdvancePhase(const FrameRecord& record, double now_s);
+  void GiveUp(const std::string& why);
+  double FlownSeconds(double now_s) const;
+
+  const FlightOptions& options_;
+  const int number_;
+  HttpClient& http_;
+  WorkerPool& workers_;
+  Statistics& statistics_;
+  const std::shared_ptr<Inbox> inbox_ = std::make_shared<Inbox>();
+
+  Phase phase_ = Phase::kOpening;
+  ClientRecord record_;
+  double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0;
+  bool asks_document_ = false;
+  double document_due_s_ = 0;
+  int document_attempts_ = 0;
+  std::string document_problem_;  // of the last attempt
+
+  std::unique_ptr<TileTree> tree_;
+  std::vector<std::string> versions_;
+  std::uint64_t frame_ = 0;
+  int active_ = 0;  // requests of tiles and subtrees
+  std::vector<Waiting> waiting_;
+  std::vector<Tile*> ready_;  // loaded, with content
+  std::uint64_t tile_bytes_ = 0;
+};
+
+}  // namespace terrace::fly

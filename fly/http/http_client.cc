@@ -1,0 +1,251 @@
+#include "fly/http/http_client.h"
+
+#include <boost/asio/as_tuple.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ssl.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <boost/beast/ssl.hpp>
+#include <chrono>
+#include <cstddef>
+#include <exception>
+#include <map>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace terrace::fly {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using boost::system::error_code;
+using Clock = std::chrono::steady_clock;
+using TlsStream = beast::ssl_stream<beast::tcp_stream>;
+
+constexpr std::uint64_t kMaxReplyBytes = std::uint64_t{64} << 20;
+constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
+
+struct Connection {
+  beast::flat_buffer buffer;
+  std::unique_ptr<beast::tcp_stream> plain;  // one of both
+  std::unique_ptr<TlsStream> tls;
+
+  beast::tcp_stream& lowest() { return plain ? *plain : tls->next_layer(); }
+};
+
+struct Call {
+  int client = 0;
+  Url url;
+  std::string accept;
+  std::function<void(HttpReply)> done;
+  Clock::time_point start;
+};
+
+Failure FailureOf(const error_code& error) {
+  if (error == beast::error::timeout) return Failure::kTimeout;
+  if (error == http::error::body_limit) return Failure::kTooLarge;
+  const bool is_cut = error == http::error::end_of_stream || error == http::error::partial_message ||
+                      error.category() != http::make_error_code(http::error::end_of_stream).category();
+  return is_cut ? Failure::kCut : Failure::kMalformed;
+}
+
+void Fail(HttpReply& reply, Failure failure, const error_code& error) {
+  reply.failure = failure;
+  reply.detail = error.message();
+}
+
+}  // namespace
+
+class HttpClient::Impl {
+ public:
+  explicit Impl(const HttpOptions& options)
+      : options_(options),
+        tls_(asio::ssl::context::tls_client),
+        work_(io_.get_executor()),
+        idle_(static_cast<std::size_t>(options.clients)) {
+    tls_.set_default_verify_paths();
+    tls_.set_verify_mode(options.verifies_certificates ? asio::ssl::verify_peer : asio::ssl::verify_none);
+    for (int i = 0; i < options.threads; ++i) threads_.emplace_back([this] { io_.run(); });
+  }
+
+  ~Impl() {
+    io_.stop();
+    threads_.clear();  // joins; only then may the coroutines be destroyed
+  }
+
+  void Start(std::shared_ptr<Call> call) { asio::co_spawn(io_, Run(std::move(call)), asio::detached); }
+
+ private:
+  using Idle = std::map<Origin, std::vector<std::unique_ptr<Connection>>>;
+
+  std::chrono::nanoseconds timeout() const {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(options_.timeout_s));
+  }
+
+  std::unique_ptr<Connection> TakeIdle(int client, const Origin& origin) {
+    const std::lock_guard lock(mutex_);
+    auto& connections = idle_[static_cast<std::size_t>(client)][origin];
+    if (connections.empty()) return nullptr;
+    std::unique_ptr<Connection> connection = std::move(connections.back());
+    connections.pop_back();
+    return connection;
+  }
+
+  void PutIdle(int client, const Origin& origin, std::unique_ptr<Connection> connection) {
+    const std::lock_guard lock(mutex_);
+    idle_[static_cast<std::size_t>(client)][origin].push_back(std::move(connection));
+  }
+
+  // Null if there is no connection; then `reply` says why.
+  asio::awaitable<std::unique_ptr<Connection>> Open(Origin origin, HttpReply& reply) {
+    asio::ip::tcp::resolver resolver(io_);
+    auto [resolve_error, endpoints] = co_await resolver.async_resolve(origin.host, origin.port, kAwait);
+    if (resolve_error) {
+      Fail(reply, Failure::kConnect, resolve_error);
+      co_return nullptr;
+    }
+    auto connection = std::make_unique<Connection>();
+    if (origin.is_tls) {
+      connection->tls = std::make_unique<TlsStream>(io_, tls_);
+    } else {
+      connection->plain = std::make_unique<beast::tcp_stream>(io_);
+    }
+    connection->lowest().expires_after(timeout());
+    auto [connect_error, endpoint] = co_await connection->lowest().async_connect(endpoints, kAwait);
+    if (connect_error) {
+      Fail(reply, connect_error == beast::error::timeout ? Failure::kTimeout : Failure::kConnect, connect_error);
+      co_return nullptr;
+    }
+    error_code ignored;
+    connection->lowest().socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+    if (connection->tls) {
+      SSL_set_tlsext_host_name(connection->tls->native_handle(), origin.host.c_str());
+      if (options_.verifies_certificates) {
+        connection->tls->set_verify_callback(asio::ssl::host_name_verification(origin.host));
+      }
+      auto [tls_error] = co_await connection->tls->async_handshake(asio::ssl::stream_base::client, kAwait);
+      if (tls_error) {
+        Fail(reply, Failure::kConnect, tls_error);
+        co_return nullptr;
+      }
+    }
+    co_return connection;
+  }
+
+  http::request<http::empty_body> MakeRequest(const Call& call) const {
+    http::request<http::empty_body> request(http::verb::get, call.url.target, 11);
+    const Url bare{call.url.origin, ""};
+    const std::string text = bare.Text();
+    request.set(http::field::host, text.substr(text.find("//") + 2));
+    request.set(http::field::user_agent, "terrace-fly");
+    request.set(http::field::accept, call.accept);
+    request.set(http::field::accept_encoding, "gzip");
+    for (const std::string& header : options_.headers) {
+      const std::size_t colon = header.find(':');
+      const std::size_t value = header.find_first_not_of(' ', colon + 1);
+      request.set(header.substr(0, colon), value == std::string::npos ? "" : header.substr(value));
+    }
+    return request;
+  }
+
+  // Returns whether the connection can be used again. `answered`: whether any byte of a reply came.
+  template <typename Stream>
+  asio::awaitable<bool> Exchange(Stream& stream, Connection& connection, const Call& call, HttpReply& reply,
+                                 bool& answered) {
+    const http::request<http::empty_body> request = MakeRequest(call);
+    connection.lowest().expires_after(timeout());
+    auto [write_error, written] = co_await http::async_write(stream, request, kAwait);
+    if (write_error) {
+      Fail(reply, FailureOf(write_error), write_error);
+      co_return false;
+    }
+    http::response_parser<http::string_body> parser;
+    parser.body_limit(kMaxReplyBytes);
+    auto [read_error, read] = co_await http::async_read(stream, connection.buffer, parser, kAwait);
+    answered = parser.got_some();
+    reply.bytes = read;
+    if (read_error) {
+      Fail(reply, FailureOf(read_error), read_error);
+      co_return false;
+    }
+    auto& message = parser.get();
+    reply.status = static_cast<int>(message.result_int());
+    reply.is_gzip = message[http::field::content_encoding] == "gzip";
+    reply.server_timing = std::string(message["Server-Timing"]);
+    reply.retry_after = std::string(message[http::field::retry_after]);
+    reply.cache_control = std::string(message[http::field::cache_control]);
+    reply.max_error = std::string(message["Terrain-Max-Error"]);
+    const bool keeps = message.keep_alive();
+    reply.body = std::move(message.body());
+    co_return keeps;
+  }
+
+  asio::awaitable<HttpReply> Fetch(std::shared_ptr<Call> call) {
+    for (;;) {
+      HttpReply reply;
+      std::unique_ptr<Connection> connection = TakeIdle(call->client, call->url.origin);
+      const bool is_reused = connection != nullptr;
+      if (!connection) {
+        reply.opened_connection = true;
+        connection = co_await Open(call->url.origin, reply);
+        if (!connection) co_return reply;
+      }
+      bool answered = false, keeps = false;
+      if (connection->tls) {
+        keeps = co_await Exchange(*connection->tls, *connection, *call, reply, answered);
+      } else {
+        keeps = co_await Exchange(*connection->plain, *connection, *call, reply, answered);
+      }
+      // The server may close an idle connection at any time; such a request was never seen.
+      if (is_reused && reply.failure == Failure::kCut && !answered) continue;
+      if (keeps) {
+        connection->lowest().expires_never();
+        PutIdle(call->client, call->url.origin, std::move(connection));
+      }
+      co_return reply;
+    }
+  }
+
+  asio::awaitable<void> Run(std::shared_ptr<Call> call) {
+    HttpReply reply;
+    try {
+      reply = co_await Fetch(call);
+    } catch (const std::exception& error) {
+      reply.failure = Failure::kMalformed;
+      reply.detail = error.what();
+    }
+    reply.seconds = std::chrono::duration<double>(Clock::now() - call->start).count();
+    call->done(std::move(reply));
+  }
+
+  const HttpOptions options_;
+  asio::ssl::context tls_;
+  std::mutex mutex_;  // guards idle_
+  // Before what holds its sockets: connections and coroutines end before it does.
+  asio::io_context io_;
+  asio::executor_work_guard<asio::io_context::executor_type> work_;
+  std::vector<Idle> idle_;  // by client
+  std::vector<std::jthread> threads_;
+};
+
+HttpClient::HttpClient(const HttpOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+HttpClient::~HttpClient() = default;
+
+void HttpClient::Get(int client, Url url, std::string accept, std::function<void(HttpReply)> done) {
+  auto call = std::make_shared<Call>();
+  call->client = client;
+  call->url = std::move(url);
+  call->accept = std::move(accept);
+  call->done = std::move(done);
+  call->start = Clock::now();
+  impl_->Start(std::move(call));
+}
+
+}  // namespace terrace::fly

@@ -1,0 +1,59 @@
+// GET requests over connections that are kept open.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fly/http/url.h"
+
+namespace terrace::fly {
+
+struct HttpOptions {
+  int threads = 1;
+  int clients = 1;                   // each has connections of its own
+  double timeout_s = 30;             // of connecting, and of a request with its reply
+  std::vector<std::string> headers;  // "Name: value", added to each request
+  bool verifies_certificates = true;
+};
+
+enum class Failure {
+  kNone,       // a complete reply, with any status
+  kConnect,    // no connection: refused, unknown host, TLS
+  kTimeout,    // no complete reply in time
+  kCut,        // closed before the reply was complete
+  kMalformed,  // no HTTP
+  kTooLarge,
+};
+
+struct HttpReply {
+  Failure failure = Failure::kNone;
+  std::string detail;  // of a failure, for people
+  int status = 0;
+  std::string body;  // as it was sent; see `is_gzip`
+  bool is_gzip = false;
+  std::string server_timing, retry_after, cache_control, max_error;
+  std::uint64_t bytes = 0;  // of head and body
+  double seconds = 0;       // from the request to the last byte; of a new connection from connecting
+  bool opened_connection = false;
+};
+
+class HttpClient {
+ public:
+  explicit HttpClient(const HttpOptions& options);
+  ~HttpClient();  // breaks off what runs; no callback is called later
+  HttpClient(const HttpClient&) = delete;
+  HttpClient& operator=(const HttpClient&) = delete;
+
+  // Calls `done` on a thread of this object, exactly once unless it is destroyed before. 0 <= client < options.clients.
+  // Any thread may call this.
+  void Get(int client, Url url, std::string accept, std::function<void(HttpReply)> done);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::fly

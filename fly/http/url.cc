@@ -1,0 +1,80 @@
+#include "fly/http/url.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace terrace::fly {
+namespace {
+
+bool StartsWith(std::string_view text, std::string_view start) { return text.substr(0, start.size()) == start; }
+
+}  // namespace
+
+std::string Url::Text() const {
+  const bool is_ipv6 = origin.host.find(':') != std::string::npos;
+  const std::string host = is_ipv6 ? "[" + origin.host + "]" : origin.host;
+  const bool is_default = origin.port == (origin.is_tls ? "443" : "80");
+  return std::string(origin.is_tls ? "https://" : "http://") + host + (is_default ? "" : ":" + origin.port) + target;
+}
+
+Result<Url> ParseUrl(std::string_view text) {
+  const auto wrong = [text](std::string_view what) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {}; give a URL such as http://127.0.0.1:8080/maui", text, what);
+  };
+  Url url;
+  std::string_view rest = text;
+  if (StartsWith(rest, "https://")) {
+    url.origin.is_tls = true;
+    rest.remove_prefix(8);
+  } else if (StartsWith(rest, "http://")) {
+    rest.remove_prefix(7);
+  } else {
+    return wrong("no http or https URL");
+  }
+  rest = rest.substr(0, rest.find('#'));
+  const std::size_t slash = rest.find_first_of("/?");
+  std::string_view authority = rest.substr(0, slash);
+  url.target = slash == std::string_view::npos ? "/" : std::string(rest.substr(slash));
+  if (url.target.front() == '?') url.target.insert(0, "/");
+  if (authority.find('@') != std::string_view::npos) return wrong("it contains a user; use --header for credentials");
+  std::size_t colon = authority.rfind(':');
+  if (StartsWith(authority, "[")) {
+    const std::size_t bracket = authority.find(']');
+    if (bracket == std::string_view::npos) return wrong("the address is not closed by ]");
+    url.origin.host = authority.substr(1, bracket - 1);
+    colon = authority.find(':', bracket);
+  } else {
+    url.origin.host = authority.substr(0, colon);
+  }
+  url.origin.port = colon == std::string_view::npos ? "" : std::string(authority.substr(colon + 1));
+  if (url.origin.port.empty()) url.origin.port = url.origin.is_tls ? "443" : "80";
+  const bool is_number =
+      std::all_of(url.origin.port.begin(), url.origin.port.end(), [](char c) { return c >= '0' && c <= '9'; });
+  if (!is_number || url.origin.port.size() > 5) return wrong("the port is no number");
+  if (url.origin.host.empty()) return wrong("it names no host");
+  const bool is_clean =
+      std::none_of(url.target.begin(), url.target.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });
+  if (!is_clean) return wrong("it contains blanks or control characters");
+  return url;
+}
+
+Result<Url> Resolve(const Url& base, std::string_view reference) {
+  if (StartsWith(reference, "http://") || StartsWith(reference, "https://")) return ParseUrl(reference);
+  if (StartsWith(reference, "//")) return ParseUrl((base.origin.is_tls ? "https:" : "http:") + std::string(reference));
+  Url url = base;
+  if (StartsWith(reference, "/")) {
+    url.target = reference;
+  } else {
+    const std::string_view path = std::string_view(base.target).substr(0, base.target.find('?'));
+    std::string folder(path.substr(0, path.rfind('/') + 1));
+    while (StartsWith(reference, "./") || StartsWith(reference, "../")) {
+      const bool is_up = reference[1] == '.';
+      reference.remove_prefix(is_up ? 3 : 2);
+      if (is_up && folder.size() > 1) folder.erase(folder.rfind('/', folder.size() - 2) + 1);
+    }
+    url.target = folder + std::string(reference);
+  }
+  return ParseUrl(url.Text());
+}
+
+}  // namespace terrace::fly

@@ -1,0 +1,32 @@
+// URLs as far as a client of tiles needs them: http and https, absolute or relative.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+
+namespace terrace::fly {
+
+struct Origin {
+  bool is_tls = false;
+  std::string host;  // without brackets, for IPv6 too
+  std::string port;
+
+  friend auto operator<=>(const Origin&, const Origin&) = default;
+};
+
+struct Url {
+  Origin origin;
+  std::string target;  // "/path?query"; no fragment
+
+  std::string Text() const;
+};
+
+// kInvalidArgument if the text is no http or https URL.
+Result<Url> ParseUrl(std::string_view text);
+
+// RFC 3986, section 5, without "../" inside of `reference`.
+Result<Url> Resolve(const Url& base, std::string_view reference);
+
+}  // namespace terrace::fly

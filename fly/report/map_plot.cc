@@ -1,0 +1,127 @@
+#include "fly/report/map_plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <set>
+#include <tuple>
+
+#include "engine/core/plain_number.h"
+#include "fly/report/time_plot.h"
+#include "fly/scene/volume.h"
+
+namespace terrace::fly {
+namespace {
+
+constexpr double kWidth = 1304, kHeight = 620, kMargin = 30;
+constexpr std::size_t kMaxTiles = 6000;
+constexpr int kShownLevels = 7;  // the deepest ones; shallower tiles only tint the ground
+
+struct Frame {
+  double longitude = 0, latitude = 0;  // of the middle
+  double pixels_per_degree = 1;        // to the north
+  double squeeze = 1;                  // of degrees to the east
+
+  double X(double lon) const {
+    return kWidth / 2 + std::remainder(lon - longitude, 360.0) * squeeze * pixels_per_degree;
+  }
+  double Y(double lat) const { return kHeight / 2 - (lat - latitude) * pixels_per_degree; }
+};
+
+Frame FrameOf(const std::vector<GeodeticPoint>& track) {
+  Frame frame;
+  double west = 0, east = 0, south = 90, north = -90, height = 0;
+  for (const GeodeticPoint& point : track) {
+    const double lon = std::remainder(point.longitude - track.front().longitude, 360.0);
+    west = std::min(west, lon);
+    east = std::max(east, lon);
+    south = std::min(south, point.latitude);
+    north = std::max(north, point.latitude);
+    height = std::max(height, point.height_m);
+  }
+  frame.longitude = track.front().longitude + (west + east) / 2;
+  frame.latitude = (south + north) / 2;
+  frame.squeeze = std::max(0.05, std::cos(geo::ToRadians(frame.latitude)));
+  // Five times the height of the camera on each side: what it sees in detail.
+  const double around = std::clamp(height * 5 / 111'000, 0.02, 60.0);
+  frame.pixels_per_degree = std::min((kHeight - 2 * kMargin) / (north - south + 2 * around),
+                                     (kWidth - 2 * kMargin) / ((east - west) * frame.squeeze + 2 * around));
+  return frame;
+}
+
+void AddTile(const Frame& frame, const geo::TileKey& key, const std::string& color, std::string& svg) {
+  const Rectangle r = RectangleOf(key);
+  const double x = frame.X((r.west + r.east) / 2), width = (r.east - r.west) * frame.squeeze * frame.pixels_per_degree;
+  const double left = std::max(x - width / 2, -5.0), right = std::min(x + width / 2, kWidth + 5);
+  const double top = std::max(frame.Y(r.north), -5.0), bottom = std::min(frame.Y(r.south), kHeight + 5);
+  if (left >= right || top >= bottom) return;
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}"><title>{}</title></rect>)",
+                 left, top, right - left, bottom - top, color, geo::ToString(key));
+}
+
+void AddScaleBar(const Frame& frame, std::string& svg) {
+  const double pixels_per_km = frame.pixels_per_degree / 111.2;
+  const double km = RoundUp(120 / pixels_per_km) / 2;
+  fmt::format_to(
+      std::back_inserter(svg),
+      R"(<path class="bar" d="M{0:.1f} {1:.1f}v6h{2:.1f}v-6"/><text class="tick" x="{3:.1f}" y="{4:.1f}" text-anchor="middle">{5} km</text>)",
+      20.0, kHeight - 24, km * pixels_per_km, 20 + km * pixels_per_km / 2, kHeight - 28, PlainNumber(km));
+}
+
+}  // namespace
+
+std::string ColorOfLevel(int level, int shallowest, int deepest) {
+  // Samples of the viridis map, which stays readable without colours.
+  static constexpr std::array<std::array<int, 3>, 6> kMap = {
+      {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {253, 231, 37}}};
+  const double way = deepest <= shallowest
+                         ? 1
+                         : std::clamp(static_cast<double>(level - shallowest) / (deepest - shallowest), 0.0, 1.0);
+  const double at = way * (kMap.size() - 1);
+  const auto low = std::min(static_cast<std::size_t>(at), kMap.size() - 2);
+  const auto mix = [&](std::size_t channel) {
+    return kMap[low][channel] + (kMap[low + 1][channel] - kMap[low][channel]) * (at - static_cast<double>(low));
+  };
+  return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mix(0), mix(1), mix(2));
+}
+
+std::string MapOf(const std::vector<AskedTile>& asked, const std::vector<GeodeticPoint>& track) {
+  if (asked.empty() || track.empty()) return {};
+  const Frame frame = FrameOf(track);
+  std::set<std::tuple<int, std::int64_t, std::int64_t>> keys;  // shallow ones first
+  for (const AskedTile& tile : asked) {
+    if (keys.size() < kMaxTiles) keys.insert({tile.key.level, tile.key.x, tile.key.y});
+  }
+  const int deepest = std::get<0>(*keys.rbegin());
+  const int shallowest = std::max(std::get<0>(*keys.begin()), deepest - kShownLevels + 1);
+  std::string svg;
+  for (const auto& [level, x, y] : keys) {
+    AddTile(frame, {level, x, y}, ColorOfLevel(level, shallowest, deepest), svg);
+  }
+  std::string points;
+  for (const GeodeticPoint& point : track) {
+    fmt::format_to(std::back_inserter(points), "{:.1f},{:.1f} ", frame.X(point.longitude), frame.Y(point.latitude));
+  }
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<polyline class="halo" points="{0}"/><polyline class="track" points="{0}"/>)", points);
+  fmt::format_to(std::back_inserter(svg),
+                 R"(<circle class="start" cx="{:.1f}" cy="{:.1f}" r="6"><title>start</title></circle>)",
+                 frame.X(track.front().longitude), frame.Y(track.front().latitude));
+  AddScaleBar(frame, svg);
+  std::string legend;
+  for (int level = shallowest; level <= deepest; ++level) {
+    fmt::format_to(std::back_inserter(legend), R"(<span class="key"><i style="background:{}"></i>{}{}</span>)",
+                   ColorOfLevel(level, shallowest, deepest), level == shallowest ? "up to level " : "", level);
+  }
+  return fmt::format(
+      R"(<figure class="wide"><figcaption><b>The way over the tiles that were loaded</b><p>Each rectangle is a tile of )"
+      R"(the first client or of others; the dot is the start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:.0f} {:.0f}" )"
+      R"(role="img" aria-label="map">{}</svg></figure>)",
+      legend, kWidth, kHeight, svg);
+}
+
+}  // namespace terrace::fly

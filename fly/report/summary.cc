@@ -1,0 +1,190 @@
+#include "fly/report/summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+namespace terrace::fly {
+namespace {
+
+// A view that moves waits for its next tiles in some frames even where the server is quick.
+constexpr double kKeepsUp = 0.75;  // share of refined frames
+
+// "1,234,567"
+std::string Group(std::uint64_t number) {
+  std::string digits = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3) {
+    digits.insert(static_cast<std::size_t>(at), ",");
+  }
+  return digits;
+}
+
+double Share(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+std::string Milliseconds(double seconds) {
+  const double ms = seconds * 1000;
+  return ms < 10       ? fmt::format("{:.1f} ms", ms)
+         : ms < 10'000 ? fmt::format("{:.0f} ms", ms)
+                       : fmt::format("{:.1f} s", seconds);
+}
+
+// In seconds of which frames were not refined although tiles were wanted: how many tiles came.
+double StarvedTilesPerSecond(const std::vector<Second>& seconds) {
+  std::uint64_t tiles = 0, count = 0;
+  for (const Second& second : seconds) {
+    if (second.frames == 0 || second.refined * 2 > second.frames) continue;
+    tiles += second.tiles;
+    ++count;
+  }
+  return count == 0 ? 0 : static_cast<double>(tiles) / static_cast<double>(count);
+}
+
+void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds, Summary& summary) {
+  std::vector<std::string>& findings = summary.findings;
+  const Totals& totals = summary.totals;
+  if (summary.never_opened > 0) {
+    const auto failed = std::find_if(summary.clients.begin(), summary.clients.end(),
+                                     [](const ClientRecord& client) { return !client.failure.empty(); });
+    findings.push_back(fmt::format("{} of {} clients did not fly: {}", summary.never_opened, summary.clients.size(),
+                                   failed == summary.clients.end() ? "stopped" : failed->failure));
+  }
+  if (summary.never_full > 0) {
+    findings.push_back(
+        fmt::format("{} of {} clients never saw a full view.", summary.never_full, summary.clients.size()));
+  }
+  if (totals.flying_frames > 0 && summary.refined_share < kKeepsUp) {
+    findings.push_back(fmt::format(
+        "The server does not keep up: {:.0f} % of the frames of the flight were not fully refined. While the view was "
+        "incomplete, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
+        "than {}.",
+        100 * (1 - summary.refined_share), StarvedTilesPerSecond(seconds), options.max_loads * options.clients,
+        Milliseconds(summary.p50_s)));
+  }
+  if (totals.hole_frames > 0) {
+    findings.push_back(fmt::format("Holes: {} of {} examined frames showed nothing in up to {:.1f} % of the screen.",
+                                   totals.hole_frames, totals.measured_frames, 100 * totals.worst_hole));
+  }
+  if (totals.uncovered_frames > 0) {
+    findings.push_back(
+        fmt::format("In {} frames no tile was selected where the tree has one.", totals.uncovered_frames));
+  }
+  for (std::size_t i = 1; i < kOutcomes; ++i) {
+    if (totals.outcomes[i] == 0) continue;
+    findings.push_back(fmt::format("{} requests: {}.", Group(totals.outcomes[i]), NameOf(static_cast<Outcome>(i))));
+  }
+  if (totals.version_changes > 0) {
+    findings.push_back(fmt::format("The dataset changed its version {} times; {} frames showed tiles of two versions.",
+                                   totals.version_changes, Group(totals.mixed_frames)));
+  }
+  if (totals.incomplete_tiles > 0) {
+    findings.push_back(fmt::format("{} tiles do not cover their rectangle (edits with holes, or damage).",
+                                   Group(totals.incomplete_tiles)));
+  }
+  if (Share(totals.late_frames, totals.frames) > 0.05) {
+    findings.push_back(
+        fmt::format("{:.0f} % of the frames were late: this machine is too slow for so many clients at this "
+                    "frame rate, and latencies contain its own waiting.",
+                    100 * Share(totals.late_frames, totals.frames)));
+  }
+}
+
+}  // namespace
+
+Summary Summarize(const FlightOptions& options, const Statistics& statistics) {
+  Summary summary;
+  summary.totals = statistics.totals();
+  summary.clients = statistics.clients();
+  const std::vector<Second> seconds = statistics.seconds();
+  summary.seconds = static_cast<double>(seconds.size());
+  std::vector<float> views;
+  for (const ClientRecord& client : summary.clients) {
+    if (client.document_s < 0) ++summary.never_opened;
+    if (client.document_s >= 0 && client.first_view_s < 0) ++summary.never_full;
+    if (client.first_view_s >= 0) views.push_back(static_cast<float>(client.first_view_s));
+    summary.arrival_s = std::max(summary.arrival_s, client.arrival_s);
+  }
+  if (!views.empty()) {
+    summary.first_view_s = Percentile(views, 0.5);
+    summary.worst_first_view_s = Percentile(views, 1);
+  }
+  const Totals& totals = summary.totals;
+  summary.p50_s = Percentile(totals.latencies_s, 0.5);
+  summary.p99_s = Percentile(totals.latencies_s, 0.99);
+  summary.max_s = Percentile(totals.latencies_s, 1);
+  summary.frame_p50_px = Percentile(totals.frame_worst_px, 0.5);
+  summary.frame_p99_px = Percentile(totals.frame_worst_px, 0.99);
+  summary.refined_share = Share(totals.refined_frames, totals.flying_frames);
+  std::uint64_t busy = 0;
+  for (const Second& second : seconds) {
+    busy += second.tiles > 0 ? 1 : 0;
+    summary.best_tiles_per_second = std::max(summary.best_tiles_per_second, static_cast<double>(second.tiles));
+  }
+  summary.tiles_per_second = Share(totals.tiles, busy);
+  for (std::size_t i = 0; i < kOutcomes; ++i) {
+    const auto outcome = static_cast<Outcome>(i);
+    if (outcome != Outcome::kOk && outcome != Outcome::kRefused) summary.errors += totals.outcomes[i];
+  }
+  FindFaults(options, seconds, summary);
+  return summary;
+}
+
+std::string LineOf(std::size_t i, const Second& second) {
+  const double refined = 100 * Share(second.refined, second.frames);
+  std::uint64_t known = 0;
+  for (std::size_t tier = 0; tier + 1 < kCacheTiers; ++tier) known += second.tiers[tier];
+  const std::string hits = known == 0 ? "   -" : fmt::format("{:3.0f}%", 100 * Share(second.tiers[0], known));
+  std::uint64_t bad = 0;
+  for (std::size_t outcome = 1; outcome < kOutcomes; ++outcome) bad += second.outcomes[outcome];
+  return fmt::format(
+      "{:4} s  tiles {:4}  {:8.1f} kB  triangles {:7}  hits {}  p50 {:>8}  p99 {:>8}  wanted {:3}  refined "
+      "{:3.0f}%  worst {:5.1f} px{}{}",
+      i + 1, second.tiles, static_cast<double>(second.bytes) / 1e3, second.triangles, hits,
+      Milliseconds(Percentile(second.latencies_s, 0.5)), Milliseconds(Percentile(second.latencies_s, 0.99)),
+      second.wanted, refined, second.worst_px,
+      second.worst_hole > 0 ? fmt::format("  hole {:.1f}%", 100 * second.worst_hole) : "",
+      bad > 0 ? fmt::format("  failed {}", bad) : "");
+}
+
+std::string TextOf(const Summary& summary) {
+  const Totals& totals = summary.totals;
+  std::string text;
+  const auto add = [&text](std::string_view name, const std::string& value) {
+    fmt::format_to(std::back_inserter(text), "{:<17}{}\n", name, value);
+  };
+  const auto seconds_or_never = [](double s) { return s < 0 ? std::string("never") : Milliseconds(s); };
+  add("first full view", summary.clients.size() == 1
+                             ? seconds_or_never(summary.first_view_s)
+                             : fmt::format("{} median, {} worst of {} clients", seconds_or_never(summary.first_view_s),
+                                           seconds_or_never(summary.worst_first_view_s), summary.clients.size()));
+  add("refined", fmt::format("{:.1f} % of {} frames of the flight; full {} after its end", 100 * summary.refined_share,
+                             Group(totals.flying_frames), seconds_or_never(summary.arrival_s)));
+  add("error on screen",
+      fmt::format("{:.1f} px in half of the frames, {:.1f} px in 99 %, {:.1f} px at most; stated by the "
+                  "server {:.1f} px at most",
+                  summary.frame_p50_px, summary.frame_p99_px, totals.worst_px, totals.worst_stated_px));
+  add("holes", fmt::format("{} of {} examined frames, at most {:.2f} % of the screen", totals.hole_frames,
+                           totals.measured_frames, 100 * totals.worst_hole));
+  add("tiles", fmt::format("{}, {:.1f} a second, {:.0f} in the best second; {} other requests", Group(totals.tiles),
+                           summary.tiles_per_second, summary.best_tiles_per_second, Group(totals.other_requests)));
+  add("received", fmt::format("{} bytes, {} triangles, {} connections", Group(totals.bytes), Group(totals.triangles),
+                              Group(totals.connections)));
+  add("latency of tiles", fmt::format("p50 {}, p99 {}, at most {}", Milliseconds(summary.p50_s),
+                                      Milliseconds(summary.p99_s), Milliseconds(summary.max_s)));
+  add("server had them",
+      fmt::format("in memory {}, lower tier {}, joined a build {}, built {}, not stated {}", Group(totals.tiers[0]),
+                  Group(totals.tiers[1]), Group(totals.tiers[2]), Group(totals.tiers[3]), Group(totals.tiers[4])));
+  std::string failures;
+  for (std::size_t i = 1; i < kOutcomes; ++i) {
+    if (totals.outcomes[i] == 0) continue;
+    failures += fmt::format("{}{} {}", failures.empty() ? "" : ", ", Group(totals.outcomes[i]),
+                            NameOf(static_cast<Outcome>(i)));
+  }
+  add("failures", fmt::format("{}; {} retries", failures.empty() ? "none" : failures, Group(totals.retries)));
+  for (const std::string& finding : summary.findings) text += "! " + finding + "\n";
+  return text;
+}
+
+}  // namespace terrace::fly

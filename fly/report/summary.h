@@ -1,0 +1,43 @@
+// A flight in numbers, for people and programs.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "fly/flight/flight.h"
+#include "fly/flight/statistics.h"
+
+namespace terrace::fly {
+
+struct Summary {
+  Totals totals;
+  std::vector<ClientRecord> clients;
+  double seconds = 0;                                 // of everything
+  int never_opened = 0, never_full = 0;               // clients
+  double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
+  double arrival_s = -1;                              // worst
+  double p50_s = 0, p99_s = 0, max_s = 0;             // of tiles
+  double tiles_per_second = 0;                        // while tiles came
+  double best_tiles_per_second = 0;                   // in the best second
+  double refined_share = 0;                           // of the frames of the flight
+  double frame_p50_px = 0, frame_p99_px = 0;          // of the worst error of a frame
+  std::uint64_t errors = 0;                           // requests that did not end with ok or a refusal
+  std::vector<std::string> findings;                  // what is wrong, in sentences
+};
+
+Summary Summarize(const FlightOptions& options, const Statistics& statistics);
+
+// Lines for a terminal.
+std::string TextOf(const Summary& summary);
+
+// One line about second `i` of the flight.
+std::string LineOf(std::size_t i, const Second& second);
+
+// One JSON object: {"document": .., "summary": {..}, "requirements": [..], "seconds": [..]}.
+struct Judgements;
+std::string JsonOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
+                   const std::vector<Second>& seconds);
+
+}  // namespace terrace::fly

@@ -1,0 +1,246 @@
+#include "fly/scene/flight_path.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+namespace terrace::fly {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr double kMeanRadius = 6371000;
+constexpr double kStepDegrees = 0.05;  // of the ways that are computed; interpolation between is straight
+constexpr std::size_t kMaxPoints = 1'000'000;
+
+// The turn from a to b, -180 to 180.
+double Turn(double a, double b) { return std::remainder(b - a, 360.0); }
+
+double GroundMetres(const GeodeticPoint& a, const GeodeticPoint& b) {
+  const geo::Vec3 u = geo::SurfaceNormal(a.longitude, a.latitude), v = geo::SurfaceNormal(b.longitude, b.latitude);
+  return kMeanRadius * std::atan2(geo::Length(geo::Cross(u, v)), geo::Dot(u, v));
+}
+
+double Metres(const GeodeticPoint& a, const GeodeticPoint& b) {
+  return std::hypot(GroundMetres(a, b), b.height_m - a.height_m);
+}
+
+double HeadingFromTo(const GeodeticPoint& a, const GeodeticPoint& b) {
+  const double turn = geo::ToRadians(b.longitude - a.longitude);
+  const double lat_a = geo::ToRadians(a.latitude), lat_b = geo::ToRadians(b.latitude);
+  return geo::ToDegrees(
+      std::atan2(std::sin(turn) * std::cos(lat_b),
+                 std::cos(lat_a) * std::sin(lat_b) - std::sin(lat_a) * std::cos(lat_b) * std::cos(turn)));
+}
+
+// Times by speed, headings along the way, and longitudes that do not jump.
+void Follow(const FlightSpeed& speed, FlightPath& path) {
+  std::vector<FlightPath::Point>& points = path.points;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].pose.pitch = speed.pitch;
+    if (i + 1 < points.size()) {
+      points[i].pose.heading = HeadingFromTo(points[i].pose.position, points[i + 1].pose.position);
+    } else if (i > 0) {
+      points[i].pose.heading = path.is_closed ? points[0].pose.heading : points[i - 1].pose.heading;
+    }
+    if (i == 0) continue;
+    points[i].seconds =
+        points[i - 1].seconds + Metres(points[i - 1].pose.position, points[i].pose.position) / speed.metres_per_second;
+  }
+}
+
+void Unwrap(FlightPath& path) {
+  for (std::size_t i = 1; i < path.points.size(); ++i) {
+    const double before = path.points[i - 1].pose.position.longitude;
+    double& longitude = path.points[i].pose.position.longitude;
+    longitude = before + Turn(before, longitude);
+  }
+}
+
+std::optional<std::vector<double>> Numbers(std::string_view line) {
+  std::vector<double> numbers;
+  const char* at = line.data();
+  const char* const end = at + line.size();
+  for (;;) {
+    while (at < end && (*at == ' ' || *at == ',' || *at == '\t' || *at == '\r')) ++at;
+    if (at == end) return numbers;
+    double value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || !std::isfinite(value)) return std::nullopt;
+    numbers.push_back(value);
+    at = next;
+  }
+}
+
+Result<void> AddPoint(const std::vector<double>& n, std::string_view where, FlightPath& path) {
+  if (n.size() != 3 && n.size() != 5 && n.size() != 6) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: {} numbers; a point is lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch", where,
+        n.size());
+  }
+  const std::size_t first = n.size() == 6 ? 1 : 0;
+  FlightPath::Point point;
+  point.seconds = first == 1 ? n[0] : 0;
+  point.pose.position = {n[first], n[first + 1], n[first + 2]};
+  if (n.size() > 3) {
+    point.pose.heading = n[first + 3];
+    point.pose.pitch = n[first + 4];
+  }
+  if (std::abs(point.pose.position.latitude) > 90 || std::abs(point.pose.position.longitude) > 360) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: no longitude and latitude in degrees, in this order", where);
+  }
+  if (first == 1 && !path.points.empty() && point.seconds <= path.points.back().seconds) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the seconds do not ascend", where);
+  }
+  if (path.points.size() == kMaxPoints) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: more than {} points", where, kMaxPoints);
+  }
+  path.points.push_back(point);
+  return {};
+}
+
+const Json* FindLine(const Json& json) {
+  if (json.is_object() && json.value("type", "") == "LineString") return &json;
+  if (!json.is_structured()) return nullptr;
+  for (const Json& part : json) {
+    if (!part.is_structured()) continue;
+    if (const Json* line = FindLine(part)) return line;
+  }
+  return nullptr;
+}
+
+Result<FlightPath> ParseGeoJson(std::string_view text, const FlightSpeed& speed) {
+  FlightPath path;
+  try {
+    const Json json = Json::parse(text);
+    const Json* line = FindLine(json);
+    if (line == nullptr) return MakeError(ErrorCode::kInvalidArgument, "the GeoJSON has no LineString");
+    for (const Json& point : line->at("coordinates")) {
+      const auto numbers = point.get<std::vector<double>>();
+      const std::string where = fmt::format("point {}", path.points.size() + 1);
+      if (numbers.size() != 3) {
+        return MakeError(ErrorCode::kInvalidArgument, "{}: needs longitude, latitude and height", where);
+      }
+      if (Result<void> added = AddPoint(numbers, where, path); !added) return tl::unexpected(added.error());
+    }
+  } catch (const std::exception& error) {
+    return MakeError(ErrorCode::kInvalidArgument, "the GeoJSON cannot be read: {}", error.what());
+  }
+  if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the LineString has no points");
+  Unwrap(path);
+  Follow(speed, path);
+  return path;
+}
+
+}  // namespace
+
+double FlightPath::length_m() const {
+  double sum = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) sum += Metres(points[i - 1].pose.position, points[i].pose.position);
+  return sum;
+}
+
+Pose FlightPath::PoseAt(double seconds) const {
+  const double whole = duration_s();
+  double at = whole <= 0 ? 0 : std::fmod(seconds, is_closed ? whole : 2 * whole);
+  if (at > whole) at = 2 * whole - at;
+  const auto after = std::lower_bound(points.begin(), points.end(), at,
+                                      [](const Point& point, double when) { return point.seconds < when; });
+  Pose pose = after == points.end() ? points.back().pose : after->pose;
+  if (after != points.begin() && after != points.end()) {
+    const Pose &a = (after - 1)->pose, &b = after->pose;
+    const double way = (at - (after - 1)->seconds) / (after->seconds - (after - 1)->seconds);
+    const auto mix = [way](double from, double to) { return from + (to - from) * way; };
+    pose.position = {mix(a.position.longitude, b.position.longitude), mix(a.position.latitude, b.position.latitude),
+                     mix(a.position.height_m, b.position.height_m)};
+    pose.heading = a.heading + Turn(a.heading, b.heading) * way;
+    pose.pitch = mix(a.pitch, b.pitch);
+  }
+  pose.position.longitude = std::remainder(pose.position.longitude, 360.0);
+  return pose;
+}
+
+FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed) {
+  FlightPath path;
+  const geo::Vec3 u = geo::SurfaceNormal(from.longitude, from.latitude);
+  const geo::Vec3 v = geo::SurfaceNormal(to.longitude, to.latitude);
+  const double angle = std::atan2(geo::Length(geo::Cross(u, v)), geo::Dot(u, v));
+  const int steps = std::max(1, static_cast<int>(std::ceil(geo::ToDegrees(angle) / kStepDegrees)));
+  for (int i = 0; i <= steps; ++i) {
+    const double way = static_cast<double>(i) / steps;
+    GeodeticPoint point = i == 0 ? from : to;
+    if (i > 0 && i < steps) {
+      const geo::Vec3 n = u * std::sin((1 - way) * angle) + v * std::sin(way * angle);
+      point.longitude = geo::ToDegrees(std::atan2(n.y, n.x));
+      point.latitude = geo::ToDegrees(std::atan2(n.z, std::hypot(n.x, n.y)));
+    }
+    point.height_m = from.height_m + (to.height_m - from.height_m) * way;
+    path.points.push_back({0, {point, 0, 0}});
+  }
+  Unwrap(path);
+  Follow(speed, path);
+  if (path.duration_s() <= 0) path.points.resize(1);
+  return path;
+}
+
+FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const FlightSpeed& speed) {
+  FlightPath path;
+  path.is_closed = true;
+  const double angle = radius_m / kMeanRadius;
+  const double lat = geo::ToRadians(center.latitude), lon = geo::ToRadians(center.longitude);
+  constexpr int kSteps = 360;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double bearing = geo::ToRadians(i * 360.0 / kSteps);
+    const double to = std::asin(std::sin(lat) * std::cos(angle) + std::cos(lat) * std::sin(angle) * std::cos(bearing));
+    const double east =
+        std::atan2(std::sin(bearing) * std::sin(angle) * std::cos(lat), std::cos(angle) - std::sin(lat) * std::sin(to));
+    path.points.push_back({0, {{geo::ToDegrees(lon + east), geo::ToDegrees(to), center.height_m}, 0, 0}});
+  }
+  Unwrap(path);
+  Follow(speed, path);
+  return path;
+}
+
+Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed) {
+  const std::size_t first = text.find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && text[first] == '{') return ParseGeoJson(text, speed);
+  FlightPath path;
+  std::size_t columns = 0;
+  for (int number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::optional<std::vector<double>> numbers = Numbers(line.substr(0, line.find('#')));
+    const std::string where = fmt::format("line {}", number);
+    if (!numbers) return MakeError(ErrorCode::kInvalidArgument, "{}: not only numbers", where);
+    if (numbers->empty()) continue;
+    if (columns != 0 && numbers->size() != columns) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where,
+                       numbers->size(), columns);
+    }
+    columns = numbers->size();
+    if (Result<void> added = AddPoint(*numbers, where, path); !added) return tl::unexpected(added.error());
+  }
+  if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the path has no points");
+  Unwrap(path);
+  const std::vector<FlightPath::Point> stated = path.points;
+  if (columns != 6) Follow(speed, path);
+  for (std::size_t i = 0; i < stated.size(); ++i) {
+    if (columns == 6) path.points[i].seconds -= stated[0].seconds;
+    if (columns == 5) path.points[i].pose = stated[i].pose;
+  }
+  // Points at one place take no time.
+  path.points.erase(std::unique(path.points.begin(), path.points.end(),
+                                [](const auto& a, const auto& b) { return a.seconds == b.seconds; }),
+                    path.points.end());
+  return path;
+}
+
+}  // namespace terrace::fly

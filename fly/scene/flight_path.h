@@ -1,0 +1,43 @@
+// The way of a camera: poses at times.
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "fly/scene/view.h"
+
+namespace terrace::fly {
+
+struct FlightPath {
+  struct Point {
+    double seconds = 0;
+    Pose pose;
+  };
+  std::vector<Point> points;  // at least one; seconds ascend from 0. Longitudes may leave -180 to 180, but do not jump
+  bool is_closed = false;     // the end is the start
+
+  double duration_s() const { return points.back().seconds; }
+  double length_m() const;
+
+  // The pose at a time from 0 on. After the end a closed path starts again, another one is flown back and forth. The
+  // longitude is -180 to 180.
+  Pose PoseAt(double seconds) const;
+};
+
+struct FlightSpeed {
+  double metres_per_second = 200;  // > 0
+  double pitch = -20;              // degrees, where a path does not say
+};
+
+// Along the shortest way on the ground. Heading follows the way. Equal ends: the camera rests and looks north.
+FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed);
+
+// Around `center` at its height, from north to east. Heading follows the circle. 0 < radius_m < 5,000,000.
+FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const FlightSpeed& speed);
+
+// Lines of "lon,lat,height", "lon,lat,height,heading,pitch" or "seconds,lon,lat,height,heading,pitch"; # begins a
+// comment; or a GeoJSON document whose first LineString has three coordinates a point. kInvalidArgument names the line.
+Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed);
+
+}  // namespace terrace::fly

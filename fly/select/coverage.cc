@@ -1,0 +1,101 @@
+#include "fly/select/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace terrace::fly {
+namespace {
+
+constexpr int kColumns = 23, kRows = 13;
+
+struct Surface {
+  double equatorial, polar;  // semi-axes, metres
+};
+
+Surface Raised(double height_m) { return {geo::kSemiMajorAxis + height_m, geo::kSemiMinorAxis + height_m}; }
+
+std::optional<double> HitDistance(const geo::Vec3& origin, const geo::Vec3& ray, const Surface& surface) {
+  const auto scaled = [&surface](const geo::Vec3& v) {
+    return geo::Vec3{v.x / surface.equatorial, v.y / surface.equatorial, v.z / surface.polar};
+  };
+  const geo::Vec3 o = scaled(origin), d = scaled(ray);
+  const double a = geo::Dot(d, d), b = geo::Dot(o, d), c = geo::Dot(o, o) - 1;
+  const double discriminant = b * b - a * c;
+  if (c <= 0 || discriminant < 0 || b >= 0) return std::nullopt;
+  return (-b - std::sqrt(discriminant)) / a;
+}
+
+GeodeticPoint PointOn(const geo::Vec3& p, const Surface& surface, double height_m) {
+  const double across = std::hypot(p.x, p.y) / (surface.equatorial * surface.equatorial);
+  return {geo::ToDegrees(std::atan2(p.y, p.x)),
+          geo::ToDegrees(std::atan2(p.z / (surface.polar * surface.polar), across)), height_m};
+}
+
+const Tile* ChildAt(const Tile& tile, const GeodeticPoint& point) {
+  for (const auto& child : tile.children) {
+    const auto* region = std::get_if<Region>(&child->volume);
+    if (region != nullptr && region->rectangle().Contains(point.longitude, point.latitude)) return child.get();
+    // A sphere says nothing of where its rectangle is: its descendants do.
+    if (region == nullptr && ChildAt(*child, point) != nullptr) return child.get();
+  }
+  return nullptr;
+}
+
+struct Found {
+  const Tile* deepest = nullptr;                   // with a region
+  double min_height_m = -1e9, max_height_m = 1e9;  // that the regions of all tiles here share
+  int drawn = 0, ready = 0;
+};
+
+Found FindAt(const Tile& root, const GeodeticPoint& point, std::uint64_t frame) {
+  Found found;
+  for (const Tile* tile = &root; tile != nullptr; tile = ChildAt(*tile, point)) {
+    if (const auto* region = std::get_if<Region>(&tile->volume)) {
+      found.deepest = tile;
+      found.min_height_m = std::max(found.min_height_m, region->min_height_m());
+      found.max_height_m = std::min(found.max_height_m, region->max_height_m());
+    }
+    if (tile->visits[0].frame != frame || tile->visits[0].verdict != Verdict::kRendered) continue;
+    ++found.drawn;
+    if (tile->state == LoadState::kReady) ++found.ready;
+  }
+  return found;
+}
+
+}  // namespace
+
+Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root) {
+  Coverage coverage;
+  const double fog = FogDensity(view.geodetic().height_m);
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const geo::Vec3 ray = view.RayThrough((column + 0.5) * 2 / kColumns - 1, (row + 0.5) * 2 / kRows - 1);
+      // Twice: the point at height 0 names the tile, whose lowest height gives the point.
+      Found found;
+      double height_m = 0, next_height_m = 0;
+      std::optional<double> distance;
+      for (int pass = 0; pass < 2; ++pass) {
+        height_m = next_height_m;
+        const Surface surface = Raised(height_m);
+        distance = HitDistance(view.position(), ray, surface);
+        if (!distance) break;
+        found = FindAt(root, PointOn(view.position() + ray * *distance, surface, height_m), frame);
+        if (found.deepest == nullptr) break;
+        next_height_m = found.min_height_m;
+      }
+      if (!distance || found.deepest == nullptr || IsHiddenByFog(*distance, fog)) continue;
+      // The range of a coarse mesh need not contain those of finer ones: outside of it, culling may be right.
+      if (height_m < found.min_height_m || height_m > found.max_height_m) continue;
+      // Without a child here the server has nothing below: the tile ends where the data do.
+      if (!found.deepest->children.empty() && found.drawn == 0) continue;
+      ++coverage.rays;
+      if (found.drawn == 0) ++coverage.uncovered;
+      if (found.drawn > 0 && found.ready == 0) ++coverage.missing;
+      if (found.drawn > 1) ++coverage.doubled;
+    }
+  }
+  return coverage;
+}
+
+}  // namespace terrace::fly

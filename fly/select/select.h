@@ -1,0 +1,60 @@
+// Which tiles a client draws and loads for one frame, as cesium-native v0.62 selects them
+// (Cesium3DTilesSelection/src/TilesetSelection.cpp) for tiles that replace their parents.
+//
+// A tile is refined while its geometric error takes more than `max_error_px` pixels on the screen at its distance.
+// Refined tiles are drawn once all of them are loaded; until then an ancestor is drawn instead of them: they are
+// kicked. Detail that was drawn in the frame before never vanishes: then new siblings do not wait for each other, and a
+// tile that is not loaded yet is a hole. With `forbid_holes` a culled sibling is loaded too before any of four is
+// drawn.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "fly/scene/view.h"
+#include "fly/select/tile.h"
+
+namespace terrace::fly {
+
+struct SelectOptions {
+  double max_error_px = 16;
+  double culled_error_px = 64;          // for the root, which is visited even if it is out of sight
+  std::uint32_t descendant_limit = 20;  // more missing descendants than this: the tile itself is loaded first
+  bool preload_ancestors = true;
+  bool preload_siblings = true;
+  bool forbid_holes = false;
+};
+
+enum class LoadGroup { kPreload, kNormal, kUrgent };
+
+struct LoadTask {
+  Tile* tile = nullptr;
+  LoadGroup group = LoadGroup::kNormal;
+  double priority = 0;  // metres off the view's axis; less is more urgent
+};
+
+struct DrawnTile {
+  Tile* tile = nullptr;
+  double error_px = 0;    // of its geometric error
+  double distance_m = 0;  // to its volume
+};
+
+struct Selection {
+  std::vector<DrawnTile> drawn;  // also tiles that are not loaded: they are holes
+  std::vector<LoadTask> loads;   // the most urgent first
+  std::uint32_t visited = 0;
+  std::uint32_t culled = 0;
+  std::uint32_t pending = 0;  // wanted tiles whose load has begun
+  bool any_kicked = false;
+
+  // The picture is what the view asks for: nothing was kicked, everything drawn is loaded.
+  bool IsRefined() const;
+};
+
+// Selects from `root` and its descendants, and records the verdicts in them. `frame` increases by one from call to
+// call, starting at 1. `update` is called for each visited tile before it is judged; it may add children to the tile.
+void SelectTiles(const SelectOptions& options, const View& view, const std::function<void(Tile&)>& update,
+                 std::uint64_t frame, Tile& root, Selection& selection);
+
+}  // namespace terrace::fly

@@ -1,0 +1,177 @@
+// The tree of a layer.json: the quadtree of EPSG:4326 as far as "available" reaches.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "fly/tree/tile_tree.h"
+
+namespace terrace::fly {
+namespace {
+
+using Json = nlohmann::json;
+
+// Clients assume these until a tile has told its heights, metres.
+constexpr double kLowestGround = -1000, kHighestGround = 9000;
+// Error of a root, metres: 8 times a quarter of 65 columns of half the equator. With 16 pixels it refines where
+// CesiumJS does with its 2.
+constexpr double kRootError = 8 * geo::kSemiMajorAxis * 0.25 / 65 * 3.14159265358979323846;
+
+// Tiles of one level, as rectangles.
+class LevelRanges {
+ public:
+  explicit LevelRanges(std::vector<geo::TileRange> ranges) : ranges_(std::move(ranges)) {
+    std::sort(ranges_.begin(), ranges_.end(), [](const auto& a, const auto& b) { return a.start_y < b.start_y; });
+    std::int64_t end = -1;
+    for (const geo::TileRange& range : ranges_) ends_.push_back(end = std::max(end, range.end_y));
+  }
+
+  bool Contains(const geo::TileKey& key) const {
+    auto i = std::upper_bound(ranges_.begin(), ranges_.end(), key.y,
+                              [](std::int64_t y, const geo::TileRange& range) { return y < range.start_y; }) -
+             ranges_.begin();
+    // Of the ranges that begin at or below the row; none before reaches it once the highest end so far does not.
+    while (i-- > 0 && ends_[static_cast<std::size_t>(i)] >= key.y) {
+      if (ranges_[static_cast<std::size_t>(i)].Contains(key)) return true;
+    }
+    return false;
+  }
+
+ private:
+  std::vector<geo::TileRange> ranges_;
+  std::vector<std::int64_t> ends_;  // highest end_y of the ranges up to each
+};
+
+struct Layer {
+  std::string version, tile_template;
+  std::vector<LevelRanges> available;
+};
+
+Result<Layer> ParseLayer(std::string_view text) {
+  try {
+    const Json json = Json::parse(text);
+    if (json.value("projection", "EPSG:4326") != "EPSG:4326") {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
+                       json.at("projection").dump());
+    }
+    if (!json.contains("available")) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "layer.json has no \"available\"; availability in metadata of tiles cannot be flown over");
+    }
+    Layer layer;
+    layer.version = json.value("version", "");
+    layer.tile_template = json.at("tiles").at(0).get<std::string>();
+    for (const Json& level : json.at("available")) {
+      std::vector<geo::TileRange> ranges;
+      for (const Json& range : level) {
+        ranges.push_back({range.at("startX").get<std::int64_t>(), range.at("startY").get<std::int64_t>(),
+                          range.at("endX").get<std::int64_t>(), range.at("endY").get<std::int64_t>()});
+      }
+      layer.available.emplace_back(std::move(ranges));
+      if (layer.available.size() > geo::kMaxLevel) break;
+    }
+    return layer;
+  } catch (const std::exception& error) {
+    return MakeError(ErrorCode::kInvalidArgument, "layer.json cannot be read: {}", error.what());
+  }
+}
+
+void Replace(std::string& text, std::string_view name, const std::string& value) {
+  for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at + value.size())) {
+    text.replace(at, name.size(), value);
+  }
+}
+
+class LayerTree : public TileTree {
+ public:
+  explicit LayerTree(Layer layer) : layer_(std::move(layer)) {
+    version_ = layer_.version;
+    root_.content = Content::kStructure;
+    root_.always_refine = true;
+    root_.state = LoadState::kReady;
+    root_.volume = Region({-180, -90, 180, 90}, kLowestGround, kHighestGround);
+    for (std::int64_t x = 0; x < 2; ++x) AddTile(root_, {0, x, 0}, true, {kLowestGround, kHighestGround}, kRootError);
+  }
+
+  Format format() const override { return Format::kTerrain; }
+
+  // All four children or none: the client makes those that the server does not have from their parent.
+  void AddChildren(Tile& tile) override {
+    if (!std::exchange(tile.may_have_more_children, false) || !tile.key || tile.key->level >= geo::kMaxLevel) return;
+    const geo::TileKey& key = *tile.key;
+    std::array<geo::TileKey, 4> keys;
+    std::array<bool, 4> available{};
+    for (int i = 0; i < 4; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      keys[at] = {key.level + 1, 2 * key.x + i % 2, 2 * key.y + i / 2};  // SW, SE, NW, NE
+      available[at] = IsAvailable(keys[at]);
+    }
+    if (std::none_of(available.begin(), available.end(), [](bool is) { return is; })) return;
+    const Region& region = std::get<Region>(tile.volume);
+    for (std::size_t i = 0; i < 4; ++i) {
+      AddTile(tile, keys[i], available[i], {region.min_height_m(), region.max_height_m()}, tile.geometric_error_m / 2);
+    }
+  }
+
+  TileRequest RequestFor(const Tile& tile) const override {
+    if (tile.content != Content::kMesh) return {};
+    std::string uri = layer_.tile_template;
+    Replace(uri, "{z}", std::to_string(tile.key->level));
+    Replace(uri, "{x}", std::to_string(tile.key->x));
+    Replace(uri, "{y}", std::to_string(tile.key->y));
+    Replace(uri, "{version}", layer_.version);
+    return {TileRequest::Kind::kMesh, std::move(uri)};
+  }
+
+  Result<void> TakeSubtree(Tile& /*tile*/, std::string_view /*bytes*/) override { return {}; }
+
+  void TakeContent(Tile& tile, const TileContent& content) override {
+    if (!content.heights) return;
+    tile.volume = Region(RectangleOf(*tile.key), content.heights->min_m, content.heights->max_m);
+  }
+
+  Result<void> TakeDocument(std::string_view json) override {
+    Result<Layer> layer = ParseLayer(json);
+    if (!layer) return tl::unexpected(std::move(layer).error());
+    layer_ = *std::move(layer);
+    version_ = layer_.version;
+    return {};
+  }
+
+ private:
+  bool IsAvailable(const geo::TileKey& key) const {
+    const auto level = static_cast<std::size_t>(key.level);
+    return level < layer_.available.size() && layer_.available[level].Contains(key);
+  }
+
+  static void AddTile(Tile& parent, const geo::TileKey& key, bool available, const HeightSpan& heights,
+                      double error_m) {
+    auto tile = std::make_unique<Tile>();
+    tile->parent = &parent;
+    tile->key = key;
+    tile->content = available ? Content::kMesh : Content::kUpsampled;
+    tile->may_have_more_children = available;
+    tile->volume = Region(RectangleOf(key), heights.min_m, heights.max_m);
+    tile->geometric_error_m = error_m;
+    parent.children.push_back(std::move(tile));
+  }
+
+  Layer layer_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<TileTree>> MakeLayerTree(std::string_view layer_json) {
+  Result<Layer> layer = ParseLayer(layer_json);
+  if (!layer) return tl::unexpected(std::move(layer).error());
+  return std::make_unique<LayerTree>(*std::move(layer));
+}
+
+}  // namespace terrace::fly

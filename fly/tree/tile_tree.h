@@ -1,0 +1,58 @@
+// The tree of tiles that a document of the server describes, and grows while the client flies: layer.json or
+// tileset.json. Not thread-safe.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "fly/content/tile_content.h"
+#include "fly/select/tile.h"
+
+namespace terrace::fly {
+
+enum class Format { kTerrain, k3dTiles };
+
+// What to ask for next, for a tile that needs loading.
+struct TileRequest {
+  enum class Kind { kNothing, kMesh, kSubtree };
+  Kind kind = Kind::kNothing;  // kNothing: the tile is ready without a request
+  std::string uri;             // relative to the document
+};
+
+class TileTree {
+ public:
+  virtual ~TileTree() = default;
+
+  virtual Format format() const = 0;
+  Tile& root() { return root_; }
+  const std::string& version() const { return version_; }  // empty: the document states none
+
+  // Adds the children of a tile that is visited, as far as they are known by now.
+  virtual void AddChildren(Tile& tile) = 0;
+
+  virtual TileRequest RequestFor(const Tile& tile) const = 0;
+
+  // Takes the reply to a request of kind kSubtree. kInvalidArgument if it is damaged.
+  virtual Result<void> TakeSubtree(Tile& tile, std::string_view bytes) = 0;
+
+  // Takes what the tile's content says about its volume.
+  virtual void TakeContent(Tile& tile, const TileContent& content) = 0;
+
+  // Takes a later version of the document: its version and URLs. Known tiles stay.
+  virtual Result<void> TakeDocument(std::string_view json) = 0;
+
+ protected:
+  TileTree() = default;
+
+  Tile root_;
+  std::string version_;
+};
+
+// kInvalidArgument if the document is not what `format` expects; the message says what is missing.
+Result<std::unique_ptr<TileTree>> MakeLayerTree(std::string_view layer_json);
+Result<std::unique_ptr<TileTree>> MakeTilesetTree(std::string_view tileset_json);
+
+}  // namespace terrace::fly

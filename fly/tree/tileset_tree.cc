@@ -1,0 +1,246 @@
+// The tree of a tileset.json: explicit tiles, and below them implicit quadtrees that grow with their subtrees.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "fly/tree/subtree.h"
+#include "fly/tree/tile_tree.h"
+
+namespace terrace::fly {
+
+struct ImplicitTree {
+  std::string content_uri, subtree_uri;
+  int subtree_levels = 1;
+  int available_levels = 1;
+  Region region;
+  std::map<std::tuple<int, std::int64_t, std::int64_t>, Subtree3d> subtrees;  // by level, x, y of their roots
+};
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kMaxDepth = 64;  // of explicit tiles
+
+[[noreturn]] void Fail(const std::string& what) { throw std::runtime_error(what); }
+
+Volume ParseVolume(const Json& json) {
+  if (json.contains("region")) {
+    const auto r = json.at("region").get<std::vector<double>>();
+    if (r.size() != 6) Fail("a region has not 6 numbers");
+    return Region({geo::ToDegrees(r[0]), geo::ToDegrees(r[1]), geo::ToDegrees(r[2]), geo::ToDegrees(r[3])}, r[4], r[5]);
+  }
+  if (json.contains("sphere")) {
+    const auto s = json.at("sphere").get<std::vector<double>>();
+    if (s.size() != 4) Fail("a sphere has not 4 numbers");
+    return Sphere{{s[0], s[1], s[2]}, s[3]};
+  }
+  const auto b = json.at("box").get<std::vector<double>>();
+  if (b.size() != 12) Fail("a box has not 12 numbers");
+  return OrientedBox{{b[0], b[1], b[2]}, {geo::Vec3{b[3], b[4], b[5]}, {b[6], b[7], b[8]}, {b[9], b[10], b[11]}}};
+}
+
+// The key of the quadtree's tile that the region is; nothing if it is none.
+std::optional<geo::TileKey> KeyOf(const Volume& volume) {
+  const auto* region = std::get_if<Region>(&volume);
+  if (region == nullptr) return std::nullopt;
+  const Rectangle& r = region->rectangle();
+  const double side = r.east - r.west;
+  if (!(side > 0)) return std::nullopt;
+  const int level = static_cast<int>(std::lround(std::log2(180 / side)));
+  if (level < 0 || level > geo::kMaxLevel) return std::nullopt;
+  const double width = 180.0 / static_cast<double>(geo::TileRows(level));
+  const geo::TileKey key{level, std::llround((r.west + 180) / width), std::llround((r.south + 90) / width)};
+  const Rectangle exact = RectangleOf(key);
+  const double slack = width / 1e6;
+  const bool same = std::abs(exact.west - r.west) < slack && std::abs(exact.south - r.south) < slack &&
+                    std::abs(exact.north - r.north) < slack;
+  return same ? std::optional(key) : std::nullopt;
+}
+
+std::string Fill(std::string uri, const geo::TileKey& local) {
+  const std::pair<std::string_view, std::int64_t> values[] = {
+      {"{level}", local.level}, {"{x}", local.x}, {"{y}", local.y}};
+  for (const auto& [name, value] : values) {
+    const std::size_t at = uri.find(name);
+    if (at != std::string::npos) uri.replace(at, name.size(), std::to_string(value));
+  }
+  return uri;
+}
+
+std::tuple<int, std::int64_t, std::int64_t> SubtreeOf(const geo::TileKey& local, int subtree_levels) {
+  const int below = local.level % subtree_levels;
+  return {local.level - below, local.x >> below, local.y >> below};
+}
+
+Tile& AddTile(Tile& parent) {
+  parent.children.push_back(std::make_unique<Tile>());
+  parent.children.back()->parent = &parent;
+  return *parent.children.back();
+}
+
+// The part of the implicit root's region; descendants inherit its heights.
+Region PartOf(const Region& root, const geo::TileKey& local) {
+  const Rectangle& r = root.rectangle();
+  const auto parts = static_cast<double>(std::int64_t{1} << local.level);
+  const double width = (r.east - r.west) / parts, height = (r.north - r.south) / parts;
+  const double west = r.west + width * static_cast<double>(local.x),
+               south = r.south + height * static_cast<double>(local.y);
+  return {{west, south, west + width, south + height}, root.min_height_m(), root.max_height_m()};
+}
+
+void AddImplicitRoot(const Json& json, Tile& place) {
+  const Json& tiling = json.at("implicitTiling");
+  if (tiling.at("subdivisionScheme") != "QUADTREE") Fail("an implicit tiling is no QUADTREE");
+  const auto* region = std::get_if<Region>(&place.volume);
+  if (region == nullptr) Fail("an implicit tiling without a region");
+  auto tree = std::make_shared<ImplicitTree>();
+  tree->content_uri = json.at("content").at("uri").get<std::string>();
+  tree->subtree_uri = tiling.at("subtrees").at("uri").get<std::string>();
+  tree->subtree_levels = tiling.at("subtreeLevels").get<int>();
+  tree->available_levels = tiling.at("availableLevels").get<int>();
+  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tree->available_levels < 1)
+    Fail("levels of an implicit tiling");
+  tree->region = *region;
+  place.content = Content::kStructure;
+  place.always_refine = true;
+  place.state = LoadState::kReady;
+  Tile& root = AddTile(place);
+  root.volume = place.volume;
+  root.key = place.key;
+  root.geometric_error_m = place.geometric_error_m;
+  root.tree = std::move(tree);
+  root.may_have_more_children = true;
+}
+
+void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile) {
+  if (depth > kMaxDepth) Fail("tiles are nested too deeply");
+  if (json.contains("transform")) Fail("a tile has a transform, which terrain does not need");
+  if (json.value("refine", "REPLACE") != "REPLACE") Fail("a tile does not REPLACE its parent");
+  tile.volume = ParseVolume(json.at("boundingVolume"));
+  tile.key = KeyOf(tile.volume);
+  tile.geometric_error_m = json.at("geometricError").get<double>();
+  if (json.contains("implicitTiling")) return AddImplicitRoot(json, tile);
+  if (json.contains("content")) {
+    tile.uri = json.at("content").at("uri").get<std::string>();
+  } else {
+    // Without content: a mere volume if its error is not below the parent's, else nothing is to be shown.
+    tile.content = Content::kEmpty;
+    tile.state = LoadState::kReady;
+    tile.always_refine = tile.geometric_error_m >= enclosing_error_m;
+  }
+  if (!json.contains("children")) return;
+  for (const Json& child : json.at("children")) ParseTile(child, tile.geometric_error_m, depth + 1, AddTile(tile));
+}
+
+class TilesetTree : public TileTree {
+ public:
+  explicit TilesetTree(const Json& json) {
+    root_.content = Content::kStructure;
+    root_.always_refine = true;
+    root_.state = LoadState::kReady;
+    const Json& top = json.at("root");
+    root_.volume = ParseVolume(top.at("boundingVolume"));
+    ParseTile(top, top.at("geometricError").get<double>() * 2, 0, AddTile(root_));
+    version_ = first_version_ = VersionOf(json);
+  }
+
+  Format format() const override { return Format::k3dTiles; }
+
+  void AddChildren(Tile& tile) override {
+    if (!tile.may_have_more_children || !tile.tree) return;
+    const ImplicitTree& tree = *tile.tree;
+    const auto found = tree.subtrees.find(SubtreeOf(tile.local, tree.subtree_levels));
+    if (found == tree.subtrees.end()) return;  // its tile asks for it first
+    tile.may_have_more_children = false;
+    const int level = tile.local.level % tree.subtree_levels + 1;
+    for (int i = 0; i < 4; ++i) {
+      const geo::TileKey local{tile.local.level + 1, 2 * tile.local.x + i % 2, 2 * tile.local.y + i / 2};
+      const auto x = static_cast<std::uint32_t>(local.x & ((std::int64_t{1} << level) - 1));
+      const auto y = static_cast<std::uint32_t>(local.y & ((std::int64_t{1} << level) - 1));
+      const bool is_last = level == tree.subtree_levels;
+      if (is_last ? found->second.HasSubtree(x, y) : found->second.HasTile(level, x, y)) {
+        AddImplicit(tile, local, is_last || found->second.HasContent(level, x, y));
+      }
+    }
+  }
+
+  TileRequest RequestFor(const Tile& tile) const override {
+    if (tile.content != Content::kMesh) return {};
+    if (!tile.tree) return {TileRequest::Kind::kMesh, WithVersion(tile.uri)};
+    const auto subtree = SubtreeOf(tile.local, tile.tree->subtree_levels);
+    if (!tile.tree->subtrees.contains(subtree)) {
+      const geo::TileKey root{std::get<0>(subtree), std::get<1>(subtree), std::get<2>(subtree)};
+      return {TileRequest::Kind::kSubtree, WithVersion(Fill(tile.tree->subtree_uri, root))};
+    }
+    return {TileRequest::Kind::kMesh, WithVersion(Fill(tile.tree->content_uri, tile.local))};
+  }
+
+  Result<void> TakeSubtree(Tile& tile, std::string_view bytes) override {
+    ImplicitTree& tree = *tile.tree;
+    Result<Subtree3d> subtree = Subtree3d::Parse(bytes, tree.subtree_levels);
+    if (!subtree) return tl::unexpected(std::move(subtree).error());
+    tree.subtrees.insert_or_assign(SubtreeOf(tile.local, tree.subtree_levels), *std::move(subtree));
+    return {};
+  }
+
+  void TakeContent(Tile& /*tile*/, const TileContent& /*content*/) override {}  // the document states all volumes
+
+  Result<void> TakeDocument(std::string_view text) override {
+    try {
+      version_ = VersionOf(Json::parse(text));
+      return {};
+    } catch (const std::exception& error) {
+      return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", error.what());
+    }
+  }
+
+ private:
+  static std::string VersionOf(const Json& json) { return json.at("asset").value("tilesetVersion", ""); }
+
+  static void AddImplicit(Tile& parent, const geo::TileKey& local, bool has_content) {
+    Tile& tile = AddTile(parent);
+    tile.tree = parent.tree;
+    tile.local = local;
+    tile.volume = PartOf(parent.tree->region, local);
+    tile.key = KeyOf(tile.volume);
+    tile.geometric_error_m = parent.geometric_error_m / 2;
+    tile.may_have_more_children = true;
+    if (has_content) return;
+    tile.content = Content::kEmpty;
+    tile.state = LoadState::kReady;
+  }
+
+  // URLs contain the version of the document that they are from.
+  std::string WithVersion(std::string uri) const {
+    if (first_version_.empty() || first_version_ == version_) return uri;
+    const std::size_t at = uri.find(first_version_);
+    if (at != std::string::npos) uri.replace(at, first_version_.size(), version_);
+    return uri;
+  }
+
+  std::string first_version_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<TileTree>> MakeTilesetTree(std::string_view tileset_json) {
+  try {
+    return std::make_unique<TilesetTree>(Json::parse(tileset_json));
+  } catch (const std::exception& error) {
+    return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", error.what());
+  }
+}
+
+}  // namespace terrace::fly

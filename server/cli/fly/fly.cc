@@ -1,0 +1,97 @@
+// terrace fly: a client that flies over a served dataset, and reports how it was served.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "fly/flight/flight.h"
+#include "fly/report/html_report.h"
+#include "fly/report/requirement.h"
+#include "fly/report/summary.h"
+#include "server/cli/common/command.h"
+#include "server/cli/fly/fly_arguments.h"
+
+namespace terrace::cli {
+namespace {
+
+std::atomic<bool> stop_requested = false;
+
+extern "C" void RequestStop(int /*signal*/) { stop_requested = true; }
+
+bool WriteFile(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file << text;
+  file.close();
+  if (file) return true;
+  std::fprintf(stderr, "terrace: %s cannot be written\n", path.c_str());
+  return false;
+}
+
+int RunFly(const FlyArguments& arguments) {
+  const Result<fly::FlightOptions> options = OptionsOf(arguments);
+  if (!options) return Fail(options.error().message, kExitUsage);
+  const Result<std::vector<fly::Requirement>> requirements = fly::ParseRequirements(arguments.require);
+  if (!requirements) return Fail(requirements.error().message, kExitUsage);
+  std::signal(SIGINT, RequestStop);
+  std::signal(SIGTERM, RequestStop);
+  fly::Statistics statistics(options->clients);
+  std::FILE* const log = arguments.json ? stderr : stdout;
+  fmt::print(log, "{}: {:.1f} km in {:.0f} s, {} client{}\n", options->document.Text(), options->path.length_m() / 1000,
+             options->duration_s, options->clients, options->clients == 1 ? "" : "s");
+  fly::Fly(
+      *options, stop_requested,
+      [&](std::size_t i) {
+        fmt::print(log, "{}\n", fly::LineOf(i, statistics.second(i)));
+        std::fflush(log);
+      },
+      statistics);
+
+  const fly::Summary summary = fly::Summarize(*options, statistics);
+  const fly::Judgements judgements = fly::Judge(*requirements, summary);
+  bool written = true;
+  if (!arguments.report.empty()) {
+    written &= WriteFile(arguments.report, fly::HtmlOf(*options, summary, judgements, statistics));
+  }
+  if (!arguments.urls.empty()) {
+    std::string lines;
+    for (const std::string& url : statistics.urls()) lines += url + "\n";
+    written &= WriteFile(arguments.urls, lines);
+  }
+  if (arguments.json) {
+    fmt::print("{}", fly::JsonOf(*options, summary, judgements, statistics.seconds()));
+  } else {
+    fmt::print("\n{}", fly::TextOf(summary));
+    for (const fly::Judgement& judgement : judgements.all) {
+      fmt::print("{} {}: {}\n", judgement.holds ? "holds " : "FAILS ", judgement.requirement.text, judgement.shown);
+    }
+  }
+  const bool has_flown = summary.totals.tiles > 0 && summary.never_opened == 0;
+  return FinishOutput(has_flown && written && judgements.AllHold() ? kExitOk : kExitFailure);
+}
+
+}  // namespace
+
+void AddFly(CLI::App& app, int& exit_code) {
+  auto arguments = std::make_shared<FlyArguments>();
+  CLI::App* fly = app.add_subcommand("fly", "Flies over a served dataset as a client, and reports what it saw.");
+  fly->group(kCommands);
+  fly->footer(
+      "Loads the tiles that cesium-native would load on this way, in real time, and prints a line each second.\n"
+      "Exit status 1: a requirement of --require failed, or nothing could be loaded. docs/flying.md explains each "
+      "number.\n\n"
+      "Examples:\n"
+      "  terrace fly http://127.0.0.1:8080/maui --circle -156.3,20.75,4500,20000 --report maui.html\n"
+      "  terrace fly http://127.0.0.1:8080/alps --from 7.6,45.9,5000 --to 8.1,46.6,5000 --format 3dtiles\n"
+      "  terrace fly https://tiles.example.org/alps --path way.csv --clients 20 --require "
+      "full-view=2s,p99=50ms,holes=0");
+  AddFlags(*fly, *arguments);
+  fly->callback([arguments, &exit_code] { exit_code = RunFly(*arguments); });
+}
+
+}  // namespace terrace::cli

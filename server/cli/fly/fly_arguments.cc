@@ -1,0 +1,226 @@
+#include "server/cli/fly/fly_arguments.h"
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <exception>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+namespace terrace::cli {
+namespace {
+
+// "-156.6,20.9,3000": `count` numbers separated by commas.
+std::optional<std::vector<double>> ParseNumbers(const std::string& text, std::size_t count) {
+  std::vector<double> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    try {
+      std::size_t used = 0;
+      numbers.push_back(std::stod(part, &used));
+      if (used != part.size() || !std::isfinite(numbers.back())) return std::nullopt;
+    } catch (const std::exception&) {
+      return std::nullopt;
+    }
+  }
+  return numbers.size() == count ? std::optional(numbers) : std::nullopt;
+}
+
+Result<fly::GeodeticPoint> ParsePoint(const char* option, const std::string& text) {
+  const std::optional<std::vector<double>> n = ParseNumbers(text, 3);
+  if (!n || std::abs((*n)[0]) > 360 || std::abs((*n)[1]) > 90) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} {}: give longitude and latitude in degrees and a height in metres, such as -156.6,20.9,3000",
+                     option, text);
+  }
+  return fly::GeodeticPoint{(*n)[0], (*n)[1], (*n)[2]};
+}
+
+Result<fly::FlightPath> PathOf(const FlyArguments& arguments) {
+  const fly::FlightSpeed speed{arguments.speed, arguments.pitch};
+  const int ways = !arguments.path.empty() + !arguments.from.empty() + !arguments.circle.empty();
+  if (ways != 1 || arguments.from.empty() != arguments.to.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "fly needs exactly one way: --path FILE, --from and --to, or --circle LON,LAT,H,RADIUS");
+  }
+  if (!arguments.path.empty()) {
+    std::ifstream file(arguments.path, std::ios::binary);
+    std::ostringstream text;
+    if (!file || !(text << file.rdbuf())) {
+      return MakeError(ErrorCode::kNotFound, "--path {}: the file cannot be read, or is empty", arguments.path);
+    }
+    Result<fly::FlightPath> path = fly::ParsePath(text.str(), speed);
+    if (!path) return MakeError(ErrorCode::kInvalidArgument, "--path {}: {}", arguments.path, path.error().message);
+    return path;
+  }
+  if (!arguments.circle.empty()) {
+    const std::optional<std::vector<double>> n = ParseNumbers(arguments.circle, 4);
+    if (!n || std::abs((*n)[0]) > 360 || std::abs((*n)[1]) > 90 || (*n)[3] <= 0 || (*n)[3] >= 5e6) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "--circle {}: give longitude, latitude, height and radius, such as -156.6,20.9,3000,20000",
+                       arguments.circle);
+    }
+    return fly::MakeCircle({(*n)[0], (*n)[1], (*n)[2]}, (*n)[3], speed);
+  }
+  const Result<fly::GeodeticPoint> from = ParsePoint("--from", arguments.from), to = ParsePoint("--to", arguments.to);
+  if (!from) return tl::unexpected(from.error());
+  if (!to) return tl::unexpected(to.error());
+  return fly::MakeStraightPath(*from, *to, speed);
+}
+
+// The document of a dataset: the URL itself if it names one, else the one of the format below it.
+Result<fly::Url> DocumentOf(const FlyArguments& arguments) {
+  Result<fly::Url> url = fly::ParseUrl(arguments.url);
+  if (!url) return url;
+  std::string& target = url->target;
+  const std::size_t query = std::min(target.find('?'), target.size());
+  const std::string path = target.substr(0, query);
+  if (path.ends_with(".json")) return url;
+  const char* name = arguments.format == "terrain" ? "layer.json" : "tileset.json";
+  target = path + (path.ends_with('/') ? "" : "/") + name + target.substr(query);
+  return url;
+}
+
+}  // namespace
+
+Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
+  fly::FlightOptions options;
+  Result<fly::Url> document = DocumentOf(arguments);
+  if (!document) return tl::unexpected(document.error());
+  Result<fly::FlightPath> path = PathOf(arguments);
+  if (!path) return tl::unexpected(path.error());
+  for (const std::string& header : arguments.headers) {
+    if (header.find(':') == std::string::npos || header.find_first_of("\r\n") != std::string::npos) {
+      return MakeError(ErrorCode::kInvalidArgument, "--header: give it as \"Name: value\"");
+    }
+  }
+  options.document = *std::move(document);
+  options.format =
+      options.document.target.find("tileset.json") != std::string::npos ? fly::Format::k3dTiles : fly::Format::kTerrain;
+  if (options.document.target.find(".json") != std::string::npos && arguments.format == "3dtiles") {
+    options.format = fly::Format::k3dTiles;
+  }
+  options.path = *std::move(path);
+  options.duration_s = arguments.duration >= 0 ? arguments.duration : std::max(10.0, options.path.duration_s());
+  options.lens = {arguments.width, arguments.height, arguments.fov};
+  options.select.max_error_px = arguments.sse;
+  options.select.culled_error_px = std::max(64.0, arguments.sse);
+  options.select.forbid_holes = arguments.forbid_holes;
+  options.frames_per_second = arguments.fps;
+  options.clients = arguments.clients;
+  options.max_loads = arguments.loads;
+  options.max_tile_bytes = static_cast<std::uint64_t>(arguments.cache_mb) << 20;
+  options.first_view_limit_s = arguments.first_view_limit;
+  options.arrival_limit_s = std::min(options.arrival_limit_s, arguments.first_view_limit);
+  options.http.timeout_s = arguments.timeout;
+  options.http.headers = arguments.headers;
+  options.http.verifies_certificates = !arguments.insecure;
+  return options;
+}
+
+namespace {
+
+// A number of which the help shows no range; an error does.
+template <typename T>
+CLI::Option* AddNumber(CLI::App& command, const char* name, T& value, const char* type, T low, T high,
+                       const char* text) {
+  return command.add_option(name, value, text)->type_name(type)->check(CLI::Range(low, high).description(""));
+}
+
+void AddWayFlags(CLI::App& command, FlyArguments& a) {
+  const std::string group = "Way";
+  command
+      .add_option("--path", a.path,
+                  "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a line; or "
+                  "GeoJSON with a LineString")
+      ->type_name("FILE")
+      ->group(group);
+  command.add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")
+      ->type_name("LON,LAT,H")
+      ->group(group);
+  command.add_option("--to", a.to, "End; the client flies back and forth")->type_name("LON,LAT,H")->group(group);
+  command.add_option("--circle", a.circle, "Circle around a place, metres")
+      ->type_name("LON,LAT,H,RADIUS")
+      ->group(group);
+  AddNumber(command, "--speed", a.speed, "M/S", 0.001, 1e7, "Metres per second")->capture_default_str()->group(group);
+  AddNumber(command, "--pitch", a.pitch, "DEGREES", -90.0, 90.0,
+            "Where the path states none; 0 looks at the horizon, -90 down")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--duration", a.duration, "S", 0.0, 7 * 86400.0,
+            "Seconds of the flight; default: once along the way, at least 10")
+      ->group(group);
+}
+
+void AddClientFlags(CLI::App& command, FlyArguments& a) {
+  const std::string group = "Client";
+  command.add_option("--format", a.format, "What to load")
+      ->type_name("terrain|3dtiles")
+      ->check(CLI::IsMember({"terrain", "3dtiles"}).description(""))
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--clients", a.clients, "N", 1, 1000, "Clients that fly at a time, spread evenly over the way")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--sse", a.sse, "PX", 0.5, 1000.0, "Screen error from which a tile is refined")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--fps", a.fps, "N", 1.0, 240.0, "Frames per second")->capture_default_str()->group(group);
+  AddNumber(command, "--fov", a.fov, "DEGREES", 1.0, 170.0, "Field of view, across the screen")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--width", a.width, "PX", 1, 32768, "Width of the screen")->capture_default_str()->group(group);
+  AddNumber(command, "--height", a.height, "PX", 1, 32768, "Height of the screen")->capture_default_str()->group(group);
+  AddNumber(command, "--loads", a.loads, "N", 1, 1000, "Requests of a client at a time")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--cache", a.cache_mb, "MIB", 1, 65536, "Decoded tiles that a client keeps")
+      ->capture_default_str()
+      ->group(group);
+  command.add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn")
+      ->group(group);
+  command.add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")
+      ->type_name("HEADER")
+      ->group(group);
+  command.add_flag("--insecure", a.insecure, "Accept any TLS certificate")->group(group);
+  AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0, "Until a request without a complete reply is given up")
+      ->capture_default_str()
+      ->group(group);
+  AddNumber(command, "--first-view-limit", a.first_view_limit, "S", 0.1, 3600.0,
+            "A client takes off after this time without a full view")
+      ->capture_default_str()
+      ->group(group);
+}
+
+void AddReportFlags(CLI::App& command, FlyArguments& a) {
+  const std::string group = "Report";
+  command.add_option("--report", a.report, "Page with plots, without references to other files")
+      ->type_name("FILE.html")
+      ->group(group);
+  command.add_flag("--json", a.json, "Report as JSON on stdout; progress goes to stderr")->group(group);
+  command.add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")
+      ->type_name("FILE")
+      ->group(group);
+  command
+      .add_option("--require", a.require,
+                  "Exit status 1 unless all hold: full-view=2s, p50=10ms, p99=50ms, refined=95%, screen-error=20px, "
+                  "holes=0, errors=0, refusals=0, hits=80%, tiles=30; joined by commas")
+      ->type_name("LIST")
+      ->group(group);
+}
+
+}  // namespace
+
+void AddFlags(CLI::App& command, FlyArguments& arguments) {
+  command.add_option("url", arguments.url, "URL of a dataset, or of its layer.json or tileset.json")
+      ->required()
+      ->type_name("URL");
+  AddWayFlags(command, arguments);
+  AddClientFlags(command, arguments);
+  AddReportFlags(command, arguments);
+}
+
+}  // namespace terrace::cli

@@ -1,0 +1,74 @@
+#include "fly/scene/flight_path.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace terrace::fly {
+namespace {
+
+constexpr FlightSpeed kSpeed{200, -20};
+
+TEST(FlightPath, KeepsItsSpeed) {
+  const FlightPath path = MakeStraightPath({7, 46, 3000}, {8, 46.5, 5000}, kSpeed);
+  const double whole = path.duration_s();
+  EXPECT_NEAR(path.length_m(), whole * 200, 1);
+  for (double t = 0; t + 1 < whole; t += whole / 17) {
+    const GeodeticPoint a = path.PoseAt(t).position, b = path.PoseAt(t + 1).position;
+    const double metres = geo::Length(geo::ToEcef(a.longitude, a.latitude, a.height_m) -
+                                      geo::ToEcef(b.longitude, b.latitude, b.height_m));
+    EXPECT_NEAR(metres, 200, 2);
+  }
+  EXPECT_NEAR(path.PoseAt(whole).position.height_m, 5000, 1e-6);
+  EXPECT_NEAR(path.PoseAt(2 * whole - 1).position.latitude, path.PoseAt(1).position.latitude, 1e-9);  // back and forth
+}
+
+TEST(FlightPath, CrossesTheAntimeridianOnTheShortWay) {
+  const FlightPath path = MakeStraightPath({179.5, 20, 3000}, {-179.5, 20, 3000}, kSpeed);
+  EXPECT_LT(path.length_m(), 110'000);
+  const double middle = std::abs(path.PoseAt(path.duration_s() / 2).position.longitude);
+  EXPECT_NEAR(middle, 180, 0.01);
+}
+
+TEST(FlightPath, CirclesAtItsRadius) {
+  const FlightPath path = MakeCircle({-156.3, 20.8, 4000}, 20'000, kSpeed);
+  EXPECT_NEAR(path.length_m(), 2 * 3.14159265 * 20'000, 50);
+  EXPECT_NEAR(path.PoseAt(0).position.latitude, path.PoseAt(path.duration_s()).position.latitude, 1e-6);
+  EXPECT_NEAR(path.PoseAt(0.01).heading, 90, 1.5);
+}
+
+TEST(FlightPath, RestsAtOnePlace) {
+  const FlightPath path = MakeStraightPath({7, 46, 3000}, {7, 46, 3000}, kSpeed);
+  EXPECT_EQ(path.duration_s(), 0);
+  EXPECT_EQ(path.PoseAt(12).position.height_m, 3000);
+}
+
+TEST(FlightPath, ReadsLinesAndGeoJson) {
+  const Result<FlightPath> timed = ParsePath("# t\n5, 7,46,3000, 10,-30\n 7, 7.1,46,3000, 350,-30\n", kSpeed);
+  ASSERT_TRUE(timed) << timed.error().message;
+  EXPECT_EQ(timed->duration_s(), 2);
+  EXPECT_NEAR(timed->PoseAt(1).heading, 0, 1e-9);  // the short turn
+  EXPECT_NEAR(timed->PoseAt(1).position.longitude, 7.05, 1e-9);
+  const Result<FlightPath> line = ParsePath("7 46 3000\n8 46 3000", kSpeed);
+  ASSERT_TRUE(line);
+  EXPECT_NEAR(line->PoseAt(0).heading, 90, 1);
+  EXPECT_EQ(line->PoseAt(0).pitch, -20);
+  const Result<FlightPath> json = ParsePath(
+      R"({"type":"Feature","geometry":{"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]}})", kSpeed);
+  ASSERT_TRUE(json) << json.error().message;
+  EXPECT_DOUBLE_EQ(json->length_m(), line->length_m());
+}
+
+TEST(FlightPath, NamesTheLineThatIsWrong) {
+  const auto message = [](std::string_view text) { return ParsePath(text, kSpeed).error().message; };
+  EXPECT_NE(message("7,46,3000\n7,x,3000").find("line 2"), std::string::npos);
+  EXPECT_NE(message("46.5,97,3000").find("in this order"), std::string::npos);
+  EXPECT_NE(message("7,46").find("2 numbers"), std::string::npos);
+  EXPECT_NE(message("1,7,46,1,0,0\n1,8,46,1,0,0").find("ascend"), std::string::npos);
+  EXPECT_NE(message("nan,46,1").find("line 1"), std::string::npos);
+  EXPECT_NE(message("").find("no points"), std::string::npos);
+  EXPECT_NE(message(R"({"type":"Point"})").find("no LineString"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace terrace::fly

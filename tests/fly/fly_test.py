@@ -1,0 +1,225 @@
+"""terrace fly against the real server, sound and with faults between: fly_test.py BINARY SOURCE_DIR."""
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import urllib.request
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
+sys.path.insert(0, str(SOURCE_DIR / "tests/fly"))
+import fault_proxy  # noqa: E402
+
+DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
+WAY = ["--from", "-84.25,36.25,2500", "--to", "-84.25,36.35,2500", "--speed", "400"]
+
+
+def setUpModule():
+    global SERVER, UPSTREAM
+    SERVER = subprocess.Popen([BINARY, "serve", DEM, "--listen", "127.0.0.1:0", "--log-level", "error"], stdout=subprocess.PIPE, text=True)
+    UPSTREAM = re.search(r"http://([\d.:]+)/", SERVER.stdout.readline())[1]
+    urllib.request.urlopen(f"http://{UPSTREAM}/jacksboro/layer.json", timeout=60).read()
+
+
+def tearDownModule():
+    SERVER.terminate()
+    SERVER.stdout.close()
+    SERVER.wait(60)
+
+
+def fly(address, *options, path="jacksboro", way=WAY, duration="2"):
+    """(exit status, report)"""
+    done = subprocess.run([BINARY, "fly", f"http://{address}/{path}", *way, "--duration", duration, "--json", *options],
+                          capture_output=True, text=True, timeout=120, check=False)
+    if not done.stdout:
+        return done.returncode, done.stderr
+    return done.returncode, json.loads(done.stdout)
+
+
+def fly_with_fault(fault, *options, **more):
+    with fault_proxy.FaultProxy(UPSTREAM, fault) as proxy:
+        status, report = fly(proxy.address, *options, **more)
+    return status, report["summary"]
+
+
+class SoundServer(unittest.TestCase):
+    def test_loads_the_view_in_both_formats(self):
+        for tiles in ("terrain", "3dtiles"):
+            with self.subTest(format=tiles), tempfile.TemporaryDirectory() as folder:
+                urls, page = pathlib.Path(folder, "urls"), pathlib.Path(folder, "page.html")
+                status, report = fly(UPSTREAM, "--format", tiles, "--urls", urls, "--report", page,
+                                     "--require", "full-view=60s,errors=0,refusals=0,holes=0,screen-error=1000px")
+                summary = report["summary"]
+                self.assertEqual(status, 0, summary)
+                self.assertEqual(summary["outcomes"]["ok"], summary["tiles"] + summary["other_requests"])
+                self.assertGreater(summary["tiles"], 60)
+                self.assertGreater(summary["triangles"], 10_000)
+                self.assertGreater(summary["holes"]["examined_frames"], 3)
+                self.assertEqual(summary["holes"]["uncovered_frames"], 0)
+                self.assertLessEqual(summary["connections"], 20)
+                self.assertEqual(summary["incomplete_tiles"], 0)
+                self.assertEqual(sum(summary["cache"].values()), summary["tiles"])
+                self.assertEqual(summary["cache"]["unknown"], 0)
+                lines = urls.read_text().split()
+                self.assertEqual(len(lines), len(set(lines)))
+                self.assertGreaterEqual(len(lines), summary["tiles"])
+                self.assertTrue(all(line.startswith("/jacksboro/") and "v=" in line for line in lines))
+                text = page.read_text()
+                self.assertTrue(text.startswith("<!doctype html>") and text.endswith("</html>\n"))
+                self.assertNotRegex(text, r"<script|src=|@import|url\(")
+
+    def test_flies_with_several_clients(self):
+        status, report = fly(UPSTREAM, "--clients", "3", way=["--circle", "-84.25,36.3,3000,5000"])
+        self.assertEqual(status, 0)
+        self.assertEqual(report["summary"]["clients"], 3)
+        self.assertEqual(report["summary"]["clients_without_full_view"], 0)
+
+    def test_explains_wrong_arguments(self):
+        for options, part in ((["--from", "1,2,3"], "exactly one way"), (["--circle", "1,2,3"], "--circle 1,2,3: give"),
+                              (["--path", "/nowhere"], "cannot be read"), ([*WAY, "--require", "p98=1s"], "p98=1s"),
+                              ([*WAY, "--header", "x"], "Name: value")):
+            with self.subTest(options=options):
+                done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *options], capture_output=True, text=True, timeout=60,
+                                      check=False)
+                self.assertEqual(done.returncode, 2)
+                self.assertIn(part, done.stderr)
+
+    def test_says_that_there_is_no_dataset(self):
+        status, report = fly(UPSTREAM, path="nothing")
+        self.assertEqual(status, 1)
+        self.assertIn("status 404", " ".join(report["summary"]["findings"]))
+
+
+class Faults(unittest.TestCase):
+    def test_waits_as_long_as_a_busy_server_says(self):
+        refused, pauses = {}, []
+
+        def refuse_twelve(handler, number):
+            if number <= 12:
+                refused[handler.path] = time.monotonic()
+                return fault_proxy.refuse(handler, "2")
+            if handler.path in refused:
+                pauses.append(time.monotonic() - refused.pop(handler.path))
+            return False
+
+        status, summary = fly_with_fault(refuse_twelve)
+        self.assertEqual(status, 0)
+        self.assertEqual(summary["outcomes"]["refused"], 12)
+        self.assertEqual(summary["retries"], 12)
+        self.assertEqual(summary["clients_without_full_view"], 0)
+        self.assertEqual((refused, len(pauses)), ({}, 12))  # all were asked again
+        self.assertGreaterEqual(min(pauses), 2)             # and none sooner than it may be
+
+    def test_asks_a_busy_document_again(self):
+        asked = []
+
+        def busy(path, status, headers, body):
+            if path.endswith("layer.json"):
+                asked.append(path)
+                if len(asked) <= 2:
+                    return 503, {"Retry-After": "0"}, b""
+            return status, headers, body
+
+        with fault_proxy.FaultProxy(UPSTREAM, rewrite=busy) as proxy:
+            status, report = fly(proxy.address)
+        self.assertEqual(status, 0)
+        self.assertEqual(report["summary"]["outcomes"]["refused"], 2)
+
+    def test_counts_faults_and_flies_on(self):
+        def every(period, fault):
+            return lambda handler, number: number % period == 0 and fault(handler)
+
+        cases = {
+            "not_found": (fault_proxy.not_found, False),
+            "damaged": (fault_proxy.garbage_body, True),
+            "no_http": (fault_proxy.no_http, True),
+            "cut": (fault_proxy.cut, True),
+            "timeout": (fault_proxy.silence, True),
+        }
+        results = {}
+
+        def run(name, fault):
+            options = ["--timeout", "1"] if name == "timeout" else []
+            results[name] = fly_with_fault(every(7, fault), *options, "--first-view-limit", "4")
+
+        threads = [threading.Thread(target=run, args=(name, fault)) for name, (fault, _) in cases.items()]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        for name, (_, asks_again) in cases.items():
+            with self.subTest(fault=name):
+                status, summary = results[name]
+                self.assertEqual(status, 0, summary)
+                self.assertGreater(summary["outcomes"][name], 3)
+                self.assertGreater(summary["tiles"], 40)
+                self.assertEqual(summary["retries"] > 0, asks_again)
+                self.assertTrue(any(finding for finding in summary["findings"]), summary["findings"])
+
+    def test_ends_where_nothing_answers(self):
+        cases = {"silent": fault_proxy.silence, "closes": fault_proxy.close_at_once}
+        for name, fault in cases.items():
+            with self.subTest(name):
+                status, summary = fly_with_fault(lambda handler, number, fault=fault: fault(handler), "--timeout", "0.5", "--first-view-limit", "2",
+                                                 duration="1")
+                self.assertEqual(status, 1)
+                self.assertEqual(summary["tiles"], 0)
+                self.assertEqual(summary["clients_without_full_view"], 1)
+
+    def test_ends_where_nothing_listens(self):
+        status, report = fly("127.0.0.1:1", "--first-view-limit", "2")
+        self.assertEqual(status, 1)
+        self.assertGreater(report["summary"]["outcomes"]["no_connection"], 0)
+        self.assertEqual(report["summary"]["clients_without_document"], 1)
+
+    def test_refuses_a_document_that_is_none(self):
+        with fault_proxy.FaultProxy(UPSTREAM, rewrite=lambda path, status, headers, body: (200, {}, b"<html>welcome</html>")) as proxy:
+            status, report = fly(proxy.address)
+        self.assertEqual(status, 1)
+        self.assertIn("layer.json cannot be read", " ".join(report["summary"]["findings"]))
+
+    def test_takes_a_new_version_in_flight(self):
+        changed = threading.Event()
+
+        def newer(path, status, headers, body):
+            if path.split("?")[0].endswith("layer.json"):
+                headers.pop("Content-Encoding", None)
+                document = json.loads(urllib.request.urlopen(f"http://{UPSTREAM}/jacksboro/layer.json", timeout=60).read())
+                if changed.is_set():
+                    document["tiles"] = [document["tiles"][0].replace(document["version"], "0123456789ab")]
+                    document["version"] = "0123456789ab"
+                return status, headers, json.dumps(document).encode()
+            is_old = changed.is_set() and "v=0123456789ab" not in path
+            return status, {**headers, "Cache-Control": "no-store" if is_old else "public, max-age=31536000, immutable"}, body
+
+        def change(handler, number):
+            if number == 60:
+                changed.set()
+            return False
+
+        with fault_proxy.FaultProxy(UPSTREAM, change, newer) as proxy:
+            status, report = fly(proxy.address, duration="4")
+        summary = report["summary"]
+        self.assertEqual(status, 0, summary)
+        self.assertEqual(summary["version_changes"], 1)
+        self.assertGreater(summary["mixed_version_frames"], 0)
+        self.assertIn("changed its version", " ".join(summary["findings"]))
+        self.assertGreaterEqual(summary["tiles"], 100)  # old ones, and all of them again
+
+    def test_says_that_a_slow_server_does_not_keep_up(self):
+        with fault_proxy.FaultProxy(UPSTREAM, tiles_per_second=10) as proxy:
+            status, report = fly(proxy.address, "--require", "full-view=2s,p99=500ms,refined=90%", "--first-view-limit", "3", duration="3")
+        summary = report["summary"]
+        self.assertEqual(status, 1)
+        self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False, False])
+        self.assertIn("does not keep up", " ".join(summary["findings"]))
+        self.assertLessEqual(summary["best_tiles_per_second"], 12)
+
+
+if __name__ == "__main__":
+    unittest.main()

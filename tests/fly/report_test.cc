@@ -1,0 +1,132 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "fly/report/html_report.h"
+#include "fly/report/map_plot.h"
+#include "fly/report/requirement.h"
+#include "fly/report/summary.h"
+#include "fly/report/time_plot.h"
+
+namespace terrace::fly {
+namespace {
+
+FlightOptions SomeOptions() {
+  FlightOptions options;
+  options.document = *ParseUrl("http://127.0.0.1:1/<maui>/layer.json");
+  options.path = MakeStraightPath({7, 46, 3000}, {8, 46, 3000}, {});
+  return options;
+}
+
+// Three seconds: ten tiles, one of them late, a refusal, and a frame in ten with a hole.
+void Fill(Statistics& statistics) {
+  ClientRecord client;
+  client.document_s = 0.1;
+  client.first_view_s = 1.5;
+  client.arrival_s = 0;
+  statistics.SetClient(0, client);
+  for (int i = 0; i < 10; ++i) {
+    RequestRecord tile;
+    tile.seconds = i == 9 ? 0.9 : 0.01;
+    tile.bytes = 1000;
+    tile.triangles = 50;
+    tile.tier = i < 4 ? CacheTier::kHit : CacheTier::kMiss;
+    statistics.AddRequest(i * 0.3, tile);
+    statistics.AddAsked(i * 0.3, {10, 1060 + i, 770}, tile.tier);
+    FrameRecord frame;
+    frame.is_refined = i != 3;
+    frame.is_measured = true;
+    frame.rays = 100;
+    frame.missing = i == 5 ? 7 : 0;
+    frame.worst_px = 10 + i;
+    statistics.AddFrame(i * 0.3, frame);
+    statistics.AddCamera({7 + i * 0.01, 46, 3000});
+  }
+  RequestRecord refused;
+  refused.outcome = Outcome::kRefused;
+  statistics.AddRequest(1, refused);
+}
+
+TEST(Summary, CountsWhatHappened) {
+  Statistics statistics(1);
+  Fill(statistics);
+  const Summary summary = Summarize(SomeOptions(), statistics);
+  EXPECT_EQ(summary.totals.tiles, 10U);
+  EXPECT_EQ(summary.totals.bytes, 10'000U);
+  EXPECT_NEAR(summary.p50_s, 0.01, 1e-6);
+  EXPECT_NEAR(summary.p99_s, 0.9, 1e-6);
+  EXPECT_NEAR(summary.refined_share, 0.9, 1e-9);
+  EXPECT_EQ(summary.totals.hole_frames, 1U);
+  EXPECT_NEAR(summary.totals.worst_hole, 0.07, 1e-9);
+  EXPECT_EQ(summary.errors, 0U);
+  EXPECT_NEAR(summary.worst_first_view_s, 1.5, 1e-6);
+  const std::string text = TextOf(summary);
+  EXPECT_NE(text.find("Holes: 1 of 10"), std::string::npos) << text;
+  EXPECT_NE(text.find("refused (429, 503)"), std::string::npos) << text;
+}
+
+TEST(Requirements, HoldOrFail) {
+  Statistics statistics(1);
+  Fill(statistics);
+  const Summary summary = Summarize(SomeOptions(), statistics);
+  const auto holds = [&summary](std::string_view text) {
+    const auto requirements = ParseRequirements(text);
+    EXPECT_TRUE(requirements) << text;
+    return Judge(*requirements, summary).AllHold();
+  };
+  EXPECT_TRUE(holds(""));
+  EXPECT_TRUE(holds("full-view=2s,p50=20ms,p99=1s,refined=90%,screen-error=20px,holes=1,errors=0,refusals=1,hits=40%"));
+  for (const char* text : {"full-view=1s", "p50=5ms", "p99=899ms", "refined=91%", "screen-error=18", "holes=0",
+                           "refusals=0", "hits=41%", "tiles=11"}) {
+    EXPECT_FALSE(holds(text)) << text;
+  }
+  Statistics nothing(1);
+  const Summary empty = Summarize(SomeOptions(), nothing);
+  for (const char* text : {"full-view=99s", "p99=99s", "refined=0%", "holes=9", "hits=0%", "tiles=0"}) {
+    EXPECT_FALSE(Judge(*ParseRequirements(text), empty).AllHold()) << text;  // what was not measured does not hold
+  }
+}
+
+TEST(Requirements, NameThePartThatIsWrong) {
+  for (const char* text :
+       {"p98=2s", "p99", "p99=2", "p99=2px", "refined=95", "holes=-1", "p99=1e999s", "full-view=2s,,p50=1s"}) {
+    const auto requirements = ParseRequirements(text);
+    ASSERT_FALSE(requirements) << text;
+    EXPECT_NE(requirements.error().message.find("full-view=2s"), std::string::npos);
+  }
+}
+
+TEST(HtmlReport, StandsAlone) {
+  Statistics statistics(1);
+  Fill(statistics);
+  statistics.AddMessage("<script>alert(1)</script>");
+  const FlightOptions options = SomeOptions();
+  const Summary summary = Summarize(options, statistics);
+  const std::string html = HtmlOf(options, summary, Judge(*ParseRequirements("p99=1ms"), summary), statistics);
+  EXPECT_EQ(html.find("<script"), std::string::npos);
+  EXPECT_EQ(html.find("src="), std::string::npos);
+  EXPECT_EQ(html.find("<link"), std::string::npos);
+  EXPECT_EQ(html.find("nan"), std::string::npos);
+  EXPECT_NE(html.find("&lt;maui&gt;"), std::string::npos);
+  EXPECT_NE(html.find("Requirements failed"), std::string::npos);
+  EXPECT_NE(html.find("class=\"map\""), std::string::npos);
+}
+
+TEST(HtmlReport, ShowsAFlightWithoutAnything) {
+  Statistics statistics(1);
+  const FlightOptions options = SomeOptions();
+  const std::string html = HtmlOf(options, Summarize(options, statistics), {}, statistics);
+  EXPECT_NE(html.find("never"), std::string::npos);
+  EXPECT_EQ(html.find("inf"), std::string::npos);
+}
+
+TEST(CacheTierOfClient, IsReadFromServerTiming) {
+  EXPECT_EQ(ParseCacheTier("cache;desc=hit"), CacheTier::kHit);
+  EXPECT_EQ(ParseCacheTier("cache;desc=miss, queue;dur=0.06"), CacheTier::kMiss);
+  EXPECT_EQ(ParseCacheTier("cache;desc=disk"), CacheTier::kLower);
+  EXPECT_EQ(ParseCacheTier("cache;desc=join, x"), CacheTier::kJoin);
+  EXPECT_EQ(ParseCacheTier("cdn-cache; desc=HIT"), CacheTier::kUnknown);
+}
+
+}  // namespace
+}  // namespace terrace::fly

@@ -1,0 +1,135 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "fly/tree/subtree.h"
+#include "fly/tree/tile_tree.h"
+#include "proto/documents/subtree.h"
+
+namespace terrace::fly {
+namespace {
+
+TEST(LayerTree, MakesAllFourChildrenWhereTheServerHasOne) {
+  const auto tree = MakeLayerTree(R"({"version":"ab12","tiles":["{z}/{x}/{y}.terrain?v={version}&error=5"],"available":[
+    [{"startX":0,"startY":0,"endX":1,"endY":0}],[{"startX":2,"startY":1,"endX":2,"endY":1}]]})");
+  ASSERT_TRUE(tree) << tree.error().message;
+  Tile& west = *(*tree)->root().children[0];
+  Tile& east = *(*tree)->root().children[1];
+  (*tree)->AddChildren(west);
+  (*tree)->AddChildren(east);
+  EXPECT_TRUE(west.children.empty());
+  ASSERT_EQ(east.children.size(), 4U);
+  EXPECT_EQ(east.children[2]->key, (geo::TileKey{1, 2, 1}));
+  EXPECT_EQ(east.children[2]->content, Content::kMesh);
+  EXPECT_EQ(east.children[0]->content, Content::kUpsampled);
+  EXPECT_EQ((*tree)->RequestFor(*east.children[2]).uri, "1/2/1.terrain?v=ab12&error=5");
+  EXPECT_EQ((*tree)->RequestFor(*east.children[0]).kind, TileRequest::Kind::kNothing);
+  // A 2-pixel error of CesiumJS at level 0 is 77,067 m; 8 times that at 16 pixels.
+  EXPECT_NEAR(east.geometric_error_m, 8 * 77067.34, 0.1);
+  EXPECT_NEAR(east.children[0]->geometric_error_m, 4 * 77067.34, 0.1);
+}
+
+TEST(LayerTree, FindsTilesInManyRanges) {
+  std::string ranges;
+  for (int i = 0; i < 64; ++i) {  // every other tile of the first row, then a block that reaches far down
+    ranges +=
+        R"({"startX":)" + std::to_string(2 * i) + R"(,"startY":0,"endX":)" + std::to_string(2 * i) + R"(,"endY":0},)";
+  }
+  ranges += R"({"startX":3,"startY":1,"endX":9,"endY":40})";
+  const auto tree = MakeLayerTree(
+      R"({"tiles":["{z}/{x}/{y}"],"available":[[{"startX":0,"startY":0,"endX":1,"endY":0}],[)" + ranges + "]]}");
+  ASSERT_TRUE(tree);
+  Tile parent;
+  parent.volume = Region({0, 0, 1, 1}, 0, 1);
+  parent.key = geo::TileKey{0, 2, 15};
+  parent.may_have_more_children = true;
+  (*tree)->AddChildren(parent);
+  ASSERT_EQ(parent.children.size(), 4U);
+  for (const auto& child : parent.children) EXPECT_EQ(child->content, Content::kMesh);
+}
+
+TEST(LayerTree, SaysWhatItCannotRead) {
+  const auto message = [](std::string_view text) { return MakeLayerTree(text).error().message; };
+  EXPECT_NE(message("<html>").find("layer.json cannot be read"), std::string::npos);
+  EXPECT_NE(message(R"({"tiles":["x"]})").find("no \"available\""), std::string::npos);
+  EXPECT_NE(message(R"({"projection":"EPSG:3857","available":[]})").find("EPSG:3857"), std::string::npos);
+}
+
+constexpr const char* kTileset = R"({"asset":{"version":"1.1","tilesetVersion":"aaaa"},"geometricError":1e7,"root":{
+  "boundingVolume":{"sphere":[0,0,0,7e6]},"geometricError":1e7,"refine":"REPLACE","children":[
+  {"boundingVolume":{"region":[0,0,0.7853981633974483,0.7853981633974483,-10,900]},"geometricError":1000,
+   "content":{"uri":"t/{level}/{x}/{y}.glb?v=aaaa"},
+   "implicitTiling":{"subdivisionScheme":"QUADTREE","availableLevels":3,"subtreeLevels":2,"subtrees":{"uri":"t/{level}.{x}.{y}.subtree?v=aaaa"}}}]}})";
+
+std::string SubtreeBytes(int levels, std::vector<std::vector<geo::TileRange>> tiles) {
+  proto::Subtree subtree;
+  subtree.levels = levels;
+  subtree.tiles = std::move(tiles);
+  return proto::EncodeSubtree(subtree);
+}
+
+TEST(TilesetTree, GrowsWithItsSubtrees) {
+  auto made = MakeTilesetTree(kTileset);
+  ASSERT_TRUE(made) << made.error().message;
+  TileTree& tree = **made;
+  Tile& top = *tree.root().children[0];
+  EXPECT_EQ(top.content, Content::kEmpty);
+  Tile& place = *top.children[0];
+  EXPECT_TRUE(place.always_refine);
+  Tile& root = *place.children[0];
+  EXPECT_EQ(root.key, (geo::TileKey{2, 4, 2}));
+  TileRequest request = tree.RequestFor(root);
+  EXPECT_EQ(request.kind, TileRequest::Kind::kSubtree);
+  EXPECT_EQ(request.uri, "t/0.0.0.subtree?v=aaaa");
+  tree.AddChildren(root);
+  EXPECT_TRUE(root.children.empty());
+
+  ASSERT_TRUE(tree.TakeSubtree(root, SubtreeBytes(2, {{{0, 0, 0, 0}}, {{1, 0, 1, 1}}, {{3, 2, 3, 2}}})));
+  request = tree.RequestFor(root);
+  EXPECT_EQ(request.kind, TileRequest::Kind::kMesh);
+  EXPECT_EQ(request.uri, "t/0/0/0.glb?v=aaaa");
+  tree.AddChildren(root);
+  ASSERT_EQ(root.children.size(), 2U);  // (1, 0) and (1, 1)
+  Tile& north_east = *root.children[1];
+  EXPECT_EQ(north_east.key, (geo::TileKey{3, 9, 5}));
+  EXPECT_DOUBLE_EQ(north_east.geometric_error_m, 500);
+  tree.AddChildren(north_east);
+  ASSERT_EQ(north_east.children.size(), 1U);  // the root of the next subtree
+  EXPECT_EQ(tree.RequestFor(*north_east.children[0]).uri, "t/2.3.2.subtree?v=aaaa");
+}
+
+TEST(TilesetTree, FollowsTheVersionOfItsDocument) {
+  auto made = MakeTilesetTree(kTileset);
+  ASSERT_TRUE(made);
+  std::string later = kTileset;
+  for (std::size_t at; (at = later.find("aaaa")) != std::string::npos;) later.replace(at, 4, "bbbb");
+  ASSERT_TRUE((*made)->TakeDocument(later));
+  EXPECT_EQ((*made)->version(), "bbbb");
+  EXPECT_EQ((*made)->RequestFor(*(*made)->root().children[0]->children[0]->children[0]).uri, "t/0.0.0.subtree?v=bbbb");
+}
+
+TEST(TilesetTree, SaysWhatItCannotRead) {
+  EXPECT_FALSE(MakeTilesetTree("{}"));
+  std::string added = kTileset;
+  added.replace(added.find("REPLACE"), 7, "ADD");
+  EXPECT_NE(MakeTilesetTree(added).error().message.find("does not REPLACE"), std::string::npos);
+}
+
+TEST(Subtree3d, ReadsTheEncodersBits) {
+  const std::string bytes = SubtreeBytes(3, {{{0, 0, 0, 0}}, {{0, 0, 1, 1}}, {{0, 0, 1, 3}, {3, 3, 3, 3}}, {}});
+  const Result<Subtree3d> subtree = Subtree3d::Parse(bytes, 3);
+  ASSERT_TRUE(subtree) << subtree.error().message;
+  for (std::uint32_t y = 0; y < 4; ++y) {
+    for (std::uint32_t x = 0; x < 4; ++x) {
+      EXPECT_EQ(subtree->HasTile(2, x, y), x < 2 || (x == 3 && y == 3)) << x << " " << y;
+      EXPECT_EQ(subtree->HasContent(2, x, y), subtree->HasTile(2, x, y));
+    }
+  }
+  EXPECT_FALSE(subtree->HasSubtree(0, 0));
+  for (std::size_t size = 0; size < bytes.size(); ++size)
+    EXPECT_FALSE(Subtree3d::Parse(std::string_view(bytes).substr(0, size), 3));
+  EXPECT_FALSE(Subtree3d::Parse(bytes, 5));
+}
+
+}  // namespace
+}  // namespace terrace::fly
