@@ -171,6 +171,7 @@ struct Config {
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
   std::size_t min_read_rate = 4096;  // bytes per second; 0: no limit
+  std::chrono::milliseconds drain_delay{0};
   std::chrono::milliseconds drain_timeout{10'000};
 
   std::vector<std::string> data_roots;        // folders that hold every source; none: any folder

@@ -181,6 +181,11 @@ constexpr RouteRow kRows[] = {
      .handle = AnswerMetrics,
      .scope = DatasetScope::kAllDatasets,
      .needs_no_catalog = true},
+    {.label = "version",
+     .pattern = "/version",
+     .handle = AnswerVersion,
+     .scope = DatasetScope::kAllDatasets,
+     .needs_no_catalog = true},
 };
 
 }  // namespace

@@ -335,6 +335,15 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .help = "Lowest rate in bytes a second at which a client must receive a response or send a body; 0 is no limit",
        .details = "It applies to a response after `write_timeout_s`, to a body after `header_timeout_s`",
        .codec = Integer(&Config::min_read_rate, 0, 1'000'000'000)},
+      {.key = "drain_delay_s",
+       .value = "SECONDS",
+       .section = "limits",
+       .help = "Time for which a stopping server still serves, with /readyz 503, so that balancers turn away from it",
+       .details = "It precedes `drain_timeout_s`. Behind a balancer that asks `/readyz`: the period of its probe times "
+                  "its failure threshold, and the time that the news takes to spread. Replies have `Connection: close` "
+                  "meanwhile. [More](operations.md#restarts)",
+       .codec = Seconds(&Config::drain_delay, 0, 3600),
+       .other_words = "lameduck shutdown_delay"},
       {.key = "drain_timeout_s",
        .value = "SECONDS",
        .section = "limits",

@@ -218,7 +218,7 @@ config::Config WithViewer(config::Config config) {
   return config;
 }
 
-// The time that stopping may take beyond the drain timeout.
+// The time that stopping may take beyond the delay and timeout of the drain.
 constexpr std::chrono::seconds kStopTime{1};
 
 // Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
@@ -323,7 +323,7 @@ int Serve(const ServeArguments& arguments) {
     reloader->Reload();
   };
   std::stop_source stop_opening;
-  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_timeout + kStopTime] {
+  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_delay + config.drain_timeout + kStopTime] {
     watchdog.Begin(limit);
     stop_opening.request_stop();
     NotifyStopping();
