@@ -46,6 +46,7 @@
 #include "server/server.h"
 #include "server/store/baked_store.h"
 #include "server/store/disk_cache.h"
+#include "server/store/shared_cache.h"
 #include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
@@ -311,6 +312,11 @@ int Serve(const ServeArguments& arguments) {
   const auto baked = std::make_shared<server::BakedStore>();
   options.tile_stores.push_back(baked);
   if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
+  if (!config.shared_cache.url.empty()) {
+    auto shared = server::OpenSharedCache(config.shared_cache, WorkerThreads(config));
+    if (!shared) return Fail(shared.error());
+    options.tile_stores.push_back(*std::move(shared));
+  }
   options.refinements =
       std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
   const auto refinements = options.refinements;
