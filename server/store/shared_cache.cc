@@ -112,7 +112,14 @@ class SharedCache final : public tiler::TileStore {
     const auto end = std::chrono::steady_clock::now() + lease_;
     milliseconds pause{1};
     while (true) {
-      if (tier_.Take(record_key, lease_) != SharedTier::Lease::kHeld) return std::nullopt;
+      const SharedTier::Lease lease = tier_.Take(record_key, lease_);
+      if (lease == SharedTier::Lease::kNone) return std::nullopt;
+      if (lease == SharedTier::Lease::kTaken) {
+        // Its last owner may have written the tile since the look-up.
+        std::optional<tiler::EncodedTile> tile = Read(record_key);
+        if (tile) tier_.Release(record_key);
+        return tile;
+      }
       if (std::chrono::steady_clock::now() + pause >= end) return std::nullopt;
       std::this_thread::sleep_for(pause);
       pause = std::min(2 * pause, milliseconds(20));

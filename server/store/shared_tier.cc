@@ -66,13 +66,7 @@ SharedTier::ConnectionPtr SharedTier::Borrow(std::uint64_t& epoch) {
   const std::lock_guard lock(mutex_);
   epoch = epoch_;
   if (!on_) return nullptr;
-  if (idle_.empty()) {
-    if (open_ < options_.readers) {
-      wants_connection_ = true;
-      changed_.notify_all();
-    }
-    return nullptr;
-  }
+  if (idle_.empty()) return nullptr;
   ConnectionPtr connection = std::move(idle_.back());
   idle_.pop_back();
   return connection;
@@ -227,12 +221,12 @@ void SharedTier::Run() {
       if (end == Clock::time_point::max()) end = Clock::now() + kLastWrites;
       if (!on_ || queue_.empty() || write_at_ >= end || Clock::now() >= end) break;
     }
-    const bool connects = on_ ? wants_connection_ : Clock::now() >= retry_at_;
+    const bool connects = open_ < options_.readers && Clock::now() >= retry_at_;
     const bool writes = on_ && !queue_.empty() && Clock::now() >= write_at_;
     if (!connects && !writes) {
       Clock::time_point next = Clock::now() + kReportAgain;
-      if (!on_) next = retry_at_;
-      if (on_ && !queue_.empty()) next = write_at_;
+      if (open_ < options_.readers) next = retry_at_;
+      if (on_ && !queue_.empty()) next = std::min(next, write_at_);
       changed_.wait_until(lock, std::min(next, end));
       continue;
     }
@@ -249,7 +243,6 @@ void SharedTier::Connect() {
   std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
-    wants_connection_ = false;
     epoch = epoch_;
   }
   Result<ConnectionPtr> connection = Open(options_.timeout);
@@ -257,8 +250,8 @@ void SharedTier::Connect() {
   const std::lock_guard lock(mutex_);
   if (!pong) {
     retry_at_ = Clock::now() + kRetryAfter;
-    if (!on_) return Report(pong.error().message, /*is_off=*/true);
-    return;  // look-ups find out
+    if (!on_) Report(pong.error().message, /*is_off=*/true);
+    return;  // those that are open may go on
   }
   if (epoch != epoch_) return;
   if (!on_) {

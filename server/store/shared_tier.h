@@ -104,8 +104,7 @@ class SharedTier {
   std::uint64_t epoch_ = 0;          // counts how often it was switched off: connections of an earlier one are closed
   std::vector<ConnectionPtr> idle_;  // for look-ups
   std::size_t open_ = 0;             // idle or borrowed, of this epoch
-  bool wants_connection_ = false;
-  Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt
+  Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt to connect, to write
   std::list<Job> queue_;
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;

@@ -1,4 +1,5 @@
 """A real redis-server on a free port, and a proxy before it that delays, cuts or falsifies what it replies."""
+import contextlib
 import pathlib
 import socket
 import subprocess
@@ -92,10 +93,13 @@ class Proxy:
         except OSError:
             pass
         for end in (source, sink):
-            try:
+            with contextlib.suppress(OSError):
                 end.shutdown(socket.SHUT_RDWR)
-            except OSError:
-                pass
+        if is_reply:
+            source.close()
+            sink.close()
 
     def close(self):
+        with contextlib.suppress(OSError):
+            self.listener.shutdown(socket.SHUT_RDWR)
         self.listener.close()
