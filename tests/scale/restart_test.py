@@ -23,6 +23,7 @@ sys.argv.pop(1)
 ROUNDS = 20 if os.environ.get("TERRACE_LONG_TESTS") == "1" else 2
 PROBE_SECONDS = 0.2  # how often the balancer asks
 DELAY_SECONDS = 1.0
+MARK_SECONDS = 2.5  # longer than nginx avoids a node that failed: fail_timeout, in whole seconds
 
 
 class Balancer:
@@ -111,6 +112,8 @@ class Restarts(unittest.TestCase):
                 await asyncio.to_thread(node.wait_until_served)
                 if balancer:
                     await balancer.wait_until_ready(node)
+                else:
+                    await asyncio.sleep(MARK_SECONDS)
         return statuses
 
     def check(self, statuses, seen, wrk):
