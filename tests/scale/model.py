@@ -24,6 +24,16 @@ class Ring:
         return self.points[at % len(self.points)][1]
 
 
+class Balancer:
+    """Any node, as a balancer gives that does not look at the URL."""
+
+    def __init__(self, nodes, chance):
+        self.nodes, self.chance = list(nodes), chance
+
+    def node_of(self, _):
+        return self.chance.choice(self.nodes)
+
+
 class Node:
     """`capacity`: tiles in memory, least recently used first out; tiles on disk are not limited, as a week's tiles fit."""
 
@@ -63,12 +73,12 @@ class Times:
 class Fleet:
     """Changes are a list of (time, function of the fleet), in their order."""
 
-    def __init__(self, count, workers, capacity, times, seed=1, has_disk=False):
+    def __init__(self, count, workers, capacity, times, seed=1, has_disk=False, has_ring=True):
         self.chance = random.Random(seed)
         self.make = lambda: Node(workers, capacity, times, self.chance, has_disk)
         self.nodes = {i: self.make() for i in range(count)}
         self.versions = dict.fromkeys(self.nodes, 0)
-        self.ring = Ring(self.nodes)
+        self.ring = Ring(self.nodes) if has_ring else Balancer(self.nodes, self.chance)
 
     def lose(self, node):
         del self.nodes[node], self.versions[node]

@@ -11,10 +11,8 @@ import pathlib
 import random
 import shutil
 import signal
-import socket
 import subprocess
 import sys
-import threading
 import time
 import unittest
 

@@ -42,7 +42,7 @@ async def timed(client, target):
 
 def measure(binary):
     """Builds one at a time, then the same tiles from disk (a new process) and from memory."""
-    targets = [target for level in (4, 5, 6, 7) for target in cluster.tiles(250, level)]
+    targets = [target.replace(".terrain", ".glb") for level in (4, 5, 6, 7) for target in cluster.tiles(250, level)]
     with cluster.scratch() as folder:
         options = {"disk_cache": {"directory": str(folder / "disk")}, "worker_threads": 1}
         node = cluster.Node(binary, folder, cluster.earth(), options).start()
@@ -80,7 +80,7 @@ def check_requests(rate, seconds):
         yield now, chance.choices(spots, weights)[0]
 
 
-def check(binary, path, rate=120, seconds=30, capacity=400):
+def check(binary, path, rate=80, seconds=45, capacity=400):
     """Three nodes with small caches; the second is killed at a third of the time and comes back at two thirds."""
     times, third = measured(), seconds / 3
     overhead = 640 + 700  # bytes of an entry besides the tile: ByteCache::kEntryOverheadBytes and the head
@@ -118,7 +118,7 @@ async def replay(nodes, requests, third):
         client = clients[node].pop() if clients[node] else cluster.Client(nodes[node].port, is_tls=False)
         level, x, y = key
         try:
-            seconds, fields, _ = await timed(client, f"/earth/{level}/{x}/{y}.terrain")
+            seconds, fields, _ = await timed(client, f"/earth/{level}/{x}/{y}.glb")
             what = re.search(r"cache;desc=(\w+)", fields.get("server-timing", ""))
             replies.append((at, seconds, "build" if what and what[1] == "miss" else "hit", node))
             clients[node].append(client)
@@ -148,31 +148,32 @@ def plot(folder):
     from matplotlib import pyplot
     times, folder = model.Times(measured()), pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    counts, capacity, per_node = [1, 2, 3, 5, 10, 20, 50, 100], 20_000, 300
+    counts, capacity, rate, seconds = [1, 2, 3, 5, 10, 20, 50, 100], 4_000, 1000, 80
     figure, axes = pyplot.subplots(1, 3, figsize=(13, 3.6))
-    table = []
-    for has_disk, label in ((False, "memory only"), (True, "with a disk cache")):
+    for has_ring, label in ((True, "ring"), (False, "any node")):
         rows = []
         for count in counts:
-            seconds = max(20, 600 / count)
-            fleet = model.Fleet(count, 2, capacity, times, has_disk=has_disk)
-            replies = [r for r in fleet.run(model.mixed(per_node * count, seconds, places=3000 * count, viewers=60 * count)) if r[0] > seconds / 2]
+            fleet = model.Fleet(count, 2, capacity, times, has_ring=has_ring)
+            replies = [r for r in fleet.run(model.mixed(rate, seconds)) if r[0] > seconds / 2]
             builds = sum(r[2] == "build" for r in replies)
             rows.append((1 - builds / len(replies), model.percentile([r[1] for r in replies], 0.99) * 1e3, builds / (seconds / 2)))
-            table.append((label, count, per_node * count, *rows[-1]))
+            print("{:9} {:3} nodes: hit ratio {:.3f}, p99 {:.1f} ms, {:.0f} builds/s".format(label, count, *rows[-1]))
         for axis, column, title in zip(axes, range(3), ("hit ratio", "p99, ms", "builds a second, all nodes")):
             axis.plot(counts, [row[column] for row in rows], marker="o", label=label)
-            axis.set(title=title, xlabel="nodes", xscale="log")
+            axis.set(title=title, xlabel="nodes", xscale="log", yscale="log" if column == 1 else "linear")
     axes[0].legend()
     axes[0].set_ylim(0, 1)
-    figure.suptitle(f"{per_node} requests a second for each node, half Zipf and half flights; 2 workers a node")
+    figure.suptitle(f"{rate} requests a second in all, half Zipf and half flights; 2 workers and {capacity} tiles in memory a node")
     save(figure, folder / "fleet-size.svg")
     figure, axes = pyplot.subplots(1, 3, figsize=(13, 3.6))
     for count in (3, 10):
         fleet = model.Fleet(count, 2, capacity, times)
         changes = [(60, lambda f: f.lose(1)), (120, lambda f: f.add(1))]
         changes += [(180 + 2 * i, lambda f, i=i: f.change_data(i)) for i in range(count)]
-        rows = model.by_second(fleet.run(model.mixed(per_node * count, 240, places=3000 * count, viewers=60 * count), changes), step=2.0)
+        rows = model.by_second(fleet.run(model.mixed(rate / 2, 240), changes), step=2.0)
+        for at in (56, 62, 116, 122, 176, 178 + 2 * count, 230):
+            row = rows[at // 2]
+            print("{:3} nodes, {:3.0f} s: hit ratio {:.3f}, p99 {:.1f} ms, {:.0f} builds/s".format(count, row[0], row[2], row[3] * 1e3, row[4]))
         for axis, column, title, scale in zip(axes, (2, 3, 4), ("hit ratio", "p99, ms", "builds a second, all nodes"), (1, 1e3, 1)):
             axis.plot([row[0] for row in rows], [row[column] * scale for row in rows], label=f"{count} nodes")
             axis.set(title=title, xlabel="s")
@@ -181,9 +182,8 @@ def plot(folder):
             axis.axvline(at, color="grey", linewidth=0.6)
             axis.annotate(word, (at, axis.get_ylim()[1]), fontsize=7, ha="center")
     axes[0].legend()
+    figure.suptitle(f"{rate // 2} requests a second; a node is lost at 60 s, comes back empty at 120 s; data change node by node from 180 s")
     save(figure, folder / "fleet-events.svg")
-    for row in table:
-        print("{:18} {:3} nodes {:6} requests/s: hit ratio {:.3f}, p99 {:.1f} ms, {:.0f} builds/s".format(*row))
 
 
 def save(figure, path):
