@@ -98,7 +98,7 @@ class SharedTier {
   void Report(const std::string& why, bool is_off);
 
   const SharedTierOptions options_;
-  mutable std::mutex mutex_;  // guards what follows, up to the counters; never held during I/O
+  mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
   std::condition_variable changed_;
   bool on_ = false;
   std::uint64_t epoch_ = 0;          // counts how often it was switched off: connections of an earlier one are closed
