@@ -115,6 +115,20 @@ struct DiskCacheConfig {
   friend bool operator==(const DiskCacheConfig&, const DiskCacheConfig&) = default;
 };
 
+// A cache of finished tiles that servers share: a Redis.
+struct SharedCacheConfig {
+  std::string url;            // redis://[user@]HOST:PORT/DATABASE, or rediss://; without a password; empty: none
+  std::string password_file;  // its first line is the password; empty: the environment's
+  std::string ca_file;        // PEM; empty: the system's authorities
+  int timeout_ms = 25;        // of a look-up
+  double min_build_ms = 2;    // cheaper tiles are not stored
+  std::size_t max_bytes_per_tile = std::size_t{256} << 10;  // larger tiles are not stored
+  std::chrono::milliseconds ttl{7 * 86'400'000};            // of a tile; 0: as long as Redis keeps it
+  int lease_ms = 0;  // how long a server waits for a tile that another one builds; 0: it builds the tile itself
+
+  friend bool operator==(const SharedCacheConfig&, const SharedCacheConfig&) = default;
+};
+
 // A token that gives access to datasets.
 struct TokenConfig {
   std::string name;                   // in the log
@@ -148,6 +162,7 @@ struct Config {
   std::size_t cache_bytes = std::size_t{256} << 20;             // 0: no cache
   std::size_t refinement_cache_bytes = std::size_t{128} << 20;  // 0: no cache
   DiskCacheConfig disk_cache;
+  SharedCacheConfig shared_cache;
   std::string cache_dir = std::string(kDefaultCacheDir);  // folder of the statistics cache; empty: none
   std::size_t cache_dir_bytes = std::size_t{2} << 30;     // limit of its files; 0: no cache
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
@@ -171,6 +186,7 @@ struct Config {
   std::chrono::milliseconds idle_timeout{30'000};
   std::chrono::milliseconds write_timeout{20'000};
   std::size_t min_read_rate = 4096;  // bytes per second; 0: no limit
+  std::chrono::milliseconds drain_delay{0};
   std::chrono::milliseconds drain_timeout{10'000};
 
   std::vector<std::string> data_roots;        // folders that hold every source; none: any folder

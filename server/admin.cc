@@ -16,7 +16,7 @@
 namespace terrace::server {
 namespace {
 
-constexpr std::string_view kPurgePath = "/admin/purge", kMetricsPath = "/metrics";
+constexpr std::string_view kPurgePath = "/admin/purge", kMetricsPath = "/metrics", kVersionPath = "/version";
 
 Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
   const std::size_t dash = text.find('-');
@@ -103,6 +103,10 @@ class AdminApplication::Handler final : public ConnectionHandler {
 
   Answer Handle(const Request& request) override {
     if (PathOf(request) == kPurgePath) return AnswerPurge(request);
+    if (PathOf(request) == kVersionPath) {
+      return StateResponse(200, "application/json",
+                           std::make_shared<const std::string>(VersionJson(*parts_.catalog())));
+    }
     return WriteMetrics();
   }
 
@@ -127,8 +131,8 @@ class AdminApplication::Handler final : public ConnectionHandler {
     if (!request.fields->origin.empty()) return ProblemResponse(403, "web pages are not answered here", request.id);
     const std::string_view path = PathOf(request);
     const bool is_purge = path == kPurgePath;
-    if (!is_purge && path != kMetricsPath) {
-      return ProblemResponse(404, "no such URL; there are /admin/purge and /metrics", request.id);
+    if (!is_purge && path != kMetricsPath && path != kVersionPath) {
+      return ProblemResponse(404, "no such URL; there are /admin/purge, /metrics and /version", request.id);
     }
     const bool reads = request.method == Method::kGet || request.method == Method::kHead;
     if (is_purge ? request.method == Method::kPost : reads) return std::nullopt;

@@ -24,6 +24,7 @@ struct DescriptorDemand {
   bool has_vrts = false;  // GDAL also keeps their parts open
   std::size_t connections = 1;
   std::size_t archive_files = 0;
+  std::size_t shared_cache = 0;  // connections to it
   bool has_admin_listener = false;
 };
 

@@ -182,6 +182,11 @@ constexpr RouteRow kRows[] = {
      .handle = AnswerMetrics,
      .scope = DatasetScope::kAllDatasets,
      .needs_no_catalog = true},
+    {.label = "version",
+     .pattern = "/version",
+     .handle = AnswerVersion,
+     .scope = DatasetScope::kAllDatasets,
+     .needs_no_catalog = true},
 };
 
 }  // namespace

@@ -163,8 +163,10 @@ class RunningServer final : public Server {
   }
 
   bool Stop() {
-    const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
     frontend_->connections.Drain();
+    // In full, also while no connection is open: balancers send requests until they have seen /readyz.
+    std::this_thread::sleep_for(DrainDelay());
+    const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
     frontend_->connections.WaitUntilEmpty(DrainGrace());
     listener_->Close();
     const bool drained = frontend_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -201,6 +203,11 @@ class RunningServer final : public Server {
     if (admin_connections_.WaitUntilEmpty(kLastWords)) return;
     admin_connections_.AbortAll();
     admin_connections_.WaitUntilEmpty(kLastWords);
+  }
+
+  // A server that was never ready is in no balancer.
+  std::chrono::milliseconds DrainDelay() const {
+    return application_.opening() ? std::chrono::milliseconds(0) : options_.config.drain_delay;
   }
 
   std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.config.drain_timeout); }
@@ -260,7 +267,7 @@ class RunningServer final : public Server {
     context->options.read = {config.header_timeout, config.idle_timeout, config.min_read_rate};
     context->options.write_timeout = config.write_timeout;
     context->options.min_rate = config.min_read_rate;
-    context->options.drain_grace = DrainGrace();
+    context->options.drain_grace = config.drain_delay + DrainGrace();
     context->application = &application_;
     context->connections = &frontend_->connections;
     context->transfers = &frontend_->transfers;

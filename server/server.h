@@ -1,7 +1,8 @@
 // The server as one object: start it, request a stop, wait for the end.
 // Threads: a few for the network, and a bounded pool for building tiles. A stop has these steps: /readyz reports
-// "draining", and every connection closes after its next reply. After drain_grace, or when no connection is left, idle
-// connections are closed and no new ones are accepted. Requests that have begun are answered, within drain_timeout.
+// "draining", and every connection closes after its next reply. After drain_delay, and then drain_grace or when no
+// connection is left, idle connections are closed and no new ones are accepted. Requests that have begun are answered,
+// within drain_timeout.
 // Builds are cancelled. Threads are joined.
 #pragma once
 
@@ -30,7 +31,7 @@ struct ServerOptions {
   std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
   std::function<std::string()> cache_problem = {};                // why cache_dir is not used; "": it is; thread-safe
   std::chrono::milliseconds metrics_age{1'000};                   // how long a text of /metrics is reused
-  // How long new requests are still served after a stop; part of drain_timeout.
+  // How long new requests are still served after a stop and drain_delay; part of drain_timeout.
   std::chrono::milliseconds drain_grace{500};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
   // Called on an io thread when one of these signals arrives; must not block.

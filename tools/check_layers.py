@@ -76,7 +76,7 @@ MODULES = {
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
     "server/http": ["engine/core", "server/asio.h", "server/net"],
-    "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive"],
+    "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive", "redis"],
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],

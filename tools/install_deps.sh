@@ -21,8 +21,9 @@ runtime_packages=(
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
-  clang-14 libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3
-  debhelper help2man lintian mkdocs redis-server
+  clang-14 libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3 redis-server
+  prometheus python3-yaml
+  debhelper help2man lintian mkdocs
 )
 
 die() { echo "install_deps: $*" >&2; exit 1; }
@@ -60,15 +61,17 @@ install_packages() {
   # Node from another source is good enough, and Debian's package would remove it.
   if $runtime_only; then :
   elif ! command -v node > /dev/null || ! command -v npm > /dev/null; then wanted+=(nodejs npm); fi
+  # Likewise kubectl.
+  if $with_tests && ! command -v kubectl > /dev/null; then wanted+=(kubernetes-client); fi
   for package in "${wanted[@]}"; do is_installed "$package" || missing+=("$package"); done
   if [[ ${#missing[@]} -eq 0 ]]; then return; fi
   command -v apt-get > /dev/null || die "apt-get not found; on other systems install the counterparts of: ${missing[*]}"
   refresh_package_lists
   echo "install_deps: apt-get install ${missing[*]}"
   as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
-  # The tests start their own nginx and Redis; the services on ports 80 and 6379 are not wanted.
+  # The tests start their own nginx and Redis, and of Prometheus they take promtool; the services are not wanted.
   local service
-  for service in nginx:nginx-light redis-server:redis-server; do
+  for service in nginx:nginx-light redis-server:redis-server prometheus:prometheus; do
     if [[ " ${missing[*]} " == *" ${service#*:} "* && -d /run/systemd/system ]]; then
       as_root systemctl disable --quiet --now "${service%%:*}" || true
     fi
@@ -115,4 +118,5 @@ install_node_modules server/viewer
 if $with_tests; then
   install_node_modules tests/e2e
   install_node_modules tests/examples
+  install_node_modules tests/scale
 fi

@@ -113,6 +113,7 @@ std::map<std::string, std::string, std::less<>> Tables() {
   }
   tables["dataset"] = TableOf(DatasetOptionTable(), "", /*has_flags=*/true);
   tables["disk_cache"] = TableOf(DiskCacheOptionTable(), "key of `disk_cache`", /*has_flags=*/false);
+  tables["shared_cache"] = TableOf(SharedCacheOptionTable(), "key of `shared_cache`", /*has_flags=*/false);
   tables["imagery"] = TableOf(ImageryOptionTable(), "key of `imagery`", /*has_flags=*/false);
   tables["source"] = TableOf(SourceOptionTable(), "key of a source", /*has_flags=*/false);
   tables["token"] = TableOf(TokenOptionTable(), "key of a token", /*has_flags=*/false);

@@ -67,6 +67,8 @@ template void ReadObject(const Json&, const ConfigLocation&, const std::vector<O
 template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<ImageryConfig>>&, ImageryConfig&);
 template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<DiskCacheConfig>>&,
                          DiskCacheConfig&);
+template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<SharedCacheConfig>>&,
+                         SharedCacheConfig&);
 template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<SourceConfig>>&, SourceConfig&);
 template void ReadObject(const Json&, const ConfigLocation&, const std::vector<Option<TokenConfig>>&, TokenConfig&);
 template Json WriteObject(const Config&, const std::vector<Option<Config>>&);
@@ -75,11 +77,13 @@ template Json WriteObject(const ImageryConfig&, const std::vector<Option<Imagery
 template Json WriteObject(const SourceConfig&, const std::vector<Option<SourceConfig>>&);
 template Json WriteObject(const TokenConfig&, const std::vector<Option<TokenConfig>>&);
 template Json WriteObject(const DiskCacheConfig&, const std::vector<Option<DiskCacheConfig>>&);
+template Json WriteObject(const SharedCacheConfig&, const std::vector<Option<SharedCacheConfig>>&);
 template Json ObjectSchema(const std::vector<Option<Config>>&);
 template Json ObjectSchema(const std::vector<Option<DatasetConfig>>&);
 template Json ObjectSchema(const std::vector<Option<ImageryConfig>>&);
 template Json ObjectSchema(const std::vector<Option<SourceConfig>>&);
 template Json ObjectSchema(const std::vector<Option<TokenConfig>>&);
 template Json ObjectSchema(const std::vector<Option<DiskCacheConfig>>&);
+template Json ObjectSchema(const std::vector<Option<SharedCacheConfig>>&);
 
 }  // namespace terrace::config

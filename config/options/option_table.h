@@ -104,6 +104,12 @@ Codec<Config> DiskCacheOption();
 
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();
 
+// shared_cache_option.cc
+// {"url": "redis://cache:6379/0", "timeout_ms": 25, ...}. As a flag: only the URL.
+Codec<Config> SharedCacheOption();
+
+const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable();
+
 // client_options.cc
 // [{"name": "field-team", "sha256": "9f86d0...", "datasets": ["maui"]}]. No flag, because command lines are not secret.
 Codec<Config> TokensCodec();

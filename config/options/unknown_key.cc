@@ -15,13 +15,14 @@ struct Kind {
   std::vector<KnownName> keys;
 };
 
-const std::array<Kind, 8>& Kinds() {
-  static const std::array<Kind, 8> kinds = {
+const std::array<Kind, 9>& Kinds() {
+  static const std::array<Kind, 9> kinds = {
       {{"at the top of the file", KnownNames(ServerOptionTable())},
        {"in an object of \"datasets\"", KnownNames(DatasetOptionTable())},
        {"in an object of a dataset's \"sources\"", KnownNames(SourceOptionTable())},
        {"in a dataset's \"imagery\"", KnownNames(ImageryOptionTable())},
        {"in \"disk_cache\"", KnownNames(DiskCacheOptionTable())},
+       {"in \"shared_cache\"", KnownNames(SharedCacheOptionTable())},
        {"in an object of \"tokens\"", KnownNames(TokenOptionTable())},
        {"in a dataset's \"water\"", {{"mask"}, {"sea_level"}}},
        {"in \"tls\"", {{"certificate"}, {"key"}}}}};

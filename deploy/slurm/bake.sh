@@ -1,19 +1,28 @@
-#!/bin/sh
-# Bakes one archive with an array of jobs, a shard each. From the folder of the configuration:
+#!/bin/bash
+# A bake as a job array: 64 shards, and a last job that checks all files and writes the manifest.
 #
-#   job=$(sbatch --parsable --array=0-7 bake.sh terrace.json europe "$SCRATCH/europe")
-#   sbatch --dependency=afterok:$job bake.sh terrace.json europe "$SCRATCH/europe"
+#   CONFIG=terrace.json DATASET=europe OUT=/scratch/europe deploy/slurm/bake.sh
 #
-# The second command, without --array, checks all files and writes the manifest. A shard that failed or ran out of time
-# goes on when it is submitted again: sbatch --array=3 --export=ALL,SHARDS=8 bake.sh ... Every node must see the folder.
+# Slurm starts the script again for each task of the array. A shard that was ended goes on where it was: sbatch it again.
 #SBATCH --job-name=terrace-bake
+#SBATCH --array=0-63
 #SBATCH --cpus-per-task=8
-#SBATCH --mem=8G
+#SBATCH --mem=12G
 #SBATCH --time=12:00:00
+#SBATCH --requeue
 #SBATCH --signal=TERM@60
-set -eu
-[ $# -eq 3 ] || { echo "usage: bake.sh CONFIG DATASET PLACE" >&2; exit 2; }
-what=--finish
-if [ -n "${SLURM_ARRAY_TASK_ID:-}" ]; then what="--shard $SLURM_ARRAY_TASK_ID/${SHARDS:-$SLURM_ARRAY_TASK_COUNT}"; fi
-# shellcheck disable=SC2086 # two words
-exec "${TERRACE:-terrace}" bake --config "$1" --dataset "$2" --out "$3" --threads "${SLURM_CPUS_PER_TASK:-1}" $what
+set -euo pipefail
+: "${CONFIG:?the configuration with the dataset}" "${DATASET:?its name}" "${OUT:?where the archive goes: a file system of all nodes}"
+terrace=${TERRACE:-terrace}
+
+if [[ -z ${SLURM_JOB_ID:-} ]]; then  # on the login node
+  job=$(sbatch --parsable --export=ALL "$0")
+  exec sbatch --dependency="afterok:$job" --array=0 --export=ALL,FINISH=1 "$0"
+fi
+if [[ -n ${FINISH:-} ]]; then
+  exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --finish
+fi
+shard=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN)) count=$SLURM_ARRAY_TASK_COUNT
+# A task runs once at a time, so a lock is of a run that was ended on another node.
+rm -f "$OUT/bake-$shard-of-$count.lock"
+exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --threads "${SLURM_CPUS_PER_TASK:-1}" --shard "$shard/$count"

@@ -183,4 +183,9 @@ Answer AnswerLive(const Handlers& from, const RequestContext& context);
 Answer AnswerReady(const Handlers& from, const RequestContext& context);
 Answer AnswerMetrics(const Handlers& from, const RequestContext& context);
 
+// GET /version: which program answers, and what it serves, so that operators can compare the nodes of a fleet.
+Answer AnswerVersion(const Handlers& from, const RequestContext& context);
+// {"product","version","build","encoder","libraries":{"GDAL":"3.6.2",...},"datasets":[{"name","version"}]}
+std::string VersionJson(const Catalog& catalog);
+
 }  // namespace terrace::server

@@ -72,13 +72,19 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
   add(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &Stats::misses, 0);
   add(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &Stats::entries, 0);
   add(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files", &Stats::bytes, 0);
-  add(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk failed", &Stats::errors,
-      in_memory);
+  add(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk or the network failed",
+      &Stats::errors, in_memory);
   add(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased", &Stats::damaged,
       in_memory);
   add(kCounter, "terrace_cache_written_total", "Values written", &Stats::written, in_memory);
-  add(kCounter, "terrace_cache_dropped_total", "Values not written, as the disk failed or was behind", &Stats::dropped,
+  add(kCounter, "terrace_cache_dropped_total", "Values not written, as the store failed or was behind", &Stats::dropped,
       in_memory);
+  add(kCounter, "terrace_cache_timeouts_total", "Look-ups that took longer than a store on a network may",
+      &Stats::timeouts, in_memory);
+  add(kCounter, "terrace_cache_skipped_total",
+      "Look-ups that were not made: the store is off, or little would be found", &Stats::skipped, in_memory);
+  add(kCounter, "terrace_cache_switched_off_total", "How often a store on a network was switched off",
+      &Stats::switched_off, in_memory);
   add(kGauge, "terrace_cache_on", "1 while a cache reads and writes, 0 while it is switched off", &Stats::on,
       in_memory);
 }
@@ -100,6 +106,19 @@ prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
     add("measured", counts.measured);
     add("filled", counts.filled);
     add("void", counts.voids);
+  }
+  return family;
+}
+
+prometheus::MetricFamily StoreTimes(const TileService::Stats& tiles, const Metrics::ServerState& state) {
+  prometheus::MetricFamily family;
+  family.name = "terrace_store_read_seconds_total";
+  family.help = "Time of look-ups of tiles in the tiers below memory, found or not";
+  family.type = prometheus::MetricType::Counter;
+  for (std::size_t i = 0; i < std::min(tiles.store_times.size(), state.stores.size()); ++i) {
+    prometheus::ClientMetric& metric = family.metric.emplace_back();
+    metric.label = {{"tier", state.stores[i]->name()}};
+    metric.counter.value = InSeconds(tiles.store_times[i]);
   }
   return family;
 }
@@ -139,6 +158,11 @@ struct Metrics::Families {
           .Name("terrace_tile_build_stage_seconds")
           .Help("Time of each step of a build, waiting for a worker included")
           .Register(registry);
+  prometheus::Histogram& build_time = prometheus::BuildHistogram()
+                                          .Name("terrace_tile_build_seconds")
+                                          .Help("Time of a build, without waiting for a worker")
+                                          .Register(registry)
+                                          .Add({}, Seconds());
   struct Stage {
     std::chrono::microseconds tiler::StageTimes::*time;
     prometheus::Histogram& histogram;
@@ -267,9 +291,12 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr
     case tiler::RefinementUse::kNone:
       break;
   }
+  std::chrono::microseconds in_all{0};
   for (const Families::Stage& stage : families_->each_stage) {
     stage.histogram.Observe(InSeconds((*tile)->times.*stage.time));
+    if (stage.time != &tiler::StageTimes::queue) in_all += (*tile)->times.*stage.time;
   }
+  families_->build_time.Observe(InSeconds(in_all));
 }
 
 void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
@@ -304,6 +331,8 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
   AddCaches(tiers, in_memory, all);
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
+  add(kCounter, "terrace_builds_refused_total", "Tile requests for which the queue had no room", tiles.refused);
+  all.push_back(StoreTimes(tiles, state));
   add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
   add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
   add(kGauge, "terrace_http_connections", "Open connections", state.connections);

@@ -35,7 +35,8 @@ TileService::TileService(TileServiceOptions options, BuildObserver observer)
       cache_(options.cache_bytes),
       stores_(std::move(options.stores)),
       pool_(options.worker_threads, options.queue_length),
-      flights_(pool_) {}
+      flights_(pool_),
+      store_times_(stores_.size()) {}
 
 TileService::~TileService() { Shutdown(); }
 
@@ -61,7 +62,10 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   order.deadline = deadline;
   Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(build), order);
   if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
-  if (!flight.value) co_return tl::unexpected(std::move(flight.value.error()));
+  if (!flight.value) {
+    if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
+    co_return tl::unexpected(std::move(flight.value.error()));
+  }
   const CacheStatus found = (*flight.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
@@ -79,7 +83,10 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
   // An earlier flight may have ended between the look-up in the cache and the start of this one.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
   for (auto store = stores_.begin(); store != stores_.end(); ++store) {
+    const auto begun = Clock::now();
     std::optional<tiler::EncodedTile> kept = (*store)->Find(key);
+    store_times_[static_cast<std::size_t>(store - stores_.begin())].fetch_add(tiler::MicrosecondsSince(begun).count(),
+                                                                              std::memory_order_relaxed);
     if (!kept) continue;
     kept->store = (*store)->name();
     tiler::TilePtr tile = Finish(request, *std::move(kept));
@@ -142,6 +149,8 @@ TileService::Stats TileService::stats() const {
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
   stats.joined = flights_.joined_total();
+  stats.refused = refused_.load(std::memory_order_relaxed);
+  for (const auto& time : store_times_) stats.store_times.emplace_back(time.load(std::memory_order_relaxed));
   stats.queued = pool_.queued();
   stats.in_flight = flights_.in_flight() + pool_.runs();
   stats.cache = cache_.stats();

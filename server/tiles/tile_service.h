@@ -95,6 +95,8 @@ class TileService {
 
   struct Stats {
     std::uint64_t hits = 0, misses = 0, joined = 0;
+    std::uint64_t refused = 0;                           // builds for which the queue had no room
+    std::vector<std::chrono::microseconds> store_times;  // of look-ups in each tier below memory
     std::size_t queued = 0, in_flight = 0;
     tiler::ByteCacheStats cache;
   };
@@ -112,7 +114,8 @@ class TileService {
   const std::vector<std::shared_ptr<tiler::TileStore>> stores_;
   WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;
-  std::atomic<std::uint64_t> hits_{0}, misses_{0};
+  std::atomic<std::uint64_t> hits_{0}, misses_{0}, refused_{0};
+  std::vector<std::atomic<std::int64_t>> store_times_;  // microseconds
 };
 
 }  // namespace terrace::server

@@ -23,7 +23,7 @@ TEST(CheckDatasetName, RefusesOtherCharactersAndLengths) {
 }
 
 TEST(CheckDatasetName, RefusesUrlsOfTheServer) {
-  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics"}) {
+  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics", "version"}) {
     EXPECT_NE(CheckDatasetName(name).find("is a URL of the server itself"), std::string::npos) << name;
   }
 }

@@ -58,6 +58,14 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.cache_bytes = std::size_t{1} << 40;
   config.refinement_cache_bytes = 12'345'678;
   config.disk_cache = {"/srv/cache", std::size_t{1} << 40, 0};
+  config.shared_cache = {"rediss://terrace@redis.example:6380/1",
+                         "/run/password",
+                         "/etc/ca.pem",
+                         7,
+                         0.5,
+                         0,
+                         std::chrono::milliseconds(1'500),
+                         250};
   config.gdal_cache_bytes = 1'000'000;
   config.data_roots = {"/data", "/srv/dems"};
   config.allowed_prefixes = {"/vsis3/bucket/"};
@@ -80,6 +88,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   config.header_timeout = std::chrono::milliseconds(1'234);
   config.idle_timeout = std::chrono::milliseconds(3'600'000);
   config.write_timeout = std::chrono::milliseconds(999);
+  config.drain_delay = std::chrono::milliseconds(1'500);
   config.drain_timeout = std::chrono::milliseconds(0);
   config.log_level = LogLevel::kOff;
   config.log_format = LogFormat::kJson;
@@ -100,6 +109,7 @@ TEST(ToJson, NamesEveryOption) {
   dataset.imagery.image = "/data/photo.tif";
   dataset.baked = "/data/baked";
   config.disk_cache.directory = "/srv/cache";
+  config.shared_cache.url = "redis://redis.example";
   config.datasets = {dataset};
   config.tls = {"/etc/server.pem", "/etc/server.key"};
   config.data_roots = {"/data"};

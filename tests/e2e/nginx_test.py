@@ -79,7 +79,9 @@ class Proxied(unittest.TestCase):
         subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
                         "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", certificates / "tls.key", "-out",
                         certificates / "tls.crt"], check=True, stderr=subprocess.DEVNULL)
-        values = {"TERRACE_UPSTREAM": f"127.0.0.1:{cls.terrace_port}", "TERRACE_HTTP_PORT": str(cls.http_port),
+        nodes = (SOURCE_DIR / "docker/nodes.conf").read_text().replace("terrace:8080", f"127.0.0.1:{cls.terrace_port}")
+        (cls.folder / "nodes.conf").write_text(nodes)
+        values = {"TERRACE_NODES": str(cls.folder / "nodes.conf"), "TERRACE_HTTP_PORT": str(cls.http_port),
                   "TERRACE_HTTPS_PORT": str(cls.port), "TERRACE_CERTIFICATES": str(certificates), "TERRACE_CACHE": str(cls.folder / "cache")}
         filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: values[match[1]], TEMPLATE.read_text())
         # The rest of the configuration is like nginx.conf of the image, but in a temporary folder.

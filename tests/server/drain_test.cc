@@ -120,6 +120,28 @@ TEST_F(Drain, AnswersARequestWhoseFirstHalfCameInTheGrace) {
   EXPECT_TRUE(server_->Wait());
 }
 
+TEST_F(Drain, ServesThroughTheDelayAlsoWithoutAConnection) {
+  ServerOptions options;
+  options.config.drain_delay = 1s;
+  options.drain_grace = 0ms;
+  Start(options);
+  RawClient idle(port());
+  idle.Send(Get("/livez"));
+  ASSERT_TRUE(idle.Read());
+  const std::uint16_t port_then = port();
+  const auto begun = std::chrono::steady_clock::now();
+  server_->RequestStop();
+  WaitUntilDraining(port_then);
+  ASSERT_TRUE(idle.Send(Get("/livez"))) << "idle connections stay open";
+  EXPECT_TRUE(idle.Read());
+  EXPECT_TRUE(idle.Ended());
+  int answers = 0;
+  while (Fetch(port_then, "/maui/0/0/0.terrain").status == 200) ++answers;
+  EXPECT_GT(answers, 0);
+  EXPECT_TRUE(server_->Wait());
+  EXPECT_GE(std::chrono::steady_clock::now() - begun, 1s);
+}
+
 TEST_F(Drain, ClosesIdleConnectionsAfterTheGraceAndTakesNoNewOnes) {
   Start();
   RawClient idle(port());

@@ -289,13 +289,21 @@ TEST_F(Limits, ShowsDatasetsToWhomTheyBelong) {
     const char* target;
     int anonymous, oahu, all;
   } cases[] = {
-      {"/maui/layer.json", 401, 403, 200}, {"/maui/0/0/0.terrain", 401, 403, 200},
-      {"/oahu/layer.json", 401, 200, 200}, {"/oahu/0/0/0.glb", 401, 200, 200},
-      {"/open/layer.json", 200, 200, 200}, {"/open/0/0/0.terrain", 200, 200, 200},
-      {"/nope/layer.json", 401, 403, 404}, {"/metrics", 401, 403, 200},
-      {"/datasets", 200, 200, 200},        {"/", 200, 200, 200},
-      {"/livez", 200, 200, 200},           {"/maui/tileset.json", 401, 403, 200},
-      {"/maui/tiles.json", 401, 403, 200}, {"/maui/heights?locations=1,2", 401, 403, 503},
+      {"/maui/layer.json", 401, 403, 200},
+      {"/maui/0/0/0.terrain", 401, 403, 200},
+      {"/oahu/layer.json", 401, 200, 200},
+      {"/oahu/0/0/0.glb", 401, 200, 200},
+      {"/open/layer.json", 200, 200, 200},
+      {"/open/0/0/0.terrain", 200, 200, 200},
+      {"/nope/layer.json", 401, 403, 404},
+      {"/metrics", 401, 403, 200},
+      {"/version", 401, 403, 200},
+      {"/datasets", 200, 200, 200},
+      {"/", 200, 200, 200},
+      {"/livez", 200, 200, 200},
+      {"/maui/tileset.json", 401, 403, 200},
+      {"/maui/tiles.json", 401, 403, 200},
+      {"/maui/heights?locations=1,2", 401, 403, 503},
   };
   for (const auto& c : cases) {
     const std::string target = c.target;

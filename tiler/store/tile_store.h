@@ -49,6 +49,9 @@ struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
   std::uint64_t written = 0;
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
   bool on = false;            // both reading and writing
+  // Of a store on a network: look-ups that took too long, look-ups that were not made because it was switched off or
+  // because little of their kind is found, and how often it was switched off.
+  std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;
 };
 
 class StoreBase {

@@ -10,6 +10,7 @@
 #include "server/cli/common/command.h"
 #include "server/cli/common/source_files.h"
 #include "server/server.h"
+#include "server/store/shared_cache.h"
 
 namespace terrace::cli {
 
@@ -32,6 +33,7 @@ int CheckStart(const config::Config& config, const config::Config& served,
       note(MakeError(folder.error().code, "disk_cache: {}", folder.error().message));
     }
   }
+  if (!config.shared_cache.url.empty()) note(server::CheckSharedCache(config.shared_cache));
   if (!descriptors) errors.push_back(descriptors.error());
   if (tries_address) note(server::Server::CheckAddress(served));
   const Result<void> policy =

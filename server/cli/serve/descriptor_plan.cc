@@ -12,6 +12,9 @@
 namespace terrace::cli {
 namespace {
 
+// Besides those for look-ups: for writing, for a purge, and one that is being tried.
+constexpr std::size_t kOtherSharedConnections = 3;
+
 bool HasVrt(const config::DatasetConfig& dataset) {
   const auto is_vrt = [](const std::string& file) { return file.ends_with(".vrt") || file.ends_with(".VRT"); };
   return is_vrt(dataset.imagery.image) || is_vrt(dataset.water.mask) ||
@@ -23,8 +26,8 @@ bool HasVrt(const config::DatasetConfig& dataset) {
 server::DescriptorDemand DemandOf(const config::Config& config) {
   server::DescriptorDemand demand;
   demand.io_threads = config.io_threads;
-  demand.worker_threads =
-      config.worker_threads > 0 ? config.worker_threads : std::max(1u, std::thread::hardware_concurrency());
+  demand.worker_threads = WorkerThreads(config);
+  if (!config.shared_cache.url.empty()) demand.shared_cache = demand.worker_threads + kOtherSharedConnections;
   demand.access_log_file = !config.access_log_file.empty();
   demand.open_sources = config.max_open_sources;
   demand.has_vrts = std::ranges::any_of(config.datasets, HasVrt);
@@ -43,6 +46,10 @@ server::DescriptorDemand DemandOf(const config::Config& config) {
 }
 
 }  // namespace
+
+unsigned WorkerThreads(const config::Config& config) {
+  return config.worker_threads > 0 ? config.worker_threads : std::max(1u, std::thread::hardware_concurrency());
+}
 
 Result<server::DescriptorBudget> PlanDescriptors(const config::Config& config) {
   const std::size_t limit = server::RaiseDescriptorLimit();

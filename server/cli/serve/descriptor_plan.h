@@ -7,6 +7,9 @@
 
 namespace terrace::cli {
 
+// The number of workers that the configuration gives: as many as the machine has processors, if it gives none.
+unsigned WorkerThreads(const config::Config& config);
+
 // Raises the limit on open files as far as permitted. kUnavailable: the limit is too low. Call before the server opens
 // files.
 Result<server::DescriptorBudget> PlanDescriptors(const config::Config& config);

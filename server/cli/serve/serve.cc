@@ -46,6 +46,7 @@
 #include "server/server.h"
 #include "server/store/baked_store.h"
 #include "server/store/disk_cache.h"
+#include "server/store/shared_cache.h"
 #include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
@@ -218,7 +219,7 @@ config::Config WithViewer(config::Config config) {
   return config;
 }
 
-// The time that stopping may take beyond the drain timeout.
+// The time that stopping may take beyond the delay and timeout of the drain.
 constexpr std::chrono::seconds kStopTime{1};
 
 // Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
@@ -311,6 +312,11 @@ int Serve(const ServeArguments& arguments) {
   const auto baked = std::make_shared<server::BakedStore>();
   options.tile_stores.push_back(baked);
   if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
+  if (!config.shared_cache.url.empty()) {
+    auto shared = server::OpenSharedCache(config.shared_cache, WorkerThreads(config));
+    if (!shared) return Fail(shared.error());
+    options.tile_stores.push_back(*std::move(shared));
+  }
   options.refinements =
       std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
   const auto refinements = options.refinements;
@@ -323,7 +329,7 @@ int Serve(const ServeArguments& arguments) {
     reloader->Reload();
   };
   std::stop_source stop_opening;
-  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_timeout + kStopTime] {
+  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_delay + config.drain_timeout + kStopTime] {
     watchdog.Begin(limit);
     stop_opening.request_stop();
     NotifyStopping();

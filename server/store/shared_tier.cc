@@ -1,0 +1,341 @@
+#include "server/store/shared_tier.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "tiler/store/tile_record.h"
+
+namespace terrace::server {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kWriteTimeout{1'000}, kLastWrites{500};
+constexpr milliseconds kReportAgain{60'000};
+constexpr std::size_t kBatchBytes = std::size_t{1} << 20, kBatchValues = 64;
+constexpr std::size_t kChecksumBytes = 8;
+
+bool IsTimeout(const Error& error) { return error.message.find("in time") != std::string::npos; }
+
+// Key names are bytes; a pattern takes some of them for wildcards.
+std::string PatternOf(std::string_view prefix) {
+  std::string pattern;
+  for (const char c : prefix) {
+    if (c == '*' || c == '?' || c == '[' || c == ']' || c == '\\') pattern += '\\';
+    pattern += c;
+  }
+  return pattern + '*';
+}
+
+std::string NameOf(std::string_view key) { return "terrace:tile:" + std::string(key); }
+std::string LeaseOf(std::string_view key) { return "terrace:lease:" + std::string(key); }
+
+}  // namespace
+
+SharedTier::SharedTier(SharedTierOptions options) : options_(std::move(options)), thread_([this] { Run(); }) {}
+
+SharedTier::~SharedTier() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+    changed_.notify_all();
+  }
+  thread_.join();
+}
+
+void SharedTier::Abandon() {
+  const std::lock_guard lock(mutex_);
+  abandoned_ = true;
+  dropped_ += queue_.size();
+  queue_.clear();
+  queued_bytes_ = 0;
+}
+
+Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout) const {
+  redis::ConnectionOptions options;
+  options.connect_timeout = kWriteTimeout;
+  options.command_timeout = command_timeout;
+  options.ca_file = options_.ca_file;
+  options.max_reply_bytes = options_.max_value_bytes + 4096;
+  return redis::Connection::Open(options_.address, options);
+}
+
+SharedTier::ConnectionPtr SharedTier::Borrow(std::uint64_t& epoch) {
+  const std::lock_guard lock(mutex_);
+  epoch = epoch_;
+  if (!on_) return nullptr;
+  if (idle_.empty()) return nullptr;
+  ConnectionPtr connection = std::move(idle_.back());
+  idle_.pop_back();
+  return connection;
+}
+
+void SharedTier::GiveBack(ConnectionPtr connection, std::uint64_t epoch) {
+  const std::lock_guard lock(mutex_);
+  if (epoch == epoch_) idle_.push_back(std::move(connection));
+}
+
+void SharedTier::SwitchOff(const std::string& why, bool is_timeout) {
+  ++errors_;
+  if (is_timeout) ++timeouts_;
+  std::vector<ConnectionPtr> gone;  // closed after the lock is released
+  const std::lock_guard lock(mutex_);
+  if (!on_) return;  // another caller has seen the same failure
+  on_ = false;
+  ++epoch_;
+  ++switched_off_;
+  gone.swap(idle_);
+  open_ = 0;
+  retry_at_ = Clock::now() + kRetryAfter;
+  Report(why, /*is_off=*/true);
+  changed_.notify_all();
+}
+
+// `mutex_` is held. A Redis that fails every second makes a line a minute.
+void SharedTier::Report(const std::string& why, bool is_off) {
+  const auto now = Clock::now();
+  if (why == reported_ && now - reported_at_ < kReportAgain) return;
+  reported_ = why;
+  reported_at_ = now;
+  if (is_off) {
+    spdlog::warn("shared cache: {}; it is switched off until Redis answers, tiles are built meanwhile", why);
+  } else {
+    spdlog::warn("shared cache: {}; nothing is written until it does, values are read", why);
+  }
+}
+
+std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
+  std::uint64_t epoch = 0;
+  ConnectionPtr connection = Borrow(epoch);
+  if (!connection) {
+    ++skipped_;
+    return std::nullopt;
+  }
+  Result<std::vector<redis::Reply>> replies = connection->CallAll(std::span(&command, 1));
+  if (!replies) {
+    SwitchOff(replies.error().message, IsTimeout(replies.error()));
+    return std::nullopt;
+  }
+  redis::Reply reply = std::move(replies->front());
+  // Something of another type at the key is a value that is wrong. After any other refusal Redis is of no use.
+  if (reply.is_error() && !reply.text().starts_with("WRONGTYPE")) {
+    SwitchOff(connection->Refusal(command.front(), reply).message, /*is_timeout=*/false);
+    return std::nullopt;
+  }
+  GiveBack(std::move(connection), epoch);
+  return reply;
+}
+
+std::optional<std::string> SharedTier::Find(const std::string& key) {
+  // A value of any length is answered with at most this many bytes; a longer one fails its checksum.
+  const std::optional<redis::Reply> reply =
+      Ask({"GETRANGE", NameOf(key), "0", std::to_string(options_.max_value_bytes + kChecksumBytes)});
+  if (!reply) return std::nullopt;
+  if (reply->kind() == redis::ReplyView::Kind::kText && reply->text().empty()) {  // GETRANGE of nothing
+    ++misses_;
+    return std::nullopt;
+  }
+  if (reply->kind() == redis::ReplyView::Kind::kText) {
+    if (const auto value = tiler::StripChecksum(key, reply->text())) {
+      ++hits_;
+      return std::string(*value);
+    }
+  }
+  Forget(key);
+  return std::nullopt;
+}
+
+void SharedTier::Forget(const std::string& key) {
+  ++damaged_;
+  Enqueue({NameOf(key), nullptr, {}, 0});
+}
+
+void SharedTier::Keep(std::string key, std::function<std::string()> value, std::size_t charge) {
+  std::string name = NameOf(key);
+  Enqueue({std::move(name), std::move(value), std::move(key), charge});
+}
+
+void SharedTier::Enqueue(Job job) {
+  job.charge += job.name.size() + job.key.size() + sizeof(Job);
+  const std::lock_guard lock(mutex_);
+  if (abandoned_ || stop_ || !on_ || queued_bytes_ + job.charge > options_.queue_bytes) {
+    if (job.value) ++dropped_;
+    return;
+  }
+  queued_bytes_ += job.charge;
+  queue_.push_back(std::move(job));
+  changed_.notify_all();
+}
+
+SharedTier::Lease SharedTier::Take(const std::string& key, milliseconds time) {
+  const auto reply = Ask({"SET", LeaseOf(key), "1", "NX", "PX", std::to_string(time.count())});
+  if (!reply) return Lease::kNone;
+  return reply->is_nil() ? Lease::kHeld : Lease::kTaken;
+}
+
+void SharedTier::Release(const std::string& key) { Enqueue({LeaseOf(key), nullptr, {}, 0}); }
+
+Result<std::size_t> SharedTier::Erase(const std::string& prefix,
+                                      const std::function<bool(std::string_view key)>& is_chosen,
+                                      const std::stop_token& stop) {
+  std::size_t erased = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    std::erase_if(queue_, [&](const Job& job) {
+      if (!job.value || !job.key.starts_with(prefix) || !is_chosen(job.key)) return false;
+      queued_bytes_ -= job.charge;
+      ++erased;
+      return true;
+    });
+  }
+  const Result<ConnectionPtr> connection = Open(kWriteTimeout);
+  if (!connection) return tl::unexpected(connection.error());
+  std::string cursor = "0";
+  do {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped while the shared cache was purged");
+    const auto page = (*connection)->Call({"SCAN", cursor, "MATCH", PatternOf(NameOf(prefix)), "COUNT", "1000"});
+    if (!page) return tl::unexpected(page.error());
+    redis::Command unlink = {"UNLINK"};
+    for (std::size_t i = 0; i < (*page)[1].size(); ++i) {
+      const std::string_view name = (*page)[1][i].text();
+      const std::size_t first = NameOf("").size();
+      if (name.starts_with(NameOf(prefix)) && is_chosen(name.substr(first))) unlink.emplace_back(name);
+    }
+    if (unlink.size() > 1) {
+      const auto gone = (*connection)->Call(unlink);
+      if (!gone) return tl::unexpected(gone.error());
+      erased += static_cast<std::size_t>(std::max<std::int64_t>(gone->integer(), 0));
+    }
+    cursor = (*page)[0].text();
+  } while (cursor != "0" && !cursor.empty());
+  return erased;
+}
+
+void SharedTier::Run() {
+  std::unique_lock lock(mutex_);
+  Clock::time_point end = Clock::time_point::max();
+  while (true) {
+    if (stop_) {
+      if (end == Clock::time_point::max()) end = Clock::now() + kLastWrites;
+      if (!on_ || queue_.empty() || write_at_ >= end || Clock::now() >= end) break;
+    }
+    const bool connects = open_ < options_.readers && Clock::now() >= retry_at_;
+    const bool writes = on_ && !queue_.empty() && Clock::now() >= write_at_;
+    if (!connects && !writes) {
+      Clock::time_point next = Clock::now() + kReportAgain;
+      if (open_ < options_.readers) next = retry_at_;
+      if (on_ && !queue_.empty()) next = std::min(next, write_at_);
+      changed_.wait_until(lock, std::min(next, end));
+      continue;
+    }
+    lock.unlock();
+    if (connects) Connect();
+    if (writes) Write();
+    lock.lock();
+  }
+  dropped_ += queue_.size();
+}
+
+// Opens one connection for look-ups. One that answers in time switches the store on.
+void SharedTier::Connect() {
+  std::uint64_t epoch = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    epoch = epoch_;
+  }
+  Result<ConnectionPtr> connection = Open(options_.timeout);
+  Result<redis::Reply> pong = connection ? (*connection)->Call({"PING"}) : tl::unexpected(connection.error());
+  const std::lock_guard lock(mutex_);
+  if (!pong) {
+    retry_at_ = Clock::now() + kRetryAfter;
+    if (!on_) Report(pong.error().message, /*is_off=*/true);
+    return;  // those that are open may go on
+  }
+  if (epoch != epoch_) return;
+  if (!on_) {
+    on_ = true;
+    writer_ = nullptr;  // of the time before
+    spdlog::info("shared cache: {} answers", options_.address.Text());
+    reported_.clear();
+  }
+  ++open_;
+  idle_.push_back(*std::move(connection));
+}
+
+void SharedTier::RefuseWrites(const std::string& why) {
+  const std::lock_guard lock(mutex_);
+  write_at_ = Clock::now() + kRetryAfter;
+  Report(why, /*is_off=*/false);
+}
+
+// One batch, in one round trip.
+void SharedTier::Write() {
+  std::list<Job> jobs;
+  {
+    const std::lock_guard lock(mutex_);
+    std::size_t bytes = 0;
+    while (!queue_.empty() && jobs.size() < kBatchValues && bytes < kBatchBytes) {
+      bytes += queue_.front().charge;
+      jobs.splice(jobs.end(), queue_, queue_.begin());
+    }
+    queued_bytes_ -= bytes;
+  }
+  const auto values =
+      static_cast<std::uint64_t>(std::ranges::count_if(jobs, [](const Job& job) { return !!job.value; }));
+  if (!writer_ || !writer_->is_open()) {
+    Result<ConnectionPtr> opened = Open(kWriteTimeout);
+    if (!opened) {
+      dropped_ += values;
+      return SwitchOff(opened.error().message, IsTimeout(opened.error()));
+    }
+    writer_ = *std::move(opened);
+  }
+  std::vector<redis::Command> commands;
+  for (const Job& job : jobs) {
+    if (!job.value) {
+      commands.push_back({"UNLINK", job.name});
+      continue;
+    }
+    commands.push_back({"SET", job.name, tiler::AddChecksum(job.key, job.value())});
+    if (options_.ttl.count() > 0) {
+      commands.back().insert(commands.back().end(), {"EX", std::to_string(options_.ttl.count())});
+    }
+  }
+  const Result<std::vector<redis::Reply>> replies = writer_->CallAll(commands);
+  if (!replies) {
+    dropped_ += values;
+    return SwitchOff(replies.error().message, IsTimeout(replies.error()));
+  }
+  std::string refused;
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const bool is_value = commands[i].front() == "SET";
+    if ((*replies)[i].is_error()) {
+      ++errors_;
+      if (is_value) ++dropped_;
+      refused = writer_->Refusal(commands[i].front(), (*replies)[i]).message;
+    } else if (is_value) {
+      ++written_;
+    }
+  }
+  if (!refused.empty()) RefuseWrites(refused);
+}
+
+tiler::StoreStats SharedTier::stats() const {
+  tiler::StoreStats stats;
+  stats.hits = hits_;
+  stats.misses = misses_;
+  stats.errors = errors_;
+  stats.damaged = damaged_;
+  stats.written = written_;
+  stats.dropped = dropped_;
+  stats.timeouts = timeouts_;
+  stats.skipped = skipped_;
+  stats.switched_off = switched_off_;
+  const std::lock_guard lock(mutex_);
+  stats.on = on_ && Clock::now() >= write_at_;
+  return stats;
+}
+
+}  // namespace terrace::server

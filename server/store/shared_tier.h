@@ -1,0 +1,120 @@
+// A key-value store that several servers share: a Redis that may be slow, full, stopped or wrong. Nothing waits for it
+// longer than one time-out, and nothing depends on it.
+//
+// Thread-safe. Find blocks for at most one time-out, on a connection that is open already. Opening connections,
+// writing, and trying again are the work of a thread of the store. After a time-out, or another failure of a
+// connection, the store is switched off for kRetryAfter, and then until a connection opens and answers within the
+// time-out: meanwhile Find returns at once. So a failing Redis delays the look-ups that were under way, one for each
+// caller, and no others. Log and statistics report it. All keys begin with "terrace:" in Redis, so that a user's rights
+// can be limited to them.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "redis/connection.h"
+#include "tiler/store/tile_store.h"
+
+namespace terrace::server {
+
+struct SharedTierOptions {
+  redis::Address address;
+  std::string ca_file;                             // redis::ConnectionOptions
+  std::chrono::milliseconds timeout{25};           // of a look-up
+  std::chrono::seconds ttl{0};                     // of a value; 0: none
+  std::size_t max_value_bytes = 0;                 // larger ones are neither sent nor fetched
+  std::size_t readers = 1;                         // connections for look-ups: how many run at a time
+  std::size_t queue_bytes = std::size_t{8} << 20;  // memory of values that wait to be written; more are dropped
+};
+
+class SharedTier {
+ public:
+  // Returns at once. A Redis that cannot be reached is no error: the store is switched off until it can.
+  explicit SharedTier(SharedTierOptions options);
+  // Writes waiting values, unless Redis fails or this takes longer than half a second.
+  ~SharedTier();
+
+  void Abandon();
+
+  // Returns nothing if the value is absent, too large or damaged, if Redis failed, or if the store is switched off.
+  std::optional<std::string> Find(const std::string& key);
+
+  // `value` is called on the store's thread. `charge`: about the memory that it holds until then.
+  void Keep(std::string key, std::function<std::string()> value, std::size_t charge);
+  // Removes a value that Find returned and that could not be parsed.
+  void Forget(const std::string& key);
+
+  // Takes the lease of a key for `time`, unless somebody else has it. kHeld: wait, and look again. kNone: the store is
+  // switched off, so nobody is to be waited for. Let go of it with Release, or by the time.
+  enum class Lease { kTaken, kHeld, kNone };
+  Lease Take(const std::string& key, std::chrono::milliseconds time);
+  void Release(const std::string& key);
+
+  // Erases the values whose keys begin with `prefix` and that `is_chosen` accepts, also those that wait to be written.
+  // Blocks. Returns their number. kUnavailable: Redis failed, values may be left. kCancelled.
+  Result<std::size_t> Erase(const std::string& prefix, const std::function<bool(std::string_view key)>& is_chosen,
+                            const std::stop_token& stop);
+
+  tiler::StoreStats stats() const;
+
+  static constexpr std::chrono::milliseconds kRetryAfter{1'000};
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  using ConnectionPtr = std::unique_ptr<redis::Connection>;
+  struct Job {
+    std::string name;                    // of the key, or of its lease, in Redis
+    std::function<std::string()> value;  // empty: erase
+    std::string key = {};                // of a value
+    std::size_t charge = 0;
+  };
+
+  Result<ConnectionPtr> Open(std::chrono::milliseconds command_timeout) const;
+  // A command that a caller waits for. Nothing: the store is or was just switched off.
+  std::optional<redis::Reply> Ask(const redis::Command& command);
+  ConnectionPtr Borrow(std::uint64_t& epoch);
+  void GiveBack(ConnectionPtr connection, std::uint64_t epoch);
+  void SwitchOff(const std::string& why, bool is_timeout);
+  void Enqueue(Job job);
+
+  // Of the store's thread.
+  void Run();
+  void Connect();
+  void Write();
+  void RefuseWrites(const std::string& why);
+  void Report(const std::string& why, bool is_off);
+
+  const SharedTierOptions options_;
+  mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
+  std::condition_variable changed_;
+  bool on_ = false;
+  std::uint64_t epoch_ = 0;          // counts how often it was switched off: connections of an earlier one are closed
+  std::vector<ConnectionPtr> idle_;  // for look-ups
+  std::size_t open_ = 0;             // idle or borrowed, of this epoch
+  Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt to connect, to write
+  std::list<Job> queue_;
+  std::size_t queued_bytes_ = 0;
+  bool stop_ = false, abandoned_ = false;
+  std::string reported_;  // the last reason in the log, and when
+  Clock::time_point reported_at_;
+
+  ConnectionPtr writer_;  // of the store's thread
+  std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0}, damaged_{0}, written_{0}, dropped_{0};
+  std::atomic<std::uint64_t> timeouts_{0}, skipped_{0}, switched_off_{0};
+  std::thread thread_;
+};
+
+}  // namespace terrace::server
