@@ -143,9 +143,9 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   Result<ReplayedMesh> replayed = ReplayMesh(source, lattice, refinement, mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());
   double error_m = replayed->error_m;
-  const auto replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+  const auto replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
   Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), lattice, steps, error_m, stop);
-  if (meshed) meshed->replayed = replayed;
+  if (meshed) meshed->replayed = replay_time;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
   error_m = wanted_error_m;
