@@ -29,7 +29,7 @@ CONFIG = ["config/common", "config/config.h", "config/input", "config/options", 
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
-       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
+       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/edits", "engine/dem/image"]
 # Headers below a module that count as that module's own: every module that may include it may include these.
 PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
     "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
@@ -87,7 +87,7 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|proto/.*\.cc|archive/.*\.cc|bake/.*\.cc|server/.*\.cc)"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/dem/edits/|proto/.*\.cc|archive/.*\.cc|bake/.*\.cc|server/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"proto/.*\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
