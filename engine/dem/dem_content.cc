@@ -28,7 +28,8 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
       hasher.AddText({reinterpret_cast<const char*>(closed.data()), closed.size()});
     }
   }
-  for (const std::size_t edit : impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top))) {
+  for (const std::size_t edit :
+       impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top))) {
     hasher.Add(impl_->edits->edits()[edit].hash);
   }
   // The floor in the datum of a source (ReadInSourceDatum) comes from the last raster grid with a geoid.

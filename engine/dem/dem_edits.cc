@@ -20,9 +20,8 @@ namespace {
 bool Meets(const Box& box, const GeoBounds& bounds) {
   const double east = bounds.west > bounds.east ? bounds.east + 360 : bounds.east;
   if (box.north < bounds.south || box.south > bounds.north) return false;
-  return std::ranges::any_of(std::array{-360.0, 0.0, 360.0}, [&](double turn) {
-    return box.east + turn >= bounds.west && box.west + turn <= east;
-  });
+  return std::ranges::any_of(std::array{-360.0, 0.0, 360.0},
+                             [&](double turn) { return box.east + turn >= bounds.west && box.west + turn <= east; });
 }
 
 GeoPosition MiddleOf(const Edit& edit) { return {edit.plane.longitude, edit.plane.latitude}; }
@@ -86,9 +85,10 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
     if (options.stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     if (!Meets(edit.reach, info.bounds)) {
       const bool is_swapped = Meets(Swapped(edit.reach), info.bounds);
-      faults.push_back(FaultOf(edit, fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}",
-                                                 info.bounds.south, info.bounds.north, info.bounds.west, info.bounds.east,
-                                                 is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "")));
+      faults.push_back(
+          FaultOf(edit, fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}",
+                                    info.bounds.south, info.bounds.north, info.bounds.west, info.bounds.east,
+                                    is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "")));
       continue;
     }
     if (edit.op == EditOp::kFlatten && edit.flat != FlatHeight::kGiven) {
@@ -251,9 +251,8 @@ Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, He
   for (std::size_t k = 0; k < at.size(); ++k) {
     float& height = heights[edited[k]];
     const double before = static_cast<double>(above.empty() ? height : above[k]);
-    const double after = edits->ApplyAt(at[k], which[k], before, [&](const Edit& edit) {
-      return static_cast<double>((*others[edit.replacement])[k]);
-    });
+    const double after = edits->ApplyAt(
+        at[k], which[k], before, [&](const Edit& edit) { return static_cast<double>((*others[edit.replacement])[k]); });
     if (above.empty()) {
       height = static_cast<float>(after);
     } else if (!(after == before)) {
@@ -368,8 +367,8 @@ std::vector<EditOutline> DemSource::Edits() const {
     for (const auto& ring : edit.rings) {
       auto& line = outline.lines.emplace_back();
       for (const PlanPoint point : ring) {
-        line.push_back({edit.plane.longitude + point.x / edit.plane.east_m,
-                        edit.plane.latitude + point.y / edit.plane.north_m});
+        line.push_back(
+            {edit.plane.longitude + point.x / edit.plane.east_m, edit.plane.latitude + point.y / edit.plane.north_m});
       }
       if (edit.is_area) line.push_back(line.front());
     }

@@ -83,8 +83,8 @@ class DemSource {
   //
   // What the edits ask of the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
-  // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits. `EditsOfMercator`:
-  // of pixels as ReadMercator has them. Cheap after the first call for a tile.
+  // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits.
+  // `EditsOfMercator`: of pixels as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsOf(const geo::TileKey& key) const;
   std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
   std::vector<EditOutline> Edits() const;

@@ -189,8 +189,8 @@ struct EditOutline {
   std::vector<std::vector<GeoPosition>> lines;  // closed rings repeat the first position
 };
 
-// What edits ask of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is empty
-// if they ask nothing of it. Depends on the nodes' positions and their level alone.
+// What edits ask of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is
+// empty if they ask nothing of it. Depends on the nodes' positions and their level alone.
 struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
   std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`

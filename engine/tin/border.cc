@@ -114,7 +114,8 @@ Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, co
     const double padded = misfit + options.padding_m;
     const double weighted = std::max(padded * options.weight, padded + options.step_m);
     const int x = edge.along_x ? k : edge.across, y = edge.along_x ? edge.across : k;
-    const std::size_t sample = static_cast<std::size_t>(y) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(x);
+    const std::size_t sample =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(x);
     const double error = options.scale * limits.Counted(sample, std::min(weighted, kMaxBorderWeight * misfit));
     if (error > worst.error) worst = {error, edge.SampleAt(k)};
   }

@@ -402,9 +402,8 @@ Candidate GreedyTriangulation::Impl::WorstOnBorder(VertexId from, VertexId to) {
   BorderWorst& known = border_worst_[side][static_cast<std::size_t>(begin)];
   if (const auto edge_end = static_cast<std::uint32_t>(end); known.end != edge_end) {
     const BorderOptions& border = options_.borders[side];
-    const Candidate worst = options_.limits.empty()
-                                ? WorstBorderSample(*field_, a, b, border)
-                                : WorstLimitedBorderSample(*field_, a, b, border, options_.limits);
+    const Candidate worst = options_.limits.empty() ? WorstBorderSample(*field_, a, b, border)
+                                                    : WorstLimitedBorderSample(*field_, a, b, border, options_.limits);
     known = {worst.error, worst.sample, edge_end};
   }
   return {known.error, known.sample};

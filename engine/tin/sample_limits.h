@@ -1,7 +1,7 @@
 // Limits of the error that differ from sample to sample: precision by place, and features that are inserted first.
 //
-// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5. An error e of a
-// sample counts as
+// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5. An error e of
+// a sample counts as
 //   weight e           while e <= cap,
 //   weight e 2^34      above: every cap in metres precedes every error of a run (below 2^34 times the smallest cap),
 //   max(e, 1) 2^40     if the sample is forced, whatever its error is.

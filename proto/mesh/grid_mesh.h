@@ -78,8 +78,9 @@ struct GridMesh {
 // rim has the normals of the edge, so that a skirt is lit like the ground above it.
 //
 // Triangles with two equal corners are left out. Where points coincide, as in a pole's row, edges collapse in both
-// neighbours and the surface stays closed. `left_out`: triangles in holes, 1, by triangle, or empty; no skirt hangs from
-// them. If all are left out, the skirt of one edge of the rim is left, because decoders expect a triangle. `points` and `normals` have one entry per vertex.
+// neighbours and the surface stays closed. `left_out`: triangles in holes, 1, by triangle, or empty; no skirt hangs
+// from them. If all are left out, the skirt of one edge of the rim is left, because decoders expect a triangle.
+// `points` and `normals` have one entry per vertex.
 GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
                       const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
                       const std::vector<std::uint8_t>& left_out = {});

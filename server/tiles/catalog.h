@@ -29,8 +29,8 @@ struct DatasetView {
   std::string attribution;
   double error_fraction = geo::kDefaultErrorFraction;
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
-  std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
-  std::uint64_t unedited_generation = 0;                    // as of tiler::Dataset
+  std::uint64_t generation = 0;           // changes whenever the bytes of its tiles may change
+  std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
   // tiler::TileEdits. Empty: there are no edits.
   std::function<std::uint64_t(const tiler::TileRequest&)> edits_of = {};
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last

@@ -133,11 +133,13 @@ TEST_F(Edits, LeaveEdgesOfNeighboursEqual) {
           for (const auto& [at, tile] : tiles) {
             const auto& [dx, dy] = at;
             if (const auto east = tiles.find({dx + 1, dy}); east != tiles.end()) {
-              ASSERT_EQ(EdgeOf(tile, true, 32767), EdgeOf(east->second, true, 0)) << kind << " " << level << " " << step;
+              ASSERT_EQ(EdgeOf(tile, true, 32767), EdgeOf(east->second, true, 0))
+                  << kind << " " << level << " " << step;
               ++compared;
             }
             if (const auto north = tiles.find({dx, dy + 1}); north != tiles.end()) {
-              ASSERT_EQ(EdgeOf(tile, false, 32767), EdgeOf(north->second, false, 0)) << kind << " " << level << " " << step;
+              ASSERT_EQ(EdgeOf(tile, false, 32767), EdgeOf(north->second, false, 0))
+                  << kind << " " << level << " " << step;
               ++compared;
             }
           }
@@ -166,7 +168,8 @@ TEST_F(Edits, KeepThePrecisionAtEverySample) {
             const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
             const double error_m = geo::LadderError(level, step);
             for (std::size_t k = 0; k < demands.weights.size(); ++k) {
-              const double allowed = std::min(error_m / static_cast<double>(demands.weights[k]), static_cast<double>(demands.caps[k]));
+              const double allowed =
+                  std::min(error_m / static_cast<double>(demands.weights[k]), static_cast<double>(demands.caps[k]));
               if (allowed >= error_m) continue;
               ++limited;
               // The rounding of an edge's positions counts up to four times the error alone (tin::kMaxBorderWeight).

@@ -38,8 +38,8 @@ proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, doubl
   proto::EdgeErrors errors(error_m);
   if (limits.weights.empty()) return errors;
   const auto at = [&](int x, int y) {
-    return limits.Allowed(static_cast<std::size_t>(y) * static_cast<std::size_t>(cells + 1) + static_cast<std::size_t>(x),
-                          error_m);
+    return limits.Allowed(
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(cells + 1) + static_cast<std::size_t>(x), error_m);
   };
   for (int k = 1; k < cells; ++k) {
     const std::array<double, 4> of_sides = {at(k, 0), at(cells, k), at(k, cells), at(0, k)};

@@ -21,7 +21,7 @@ namespace terrace::tiler {
 // A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
-  TileRequest request;  // its `dataset` is 0
+  TileRequest request;           // its `dataset` is 0
   std::uint64_t generation = 0;  // Dataset::cache_generation
   std::uint64_t edits = 0;       // TileEdits: tiles that an edit does not touch stay valid when it changes
 

@@ -64,18 +64,18 @@ struct Edit {
   double blend_m = 0;
   double half_width_m = 0;  // of lines
   FlatHeight flat = FlatHeight::kGiven;
-  double height_m = 0;                                          // of flatten
-  double offset_m = 0;                                          // of offset
-  double error_m = std::numeric_limits<double>::infinity();     // of precision
-  double factor = 1;                                            // of precision: share of the tile's error, 0 .. 1
-  int min_level = 0;                                            // of precision
-  std::string source;                                           // of replace: a path
-  std::size_t replacement = 0;                                  // of replace: by edit set, the opened source
+  double height_m = 0;                                       // of flatten
+  double offset_m = 0;                                       // of offset
+  double error_m = std::numeric_limits<double>::infinity();  // of precision
+  double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
+  int min_level = 0;                                         // of precision
+  std::string source;                                        // of replace: a path
+  std::size_t replacement = 0;                               // of replace: by edit set, the opened source
 
   // Derived by Complete.
-  Box reach;                            // degrees, with the blend; west in -180 .. 180
-  double low_m = 0, high_m = 0;         // of the target heights
-  double steepest = 0;                  // of the target heights, metres per metre
+  Box reach;                     // degrees, with the blend; west in -180 .. 180
+  double low_m = 0, high_m = 0;  // of the target heights
+  double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;
   ContentHash hash;
 

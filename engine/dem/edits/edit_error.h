@@ -32,7 +32,8 @@ class EditError {
   EditError(const NodeWindow& window, double error_m);
 
   // `part`: the nodes, relative to the window. `diagonal_m`: of a cell. `tau_m`: of a replacement.
-  void Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m, double tau_m);
+  void Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
+           double tau_m);
 
   double bound() const;
 

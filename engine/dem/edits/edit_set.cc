@@ -20,7 +20,8 @@ BoxIndex IndexOfEdits(const std::vector<Edit>& edits) {
   entries.reserve(3 * edits.size());
   for (std::size_t i = 0; i < edits.size(); ++i) {
     const Box& box = edits[i].reach;
-    for (const int turn : {-360, 0, 360}) entries.push_back({{box.west + turn, box.south, box.east + turn, box.north}, i});
+    for (const int turn : {-360, 0, 360})
+      entries.push_back({{box.west + turn, box.south, box.east + turn, box.north}, i});
   }
   return BoxIndex(entries);
 }
@@ -81,7 +82,9 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           } else if (share > 0) {
             target = TargetAt(edit, {x, y}, place);
           }
-          if (errors) nodes[Area(columns, j - part.first_row) + static_cast<std::size_t>(i - part.first_column)] = {place, values[at], target};
+          if (errors)
+            nodes[Area(columns, j - part.first_row) + static_cast<std::size_t>(i - part.first_column)] = {
+                place, values[at], target};
           if (share > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, share);
         }
       }
@@ -212,7 +215,8 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
       }
     }
   }
-  if (std::ranges::all_of(demands.forced, [](std::uint8_t is_forced) { return is_forced == 0; })) demands.forced.clear();
+  if (std::ranges::all_of(demands.forced, [](std::uint8_t is_forced) { return is_forced == 0; }))
+    demands.forced.clear();
   if (std::ranges::all_of(demands.hole, [](std::uint8_t is_hole) { return is_hole == 0; })) demands.hole.clear();
   return demands;
 }

@@ -37,9 +37,10 @@ class EditSet {
   // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order.
   std::vector<std::size_t> Find(const Box& degrees) const { return index_.Find(degrees); }
 
-  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null: in,
-  // an upper bound of the distance between the surface through the tile's nodes and the samples of the sources; out,
-  // the same of the edited surface and the edited samples. The window then has a halo of one, which does not count.
+  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
+  // in, an upper bound of the distance between the surface through the tile's nodes and the samples of the sources;
+  // out, the same of the edited surface and the edited samples. The window then has a halo of one, which does not
+  // count.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
                      std::span<float> heights, const ReadReplacement& replaced, double* error_m = nullptr) const;

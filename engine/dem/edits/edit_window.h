@@ -41,7 +41,8 @@ class WindowAxes {
     std::vector<Part> parts;
     int beyond = -1;  // columns of the last part
     for (const double turn : {-360.0, 0.0, 360.0}) {
-      const double first = std::floor((box.west + turn - west_) / step_), last = std::ceil((box.east + turn - west_) / step_);
+      const double first = std::floor((box.west + turn - west_) / step_),
+                   last = std::ceil((box.east + turn - west_) / step_);
       if (last < 0 || first > columns - 1 || first_row > last_row) continue;
       const Part part{std::max(std::max(static_cast<int>(std::max(first, 0.0)), 0), beyond + 1),
                       static_cast<int>(std::min(last, columns - 1.0)), first_row, last_row};

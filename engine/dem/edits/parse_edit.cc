@@ -104,9 +104,8 @@ std::optional<Edit> Parser::Parse(const json& feature) {
     return std::nullopt;
   }
   const std::string op = (*terrain)["op"];
-  const auto known = std::ranges::find(kEditOpNames, std::string_view(op), [](const char* name) {
-    return std::string_view(name);
-  });
+  const auto known =
+      std::ranges::find(kEditOpNames, std::string_view(op), [](const char* name) { return std::string_view(name); });
   if (known == kEditOpNames.end()) {
     Fail(fmt::format("unknown op \"{}\"{}", op, DidYouMean(op, kEditOpNames)));
     return std::nullopt;
@@ -129,8 +128,8 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 }
 
 void Parser::CheckKeys(const json& terrain) {
-  static const std::vector<std::string_view> keys = {"op",     "blend_m", "height",  "heights", "metres",   "source",
-                                                     "width_m", "error_m", "factor", "min_level"};
+  static const std::vector<std::string_view> keys = {"op",     "blend_m", "height",  "heights", "metres",
+                                                     "source", "width_m", "error_m", "factor",  "min_level"};
   for (const auto& [key, value] : terrain.items()) {
     if (std::ranges::find(keys, key) == keys.end()) {
       Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, keys)));
@@ -232,7 +231,10 @@ void Parser::ReadGeometry(const json& geometry) {
     for (const json& line : coordinates) AddRing(line);
   } else {
     Fail(fmt::format("{} takes a {}, not a {}", NameOf(edit_.op),
-                     takes_area && takes_line ? "polygon or a line" : takes_area ? "polygon" : "line", type));
+                     takes_area && takes_line ? "polygon or a line"
+                     : takes_area             ? "polygon"
+                                              : "line",
+                     type));
   }
 }
 
@@ -258,7 +260,8 @@ void Parser::ReadOptions(const json& terrain) {
   }
   if (edit_.op == EditOp::kReplace) {
     const auto source = terrain.find("source");
-    if (source == terrain.end() || !source->is_string()) return Fail("replace needs the path of a raster as \"source\"");
+    if (source == terrain.end() || !source->is_string())
+      return Fail("replace needs the path of a raster as \"source\"");
     edit_.source = (std::filesystem::path(file_).parent_path() / source->get<std::string>()).string();
   }
 }

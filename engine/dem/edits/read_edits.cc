@@ -64,8 +64,11 @@ void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<Ed
     if (is_object && root.contains("crs")) {
       const std::string crs = root["crs"].dump();
       if (crs.find("CRS84") == std::string::npos && crs.find("4326") == std::string::npos) {
-        faults.push_back({path, {}, {}, "names a reference system; GeoJSON has longitude and latitude of WGS 84: "
-                                        "convert it with ogr2ogr -t_srs EPSG:4326"});
+        faults.push_back({path,
+                          {},
+                          {},
+                          "names a reference system; GeoJSON has longitude and latitude of WGS 84: "
+                          "convert it with ogr2ogr -t_srs EPSG:4326"});
       }
     }
   } catch (const std::exception& error) {

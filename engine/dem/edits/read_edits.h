@@ -13,7 +13,7 @@ namespace terrace::dem {
 // What is wrong with a feature or a file.
 struct EditFault {
   std::string file;
-  std::optional<std::size_t> feature = {};    // its index; nothing: the file itself
+  std::optional<std::size_t> feature = {};  // its index; nothing: the file itself
   std::optional<GeoPosition> place = {};
   std::string message;  // what is wrong, and what would be right
 

@@ -57,7 +57,8 @@ class Picture {
   Picture() : pixels_(static_cast<std::size_t>(kSide) * kSide) {}
 
   void Put(int x, int y, Color color) {
-    if (x >= 0 && y >= 0 && x < kSide && y < kSide) pixels_[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x)] = color;
+    if (x >= 0 && y >= 0 && x < kSide && y < kSide)
+      pixels_[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x)] = color;
   }
   void Line(double x0, double y0, double x1, double y1, Color color) {
     const int steps = static_cast<int>(std::max(std::abs(x1 - x0), std::abs(y1 - y0))) + 1;
@@ -71,9 +72,9 @@ class Picture {
   std::string Encode() const {
     std::vector<float> codes;
     for (const auto& [red, green, blue] : pixels_) {
-      codes.push_back(static_cast<float>(proto::DecodeHeight(
-          static_cast<std::uint32_t>(red) << 16 | static_cast<std::uint32_t>(green) << 8 | blue,
-          proto::HeightEncoding::kTerrarium)));
+      codes.push_back(static_cast<float>(
+          proto::DecodeHeight(static_cast<std::uint32_t>(red) << 16 | static_cast<std::uint32_t>(green) << 8 | blue,
+                              proto::HeightEncoding::kTerrarium)));
     }
     return proto::EncodeHeightPng(codes, kSide, proto::HeightEncoding::kTerrarium);
   }
@@ -104,8 +105,8 @@ Result<std::string> DrawEdits(const dem::DemSource& source) {
       // Light from the north-west, 45 degrees high.
       const double gx = (at(x + 1, y) - at(x, y)) / metres, gy = (at(x, y) - at(x, y + 1)) / metres;
       const double light = (1 + (gx - gy) / std::sqrt(2.0)) / std::sqrt(2.0) / std::sqrt(1 + gx * gx + gy * gy);
-      const auto grey = std::isnan(light) ? std::uint8_t{0}
-                                          : static_cast<std::uint8_t>(40 + 200 * std::clamp(light, 0.0, 1.0));
+      const auto grey =
+          std::isnan(light) ? std::uint8_t{0} : static_cast<std::uint8_t>(40 + 200 * std::clamp(light, 0.0, 1.0));
       picture.Put(x, y, {grey, grey, grey});
     }
   }

@@ -273,10 +273,12 @@ void AddInfo(CLI::App& app, int& exit_code) {
   command->add_option("--draw", arguments->draw, "Writes a picture of the edits: hill shade with the features")
       ->type_name("FILE.png");
   std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
-  about_heights.erase(
-      std::remove_if(about_heights.begin(), about_heights.end(),
-                     [](const auto& option) { return option.key != "vertical" && option.key != "nodata" && option.key != "edits"; }),
-      about_heights.end());
+  about_heights.erase(std::remove_if(about_heights.begin(), about_heights.end(),
+                                     [](const auto& option) {
+                                       return option.key != "vertical" && option.key != "nodata" &&
+                                              option.key != "edits";
+                                     }),
+                      about_heights.end());
   AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });

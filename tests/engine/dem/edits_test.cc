@@ -138,15 +138,17 @@ TEST_F(TerrainEdits, ShowInNodesAndPixels) {
   const int level = source->max_level();
   const geo::Lattice lattice = source->LatticeOf(level);
   const double step = lattice.StepDegrees();
-  const NodeWindow window{static_cast<std::int64_t>((10.2 + 180) / step), static_cast<std::int64_t>((50.2 + 90) / step), 3, 3};
+  const NodeWindow window{static_cast<std::int64_t>((10.2 + 180) / step), static_cast<std::int64_t>((50.2 + 90) / step),
+                          3, 3};
   const auto nodes = source->ReadNodes(level, window);
   ASSERT_TRUE(nodes.has_value());
   for (const float height : *nodes) EXPECT_EQ(height, 777);
   const int depth = source->info().max_mercator_depth;
   const double pixels = 256.0 * static_cast<double>(std::int64_t{1} << depth);
-  const double y = std::log(std::tan(0.25 * 3.14159265358979 + 0.5 * 50.2 * 3.14159265358979 / 180)) / (2 * 3.14159265358979);
-  const auto image = source->ReadMercator(
-      depth, {static_cast<std::int64_t>((10.2 + 180) / 360 * pixels), static_cast<std::int64_t>((0.5 - y) * pixels), 2, 2});
+  const double y =
+      std::log(std::tan(0.25 * 3.14159265358979 + 0.5 * 50.2 * 3.14159265358979 / 180)) / (2 * 3.14159265358979);
+  const auto image = source->ReadMercator(depth, {static_cast<std::int64_t>((10.2 + 180) / 360 * pixels),
+                                                  static_cast<std::int64_t>((0.5 - y) * pixels), 2, 2});
   ASSERT_TRUE(image.has_value());
   for (const float height : *image) EXPECT_EQ(height, 777);
   EXPECT_EQ(source->info().heights.max, 777);
@@ -154,8 +156,9 @@ TEST_F(TerrainEdits, ShowInNodesAndPixels) {
 }
 
 TEST_F(TerrainEdits, HeightsLieWithinRangeBounds) {
-  const auto source = Open(Middle(R"({"op":"offset","metres":600,"blend_m":500})") + "," +
-                           Rectangle(R"({"op":"slope","heights":[0,-50,-100,5],"blend_m":300})", 10.3, 50.1, 10.35, 50.3));
+  const auto source =
+      Open(Middle(R"({"op":"offset","metres":600,"blend_m":500})") + "," +
+           Rectangle(R"({"op":"slope","heights":[0,-50,-100,5],"blend_m":300})", 10.3, 50.1, 10.35, 50.3));
   ASSERT_NE(source, nullptr);
   for (int level = 6; level <= source->max_level(); ++level) {
     for (const geo::TileRange& range : source->Available(level)) {
@@ -181,20 +184,36 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
   const std::string message = MessageOf(
       good + "," + Middle(R"({"op":"flaten","height":1})") + "," + Middle(R"({"op":"flatten"})") + "," +
       Rectangle(R"({"op":"offset","metres":1})", 50.15, 10.15, 50.25, 10.25) + "," +
-      geometry(R"({"op":"hole"})", R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.1,50.2],[10.1,50.1]]]})") + "," +
-      geometry(R"({"op":"hole"})", R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.15,50.3]]]})") + "," +
-      geometry(R"({"op":"hole"})", R"({"type":"Polygon","coordinates":[[[179,50],[-179,50],[-179,51],[179,51],[179,50]]]})") + "," +
-      geometry(R"({"op":"hole"})", R"({"type":"Polygon","coordinates":[[[50.1,100.1],[50.2,100.1],[50.2,100.2],[50.1,100.1]]]})") + "," +
-      geometry(R"({"op":"carve","width_m":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") + "," +
-      geometry(R"({"op":"carve","height":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") + "," +
-      Rectangle(R"({"op":"offset","metres":1})", 20, 50.15, 21, 50.25) + "," + Middle(R"({"op":"offset","meters":1})") + "," +
-      Rectangle(R"({"op":"hole"})", 10, 89.5, 11, 89.95));
-  for (const char* part :
-       {"feature 1 at", "did you mean \"flatten\"?", "feature 2 at", "flatten needs a \"height\"", "feature 3 at",
-        "are the axes swapped?", "feature 4 at", "the polygon is not valid", "feature 5 at", "the ring is open",
-        "feature 6 at", "crosses the antimeridian", "feature 7 at", "latitude 100.1 is beyond 90", "feature 8 at",
-        "heights are missing", "feature 9 at", "needs its \"width_m\"", "feature 10 at", "outside of the data",
-        "feature 11 at", "did you mean \"metres\"?", "feature 12 at", "reaches a pole", "edits.geojson"}) {
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.1,50.2],[10.1,50.1]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.15,50.3]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[179,50],[-179,50],[-179,51],[179,51],[179,50]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[50.1,100.1],[50.2,100.1],[50.2,100.2],[50.1,100.1]]]})") +
+      "," +
+      geometry(R"({"op":"carve","width_m":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") +
+      "," +
+      geometry(R"({"op":"carve","height":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") +
+      "," + Rectangle(R"({"op":"offset","metres":1})", 20, 50.15, 21, 50.25) + "," +
+      Middle(R"({"op":"offset","meters":1})") + "," + Rectangle(R"({"op":"hole"})", 10, 89.5, 11, 89.95));
+  for (const char* part : {"feature 1 at",  "did you mean \"flatten\"?",
+                           "feature 2 at",  "flatten needs a \"height\"",
+                           "feature 3 at",  "are the axes swapped?",
+                           "feature 4 at",  "the polygon is not valid",
+                           "feature 5 at",  "the ring is open",
+                           "feature 6 at",  "crosses the antimeridian",
+                           "feature 7 at",  "latitude 100.1 is beyond 90",
+                           "feature 8 at",  "heights are missing",
+                           "feature 9 at",  "needs its \"width_m\"",
+                           "feature 10 at", "outside of the data",
+                           "feature 11 at", "did you mean \"metres\"?",
+                           "feature 12 at", "reaches a pole",
+                           "edits.geojson"}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
   }
   EXPECT_EQ(message.find("feature 0 "), std::string::npos);
@@ -221,7 +240,8 @@ TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
   for (const geo::TileRange& range : plain->Available(level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
-        const bool is_same = plain->ContentBelow({level, x, y}, level + 2) == edited->ContentBelow({level, x, y}, level + 2);
+        const bool is_same =
+            plain->ContentBelow({level, x, y}, level + 2) == edited->ContentBelow({level, x, y}, level + 2);
         ++(is_same ? same : changed);
         if (edited->EditsOf({level, x, y}) != 0) EXPECT_FALSE(is_same);
       }
