@@ -316,7 +316,9 @@ std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
   const std::int64_t last = std::min(around.row + around.rows + lattice.cells, lattice.rows() + 1);
   around.row = first;
   around.rows = static_cast<int>(last - first);
-  const bool is_alone = EditsAt(lattice, around).empty();
+  Box box = BoxOf(lattice, around);
+  box.Grow(1e-8, 1e-8);  // contains the boxes of all nine tiles, whose corners are rounded in other ways
+  const bool is_alone = edits->Find(box).empty();
   if (is_alone && !(is_polar && is_range_edited)) return 0;
   {
     const std::lock_guard lock(hashes_mutex);

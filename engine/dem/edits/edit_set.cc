@@ -1,6 +1,7 @@
 #include "engine/dem/edits/edit_set.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -42,7 +43,26 @@ double Edited(EditOp op, double height, double target, double share) {
 
 }  // namespace
 
-EditSet::EditSet(std::vector<Edit> edits) : edits_(std::move(edits)), index_(IndexOfEdits(edits_)) {}
+EditSet::EditSet(std::vector<Edit> edits) : edits_(std::move(edits)), index_(IndexOfEdits(edits_)) {
+  static std::atomic<std::uint64_t> sets{0};
+  number_ = ++sets;
+}
+
+std::vector<std::size_t> EditSet::Find(const Box& degrees) const {
+  struct Empty {
+    std::uint64_t set = 0;
+    Box box;
+  };
+  thread_local Empty last;
+  const auto& [west, south, east, north] = last.box;
+  if (last.set == number_ && degrees.west >= west && degrees.east <= east && degrees.south >= south &&
+      degrees.north <= north) {
+    return {};
+  }
+  std::vector<std::size_t> found = index_.Find(degrees);
+  if (found.empty()) last = {number_, degrees};
+  return found;
+}
 
 template <typename NodeGrid>
 Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,

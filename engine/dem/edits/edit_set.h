@@ -34,8 +34,9 @@ class EditSet {
 
   const std::vector<Edit>& edits() const { return edits_; }
 
-  // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order.
-  std::vector<std::size_t> Find(const Box& degrees) const { return index_.Find(degrees); }
+  // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order. Each thread remembers
+  // the last box without edits: a tile asks for its surroundings first, and then for many boxes within these.
+  std::vector<std::size_t> Find(const Box& degrees) const;
 
   // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
   // in, an upper bound of the distance between the surface through the tile's nodes and the samples of the sources;
@@ -61,6 +62,7 @@ class EditSet {
  private:
   std::vector<Edit> edits_;
   BoxIndex index_;
+  std::uint64_t number_;  // no other set of this process has it
 };
 
 // Calls visit(column, row) for the lattice's nodes that a line passes: of each segment the nearest node in each column,

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <boost/geometry/algorithms/correct.hpp>
+#include <boost/geometry/algorithms/intersects.hpp>
 #include <boost/geometry/algorithms/is_valid.hpp>
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
@@ -48,6 +49,18 @@ std::size_t LettersApart(std::string_view a, std::string_view b) {
     }
   }
   return row.back();
+}
+
+// For messages about features whose geometry is not read.
+std::optional<GeoPosition> FirstPosition(const json& feature) {
+  if (!feature.contains("geometry") || !feature["geometry"].is_object()) return std::nullopt;
+  const auto found = feature["geometry"].find("coordinates");
+  const json* at = found == feature["geometry"].end() ? nullptr : &*found;
+  while (at != nullptr && at->is_array() && !at->empty() && at->front().is_array()) at = &at->front();
+  if (at == nullptr || !at->is_array() || at->size() < 2 || !(*at)[0].is_number() || !(*at)[1].is_number()) {
+    return std::nullopt;
+  }
+  return GeoPosition{(*at)[0], (*at)[1]};
 }
 
 template <typename Names>
@@ -99,6 +112,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   if (terrain == feature["properties"].end()) return std::nullopt;
   edit_.file = file_;
   edit_.feature = feature_;
+  first_ = FirstPosition(feature);
   if (!terrain->is_object() || !terrain->contains("op") || !(*terrain)["op"].is_string()) {
     Fail("properties.terrain needs an \"op\", such as {\"op\": \"flatten\", \"height\": 250}");
     return std::nullopt;
@@ -156,7 +170,6 @@ void Parser::AddRing(const json& points) {
       return Fail(fmt::format("{} is no position: [longitude, latitude]", point.dump().substr(0, 60)));
     }
     const GeoPosition at{point[0], point[1]};
-    if (!first_) first_ = at;
     if (std::abs(at.latitude) > 90) {
       const bool is_swapped = std::abs(at.longitude) <= 90 && std::abs(at.latitude) <= 180;
       return Fail(fmt::format("latitude {} is beyond 90{}", at.latitude,
@@ -199,6 +212,8 @@ void Parser::CheckPolygon(std::size_t first_ring) {
     ring.push_back(ring.front());
   }
   boost::geometry::correct(polygon);
+  if (boost::geometry::intersects(polygon))
+    return Fail("the polygon is not valid: its rings intersect themselves or each other");
   std::string why;
   boost::geometry::validity_failure_type type{};
   if (boost::geometry::is_valid(polygon, type) || type == boost::geometry::failure_duplicate_points) return;
