@@ -10,7 +10,7 @@ SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper docs format lint tidy clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper deb docs site format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -57,10 +57,16 @@ bench-serve: build  ## time of tiles by level and stage, data from ../shared/dat
 paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into build/paper
 	@tools/run_paper.sh $(JOBS)
 
+deb: build test-deps  ## build the Debian package into build/deb
+	@packaging/build_deb.sh
+
 docs: deps  ## write config.schema.json and the tables of docs/configuration.md from the options
 	cmake --preset release --log-level=WARNING
 	cmake --build build/release -j $(JOBS) --target write_option_docs
 	build/release/config/write_option_docs .
+
+site: test-deps  ## build the documentation as a site into build/site
+	@mkdocs build --quiet && echo "build/site/index.html"
 
 format:  ## format the C++ sources
 	$(SOURCES) | xargs clang-format-14 -i

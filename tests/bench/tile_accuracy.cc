@@ -125,7 +125,7 @@ std::shared_ptr<const tiler::TilePipeline> PipelineOf(const std::shared_ptr<cons
                                                       std::size_t refinement_bytes) {
   std::vector<tiler::Dataset> datasets(1);
   datasets[0].source = source;
-  datasets[0].rules.compact = compact;
+  datasets[0].mesh_options.compact = compact;
   return std::make_shared<const tiler::TilePipeline>(std::move(datasets), refinement_bytes);
 }
 

@@ -26,7 +26,8 @@ class HelpFormat final : public CLI::Formatter {
 
   std::string make_option_opts(const CLI::Option* option) const override {
     const bool has_value = !option->get_positional() && option->get_type_size() != 0;
-    return has_value && !option->get_type_name().empty() ? ' ' + option->get_type_name() : "";
+    // The blank at the end keeps two between a name and its description; without them help2man sees one text.
+    return (has_value && !option->get_type_name().empty() ? ' ' + option->get_type_name() : "") + ' ';
   }
 
   std::string make_option_desc(const CLI::Option* option) const override {
