@@ -157,11 +157,16 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
 }
 
 GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double least_error_m, PositionWidth width)
-    : inside(GridStep(lattice, std::min(errors.tile, least_error_m), width)) {
+    : inside(GridStep(lattice, errors.tile, width)) {
+  // A step that does not fit would be doubled, but not by the neighbour (FitsFloats).
+  const double side_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees()) * lattice.cells;
+  const double finest_m = std::min(PowerOfTwoUpTo(side_m / 0x1p22), inside);
+  const auto step = [&](double error_m) { return std::max(GridStep(lattice, error_m, width), finest_m); };
   for (std::size_t k = 0; k < 4; ++k) {
-    side[k] = GridStep(lattice, errors.side[k], width);
-    corner[k] = GridStep(lattice, errors.corner[k], width);
+    side[k] = step(errors.side[k]);
+    corner[k] = step(errors.corner[k]);
   }
+  inside = step(std::min(errors.tile, least_error_m));
 }
 
 void GridSteps::Double() {

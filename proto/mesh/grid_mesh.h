@@ -41,7 +41,8 @@ using GridPoint = std::array<std::int64_t, 3>;
 // micrometre, so two processors can differ here only if a coordinate is within a micrometre of a tie.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
-// The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`.
+// The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`. Limits count down to the step
+// of which a tile's side has 2^22 to 2^23, as that of the finest error.
 struct GridSteps {
   double inside = 1;
   std::array<double, 4> side{}, corner{};

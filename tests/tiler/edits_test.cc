@@ -7,11 +7,14 @@
 #include <cmath>
 #include <fstream>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
+#include "tests/proto/glb_decoder.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
@@ -239,6 +242,42 @@ TEST_F(Edits, AreCertified) {
         const FetchedTile tile = FetchTile(pipeline, RequestFor(TileAt(level, dx, dy), 8));
         const double error = TileSurface(tile.mesh, TileAt(level, dx, dy)).LargestError(index);
         EXPECT_LE(error, tile.encoded.certified_error_m.value_or(0)) << kind << " level " << level;
+      }
+    }
+  }
+}
+
+// Positions of the common edge of two GLB tiles, without the feet of skirts: bit-equal, though the grid inside of a
+// tile with precision is finer than that of its neighbours.
+TEST_F(Edits, LeaveEdgesOfGlbTilesEqual) {
+  const auto rim = [](const TilePipeline& pipeline, const geo::TileKey& key, int step, geo::Vec3 across) {
+    TileRequest request = RequestFor(key, step);
+    request.format = TileFormat::kGlb;
+    const auto tile = pipeline.Build(request, {});
+    EXPECT_TRUE(tile.has_value());
+    const auto glb = proto::DecodeGlb(tile->bytes);
+    EXPECT_TRUE(glb.has_value());
+    std::set<proto::Corner> feet, points;
+    for (const auto& [from, to] : proto::OpenSidesOf(*glb).sides) feet.insert(from);
+    for (const geo::Vec3& p : glb->positions) {
+      const proto::Corner point{p.x, p.y, p.z};
+      if (std::abs(geo::Dot(across, p)) < 0.01 && !feet.contains(point)) points.insert(point);
+    }
+    return points;
+  };
+  for (const char* kind : {"precision", "factor", "flatten", "breakline"}) {
+    const TilePipeline pipeline = Open({Kinds().at(kind)});
+    for (const int level : {11, 12}) {
+      for (const int step : kSteps) {
+        for (const auto& [dx, dy] : {std::pair{-1, 0}, {-1, -1}, {0, 0}}) {
+          const geo::TileKey west = TileAt(level, dx, dy), east = geo::Neighbour(west, 1, 0);
+          const geo::Lattice lattice = SourceOf(pipeline).LatticeOf(level);
+          const geo::Vec3 meridian = geo::SurfaceNormal(lattice.Longitude(lattice.FirstColumn(east)), 0);
+          const geo::Vec3 across{-meridian.y, meridian.x, 0};
+          const auto a = rim(pipeline, west, step, across), b = rim(pipeline, east, step, across);
+          EXPECT_GE(a.size(), 2u);
+          EXPECT_EQ(a, b) << kind << " " << geo::ToString(west) << " step " << step;
+        }
       }
     }
   }
