@@ -240,8 +240,8 @@ Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, He
   }
   std::vector<std::optional<std::vector<float>>> others(replacements.size());
   for (std::size_t k = 0; k < at.size(); ++k) {
-    for (const std::size_t index : which[k]) {
-      const Edit& edit = edits->edits()[index];
+    for (const std::size_t number : which[k]) {
+      const Edit& edit = edits->edits()[number];
       if (edit.op != EditOp::kReplace || others[edit.replacement]) continue;
       auto read = replacements[edit.replacement]->ReadPoints(at, HeightDatum::kEllipsoid, stop);
       if (!read) return tl::unexpected(std::move(read).error());
@@ -299,7 +299,7 @@ std::uint64_t DemSource::EditsOfMercator(int depth, const NodeWindow& window) co
   const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window);
   if (which.empty()) return 0;
   ContentHasher hasher;
-  for (const std::size_t index : which) hasher.Add(impl_->edits->edits()[index].hash);
+  for (const std::size_t number : which) hasher.Add(impl_->edits->edits()[number].hash);
   return hasher.Hash().low | 1;
 }
 
@@ -326,8 +326,8 @@ std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
   }
   ContentHasher hasher;
   bool is_touched = false;
-  for (const std::size_t index : EditsAt(lattice, WindowOfTile(lattice, key))) {
-    hasher.Add(edits->edits()[index].hash);
+  for (const std::size_t number : EditsAt(lattice, WindowOfTile(lattice, key))) {
+    hasher.Add(edits->edits()[number].hash);
     is_touched = true;
   }
   for (int dy = -1; dy <= 1; ++dy) {
