@@ -3,12 +3,38 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <filesystem>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
+#include "config/common/nearest_name.h"
 #include "engine/dem/gdal/source_policy.h"
 
 namespace terrace::cli {
+namespace {
+
+// "; did you mean dem.tif?" for a missing file with a similar name beside it; empty if there is none.
+std::string SimilarFile(const std::string& path) {
+  constexpr int kMaxFiles = 1000;  // of a folder: a suggestion must not take long
+  const std::filesystem::path wanted(path);
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(wanted.parent_path(), error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (names.size() == kMaxFiles) return "";
+    names.push_back(entry->path().filename().string());
+  }
+  std::ranges::sort(names);  // the order of a folder is not fixed
+  std::vector<config::KnownName> known;
+  for (const std::string& name : names) known.push_back({name});
+  const std::vector<std::string_view> similar = config::NearestNames(wanted.filename().string(), known);
+  return similar.empty() ? "" : fmt::format("; did you mean {}?", similar.front());
+}
+
+}  // namespace
 
 std::string DatasetNameOf(const std::string& dem) {
   std::error_code ignored;
@@ -38,8 +64,10 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
   const auto read = [&](const std::string& path, const char* remedy) -> Result<void> {
     // GDAL resolves other names.
     if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
-    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}",
-                     dataset.name, path, std::generic_category().message(errno), remedy);
+    const int reason = errno;
+    return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}{}",
+                     dataset.name, path, std::generic_category().message(reason), remedy,
+                     reason == ENOENT ? SimilarFile(path) : "");
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {

@@ -176,6 +176,13 @@ class Config(unittest.TestCase):
             self.assertIn("the configuration is fine: 1 dataset;", good.stdout)
         self.assertEqual(run("serve", dem, "--check-config", "--cache-bytes", "much").returncode, 2)
 
+    def test_a_missing_file_with_a_similar_one_beside_it(self):
+        (pathlib.Path(self.folder) / "valley.tif").write_bytes(b"")
+        missing = run("serve", f"{self.folder}/valley.tfi")
+        self.assertEqual(missing.returncode, 1)
+        self.assertIn("valley.tfi: No such file or directory; give the path of a raster file on this machine; did you mean valley.tif?", missing.stderr)
+        self.assertNotIn("did you mean", run("serve", f"{self.folder}/mountains.tif").stderr)
+
     def test_a_check_fails_where_a_start_would(self):
         dem = str(SOURCE_DIR / "config/samples/jacksboro.tif")
         (self.folder / "file").write_bytes(b"")
