@@ -75,6 +75,7 @@ struct SourceConfig {
 struct DatasetConfig {
   std::string name;                   // the first part of its URLs: [A-Za-z0-9._-]{1,64}
   std::vector<SourceConfig> sources;  // where several have a height, the first one is used; none: `baked` alone
+  std::vector<std::string> edits;     // GeoJSON files, absolute; later edits over earlier ones
   std::string baked;                  // place of an archive with finished tiles; empty: none
   std::string vertical = "crs";       // vertical datum: a keyword, "EPSG:5703", or the path of a grid
   NodataConfig nodata;

@@ -9,6 +9,7 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/strong_etag.h"
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/drawn_triangles.h"
@@ -18,13 +19,6 @@ namespace terrace::tiler {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-// The error bound of a tile's mesh that keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
-// their positions are inexact.
-double MeshError(double error_m) {
-  constexpr double kRounding = 0x1p-11 + 0x1p-14;
-  return std::max(error_m - kRounding, error_m / 2);
-}
 
 // Of a dataset without sources.
 Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request) {
@@ -41,6 +35,13 @@ tl::unexpected<Error> NoSources() {
 
 }  // namespace
 
+std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
+  if (request.format != TileFormat::kHeightPng) return source.EditsOf(request.key);
+  const int size = request.height_size, depth = request.key.level + (size == 512 ? 1 : 0);
+  if (depth > source.info().max_mercator_depth) return 0;
+  return source.EditsOfMercator(depth, {request.key.x * size, request.key.y * size, size, size});
+}
+
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
     : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
 
@@ -52,7 +53,7 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<Refine
 // Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
-  const RefinedTileKey cache_key{dataset.generation, key};
+  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.source->EditsOf(key)};
   const RefinedTilePtr known = refinements_->Find(cache_key);
   if (known) encoded.refinement = RefinementUse::kContinued;
   if (known && known->error_m <= error_m) {

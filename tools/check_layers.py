@@ -29,7 +29,7 @@ CONFIG = ["config/common", "config/config.h", "config/input", "config/options", 
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
-       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/sight", "engine/dem/bound", "engine/dem/image", "engine/dem/export"]
+       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/sight", "engine/dem/bound", "engine/dem/edits", "engine/dem/image", "engine/dem/export"]
 # Headers below a module that count as that module's own: every module that may include it may include these.
 PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
     "engine/dem": ("dem_types.h", "export/output_grid.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
@@ -99,7 +99,7 @@ LIBRARIES = [
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|(archive|bake|fly|proto|server)/.*\.cc)"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/dem/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),

@@ -34,6 +34,15 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .other_words = "paths file files dem dems raster rasters input inputs",
        .missing = "; every dataset needs one, or \"baked\"",
        .unless = "baked"},
+      {.key = "edits",
+       .value = "FILE,...",
+       .help =
+           "GeoJSON files whose features edit the terrain: flatten, slope, offset, carve, holes, precision and others",
+       .details =
+           "In order, later features over earlier ones. Relative to the folder of the file. They are watched like "
+           "sources. [Edits](edits.md)",
+       .codec = TextList(&DatasetConfig::edits, "a list of GeoJSON files", true),
+       .other_words = "geojson features overrides modifications patches"},
       {.key = "baked",
        .value = "PLACE",
        .help = "Archive with finished tiles of this dataset; other tiles are built from the sources",

@@ -87,7 +87,8 @@ Codec<DatasetConfig> NodataCodec();
 
 // A list of texts. `is_path`: the texts are paths, relative to the folder of the file. As a flag: texts separated by
 // commas.
-Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path);
+template <typename Target>
+Codec<Target> TextList(std::vector<std::string> Target::*member, const char* expected, bool is_path);
 
 // water_imagery_options.cc
 // {"mask": "water.tif"} or {"sea_level": 0}. As a flag: a number is a sea level, any other text the path of a mask.

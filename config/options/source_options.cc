@@ -178,11 +178,12 @@ Codec<DatasetConfig> NodataCodec() {
           Json::parse(kNodataSchema)};
 }
 
-Codec<Config> TextList(std::vector<std::string> Config::*member, const char* expected, bool is_path) {
+template <typename Target>
+Codec<Target> TextList(std::vector<std::string> Target::*member, const char* expected, bool is_path) {
   Json text_schema = Json::parse(kNonEmptyText);
   text_schema["pattern"] = kOneLinePattern;
   Json schema = {{"anyOf", Json::array({text_schema, ListOf(text_schema)})}};
-  return {[=](const Json& value, const ConfigLocation& place, Config& config) {
+  return {[=](const Json& value, const ConfigLocation& place, Target& config) {
             std::vector<std::string> texts;
             for (const Json& item : value.is_array() ? value : Json::array({value})) {
               if (!item.is_string() || item.get_ref<const std::string&>().empty() ||
@@ -194,7 +195,7 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
             }
             config.*member = std::move(texts);
           },
-          [=](const Config& config) { return (config.*member).empty() ? Json() : Json(config.*member); },
+          [=](const Target& config) { return (config.*member).empty() ? Json() : Json(config.*member); },
           [](const std::string& text) {
             Json list = Json::array();
             for (std::size_t start = 0; start <= text.size();) {
@@ -206,5 +207,8 @@ Codec<Config> TextList(std::vector<std::string> Config::*member, const char* exp
           },
           std::move(schema)};
 }
+
+template Codec<Config> TextList(std::vector<std::string> Config::*, const char*, bool);
+template Codec<DatasetConfig> TextList(std::vector<std::string> DatasetConfig::*, const char*, bool);
 
 }  // namespace terrace::config

@@ -3,6 +3,7 @@
 #include <cstdint>
 
 #include "engine/core/check.h"
+#include "engine/dem/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
 
 namespace terrace::dem {
@@ -26,6 +27,10 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
       const auto closed = grid.ClosedVoids(member);
       hasher.AddText({reinterpret_cast<const char*>(closed.data()), closed.size()});
     }
+  }
+  for (const std::size_t edit :
+       impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top))) {
+    hasher.Add(impl_->edits->edits()[edit].hash);
   }
   // The floor in the datum of a source (ReadInSourceDatum) comes from the last raster grid with a geoid.
   for (std::size_t i = impl_->grids.size(); i-- > 0 && impl_->floor_undulations != nullptr;) {

@@ -1,12 +1,17 @@
 // The state of a DemSource. Immutable after Open.
 #pragma once
 
+#include <algorithm>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "engine/dem/dem_source.h"
+#include "engine/dem/edits/edit_set.h"
 #include "engine/dem/mosaic/raster_grid.h"
 
 namespace terrace::dem {
@@ -25,10 +30,14 @@ struct GridContent {
 
 class DemSource::Impl {
  public:
-  // `what`: names the request in messages. `traces`, unless null, receives the traces of the raster grids that were
-  // read, in order.
+  // `what`: names the request in messages. `traces`, below, unless null, receives the traces of the raster grids that
+  // were read, in order.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
-                                       const std::stop_token& stop, std::vector<PartTrace>* traces = nullptr) const;
+                                       const std::stop_token& stop) const;
+  // The same before the edits.
+  Result<std::vector<float>> ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
+                                          const std::string& what, const std::stop_token& stop,
+                                          std::vector<PartTrace>* traces = nullptr) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
@@ -43,6 +52,22 @@ class DemSource::Impl {
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
   std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
 
+  // Of dem_edits.cc. ApplyEdits: to heights above the ellipsoid. `error_m`: EditSet::Apply.
+  Result<void> OpenEdits(const DemOptions& options);
+  template <typename NodeGrid>
+  Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
+                          std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
+  // The edits that may reach the nodes of a window.
+  template <typename NodeGrid>
+  std::vector<std::size_t> EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const;
+  Result<void> EditPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
+                          const std::stop_token& stop) const;
+  Result<std::vector<float>> PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
+                                            const std::stop_token& stop, std::span<std::uint8_t> filled = {}) const;
+  HeightRange UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const;
+  HeightRange RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice, const geo::TileKey& key) const;
+  std::uint64_t HashEditsOf(const geo::TileKey& key) const;
+
   std::vector<RasterGrid> grids;  // in order of precedence
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
@@ -54,7 +79,28 @@ class DemSource::Impl {
   DemInfo info;
   std::uint64_t fingerprint = 0;
   std::vector<GridContent> contents;  // by raster grid
+
+  // Null: there are no edits.
+  std::unique_ptr<const EditSet> edits;
+  std::vector<std::unique_ptr<DemSource>> replacements;  // by Edit::replacement
+  StampedFiles edit_files;
+  std::uint64_t unedited_fingerprint = 0;
+  HeightRange unedited_heights;  // of `info`
+  // Hashes by tile: hashing many edits takes longer than finding a cached tile.
+  mutable std::mutex hashes_mutex;
+  mutable std::unordered_map<std::uint64_t, std::uint64_t> hashes;
 };
+
+// A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.
+template <typename NodeGrid>
+Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
+  constexpr double kSlack = 1e-9;
+  const double west = node_grid.Longitude(window.column);
+  const auto [south, north] =
+      std::minmax({node_grid.Latitude(window.row), node_grid.Latitude(window.row + window.rows - 1)});
+  return {west - kSlack, south - kSlack, west + (window.columns - 1) * node_grid.StepDegrees() + kSlack,
+          north + kSlack};
+}
 
 // An index of raster grids by the box in degrees where they may have heights. Longitudes from -540 to 540, with one
 // entry for each turn around the Earth that begins there.

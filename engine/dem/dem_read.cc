@@ -16,17 +16,6 @@ namespace {
 
 bool IsVoid(float height) { return std::isnan(height); }
 
-// A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.
-template <typename NodeGrid>
-Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
-  constexpr double kSlack = 1e-9;
-  const double west = node_grid.Longitude(window.column);
-  const auto [south, north] =
-      std::minmax({node_grid.Latitude(window.row), node_grid.Latitude(window.row + window.rows - 1)});
-  return {west - kSlack, south - kSlack, west + (window.columns - 1) * node_grid.StepDegrees() + kSlack,
-          north + kSlack};
-}
-
 // Up to this number of raster grids, each is asked for the whole window.
 constexpr std::size_t kFewGrids = 8;
 // Nodes around a raster grid's footprint whose positions are computed: those of groups that touch it, and one more.
@@ -234,9 +223,9 @@ const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
   return lattices[static_cast<std::size_t>(level)];
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
-                                                      const std::string& what, const std::stop_token& stop,
-                                                      std::vector<PartTrace>* traces) const {
+Result<std::vector<float>> DemSource::Impl::ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
+                                                         const std::string& what, const std::stop_token& stop,
+                                                         std::vector<PartTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
   auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
   if (!heights || !HasVoids(*heights)) return heights;
@@ -260,13 +249,21 @@ Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum d
   const std::string what = "tile " + geo::ToString(key);
   const bool is_certified = datum == HeightDatum::kEllipsoid;
   std::vector<PartTrace> traces;
-  auto heights = ReadNodes(key.level, window, datum, what, stop, is_certified ? &traces : nullptr);
+  if (!is_certified) {
+    auto read = ReadNodes(key.level, window, datum, what, stop);
+    if (!read) return tl::unexpected(std::move(read).error());
+    return TileHeights{lattice, lattice.cells + 3, *std::move(read)};
+  }
+  auto heights = ReadUnedited(key.level, window, datum, what, stop, &traces);
   if (!heights) return tl::unexpected(std::move(heights).error());
   TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
-  if (!is_certified) return tile;
   const auto bound = BoundError(tile, window, std::move(traces), stop);
   if (!bound) return MakeError(bound.error().code, "{}: {}", what, bound.error().message);
   tile.source_error_m = *bound;
+  if (const auto which = EditsAt(lattice, window); !which.empty()) {
+    const auto edited = ApplyEdits(lattice, window, which, tile.heights, stop, &tile.source_error_m);
+    if (!edited) return MakeError(edited.error().code, "{}: {}", what, edited.error().message);
+  }
   return tile;
 }
 
@@ -300,12 +297,28 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
   auto heights = impl_->ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
                                   fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
-  if (heights) std::ranges::replace_if(*heights, IsVoid, impl_->floor);
+  if (!heights) return heights;
+  std::ranges::replace_if(*heights, IsVoid, impl_->floor);
+  if (const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window); !which.empty()) {
+    const auto edited = impl_->ApplyEdits(geo::MercatorGrid{depth}, window, which, *heights, stop);
+    if (!edited) return tl::unexpected(edited.error());
+  }
   return heights;
 }
 
 Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                                  std::stop_token stop, std::span<std::uint8_t> filled) const {
+  auto heights = impl_->PointsUnedited(points, datum, stop, filled);
+  if (!heights || impl_->edits == nullptr) return heights;
+  if (const auto edited = impl_->EditPoints(points, datum, *heights, stop); !edited) {
+    return tl::unexpected(edited.error());
+  }
+  return heights;
+}
+
+Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
+                                                           const std::stop_token& stop,
+                                                           std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
   const auto take_smooth = [&] {
@@ -327,7 +340,7 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have heights for them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
-    for (const std::size_t grid : impl_->GridsAt({x, y, x, y})) wanted[grid].push_back(i);
+    for (const std::size_t grid : GridsAt({x, y, x, y})) wanted[grid].push_back(i);
   }
   std::vector<GeoPosition> missing;
   std::vector<float> found, found_smooth;
@@ -339,7 +352,7 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = impl_->grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
+    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];
@@ -351,14 +364,11 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
   return heights;
 }
 
-HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
-  TERRACE_CHECK(geo::IsValid(key));
+HeightRange DemSource::Impl::UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const {
   BlockRange blocks;
   bool floor_shows = true;
-  const float floor = impl_->floor;
-  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
-  for (const std::size_t i : impl_->GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
-    const GridRange range = impl_->grids[i].RangeOf(lattice, key);
+  for (const std::size_t i : GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
+    const GridRange range = grids[i].RangeOf(lattice, key);
     blocks.Add(range.blocks);
     floor_shows = range.shows_others;
     if (!floor_shows) break;  // all later ones are hidden

@@ -254,6 +254,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   auto contents = ContentsOf(impl->grids, options);
   if (!contents) return tl::unexpected(contents.error());
   impl->contents = *std::move(contents);
+  if (auto opened = impl->OpenEdits(options); !opened) return tl::unexpected(std::move(opened).error());
   return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
 }
 
@@ -278,6 +279,7 @@ StampedFiles DemSource::files() const {
     const auto& geoid = grid.vertical().geoid;
     if (geoid && geoids.insert(geoid.get()).second) all.Append(geoid->files());
   }
+  all.Append(impl_->edit_files);
   return all;
 }
 

@@ -86,12 +86,24 @@ class DemSource {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
+  // Edits (docs/edits.md). All of these are 0 or empty without any.
+  //
+  // What the edits ask of the mesh of a tile.
+  MeshDemands DemandsOf(const geo::TileKey& key) const;
+  // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits.
+  // `EditsOfMercator`: of pixels as ReadMercator has them. Cheap after the first call for a tile.
+  std::uint64_t EditsOf(const geo::TileKey& key) const;
+  std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
+  std::vector<EditOutline> Edits() const;
+
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
 
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
   // precedence, and every option that changes heights. Copies of the files have the same hash.
   std::uint64_t fingerprint() const;
+  // The same without edits.
+  std::uint64_t unedited_fingerprint() const;
 
   // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
   // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the

@@ -60,6 +60,7 @@ struct DemOptions {
   HoleFill voids = HoleFill::kSmooth;
   int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
+  std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
   // edges.
   double feather = 0;
@@ -152,6 +153,7 @@ struct DemInfo {
   double floor = 0;
   int max_level = 0;
   int max_mercator_depth = 1;
+  std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.
   std::vector<std::string> left_out;
 };
@@ -176,6 +178,26 @@ struct TileHeights {
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
   float At(int i, int j) const { return heights[Area(j + 1, stride) + static_cast<std::size_t>(i + 1)]; }
+};
+
+// An edit, to be drawn.
+struct EditOutline {
+  std::string op;  // "flatten"
+  std::string file;
+  std::size_t feature = 0;
+  bool is_area = true;                          // closed rings; else lines
+  std::vector<std::vector<GeoPosition>> lines;  // closed rings repeat the first position
+};
+
+// What edits ask of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is
+// empty if they ask nothing of it. Depends on the nodes' positions and their level alone.
+struct MeshDemands {
+  std::vector<float> weights;        // the error counts this many times; at least 1
+  std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`
+  std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
+  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes all are, or are forced, are left out
+
+  bool any() const { return !weights.empty() || !forced.empty() || !hole.empty(); }
 };
 
 }  // namespace terrace::dem

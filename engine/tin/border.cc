@@ -1,5 +1,6 @@
 #include "engine/tin/border.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -100,6 +101,25 @@ Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Cor
   const int stride = edge.along_x ? 1 : field.stride();
   const ChordMisfit worst = WorstOfChord({edge.a, edge.b, edge.h_a, edge.h_b, heights, stride}, options);
   return worst.error > 0 ? Candidate{worst.error, edge.SampleAt(worst.at)} : Candidate();
+}
+
+Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, const Corner& b,
+                                   const BorderOptions& options, const SampleLimits& limits) {
+  const BorderEdge edge(field, a, b);
+  Candidate worst;
+  for (int k = edge.a + 1; k < edge.b; ++k) {
+    const double misfit =
+        std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + options.sagitta_m * (k - edge.a) * (edge.b - k);
+    if (std::isnan(misfit)) continue;
+    const double padded = misfit + options.padding_m;
+    const double weighted = std::max(padded * options.weight, padded + options.step_m);
+    const int x = edge.along_x ? k : edge.across, y = edge.along_x ? edge.across : k;
+    const std::size_t sample =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(x);
+    const double error = options.scale * limits.Counted(sample, std::min(weighted, kMaxBorderWeight * misfit));
+    if (error > worst.error) worst = {error, edge.SampleAt(k)};
+  }
+  return worst;
 }
 
 double SquaredBorderDistances(const HeightField& field, const Corner& a, const Corner& b) {

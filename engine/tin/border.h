@@ -39,6 +39,10 @@ ChordMisfit WorstOfChord(const Chord& chord, const BorderOptions& options);
 // BorderOptions.
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options);
 
+// The same by what errors count as (sample_limits.h). A cap applies to the error before BorderOptions::scale.
+Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, const Corner& b,
+                                   const BorderOptions& options, const SampleLimits& limits);
+
 // Sum of the squared vertical distances of the same samples from the chord, without weight and sagitta.
 double SquaredBorderDistances(const HeightField& field, const Corner& a, const Corner& b);
 

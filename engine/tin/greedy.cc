@@ -119,6 +119,8 @@ class GreedyTriangulation::Impl {
   void AwaitScan(TriangleId t);
   void ScanAwaiting();
   Candidate CandidateOf(const Star& star, std::size_t i, const PlaneMisfit& misfit);
+  bool MayBeLimited(const Star& star, std::size_t i) const;
+  Candidate WorstLimitedOf(TriangleId t) const;
   Candidate WorstOnBorderOf(TriangleId t);
   Candidate WorstOnBorder(VertexId from, VertexId to);
   double SquaresOf(TriangleId t) const;
@@ -127,6 +129,7 @@ class GreedyTriangulation::Impl {
 
   const HeightField* field_;
   GreedyOptions options_;
+  SampleBox limited_;  // samples with limits of their own
   Sagitta sagitta_;
   SeedCursor seeds_;
   Triangulation triangulation_;
@@ -165,6 +168,7 @@ GreedyTriangulation::Impl::Impl(const HeightField& field, GreedyOptions options)
       triangulation_(field),
       candidates_(2 * Triangulation::LikelyVertices(field)) {
   CheckOptions(options_);
+  if (!options_.limits.empty()) limited_ = BoxOfLimits(options_.limits, field.width(), field.height());
   for (const Side side : {Side::kSouth, Side::kEast, Side::kNorth, Side::kWest}) {
     const bool along_x = side == Side::kSouth || side == Side::kNorth;
     border_worst_[static_cast<std::size_t>(side)] =
@@ -296,7 +300,7 @@ const PlaneMisfit* GreedyTriangulation::Impl::ScanOf(const Star& star) {
 void GreedyTriangulation::Impl::ScanStarOf(const Star& star) {
   const PlaneMisfit* const misfits = ScanOf(star);
   candidates_.Reserve(triangulation_.triangle_count());
-  const bool is_plain = sagitta_.is_flat() && !star.has_border;
+  const bool is_plain = sagitta_.is_flat() && !star.has_border && options_.limits.empty();
   const std::uint32_t* const slots = star.triangles.data();
   if (is_plain) {
     candidates_.SetAll(slots, star.count, [misfits](std::size_t i) {
@@ -348,7 +352,9 @@ void GreedyTriangulation::Impl::MakeStar(TriangleId t, Star& star) const {
 
 Candidate GreedyTriangulation::Impl::CandidateOf(const Star& star, std::size_t i, const PlaneMisfit& misfit) {
   Candidate worst;
-  if (misfit.sample != kNoSample) {
+  if (!options_.limits.empty() && MayBeLimited(star, i)) {
+    worst = WorstLimitedOf(star.triangles[i]);
+  } else if (misfit.sample != kNoSample) {
     const double sagitta =
         sagitta_.Bound(triangulation_.position(star.ring.ids[i]), triangulation_.position(star.ring.ids[i + 1]),
                        {static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)});
@@ -359,6 +365,22 @@ Candidate GreedyTriangulation::Impl::CandidateOf(const Star& star, std::size_t i
     if (Precedes(on_border, worst)) worst = on_border;
   }
   return worst;
+}
+
+bool GreedyTriangulation::Impl::MayBeLimited(const Star& star, std::size_t i) const {
+  const RingVertex u = star.ring[i], v = star.ring[i + 1];
+  const auto [west, east] = std::minmax({0, u.dx, v.dx});
+  const auto [south, north] = std::minmax({0, u.dy, v.dy});
+  return star.x + west <= limited_.east && star.x + east >= limited_.west && star.y + south <= limited_.north &&
+         star.y + north >= limited_.south;
+}
+
+Candidate GreedyTriangulation::Impl::WorstLimitedOf(TriangleId t) const {
+  const auto [u, v, p] = triangulation_.triangle(t);
+  const double sagitta =
+      sagitta_.Bound(triangulation_.position(u), triangulation_.position(v), triangulation_.position(p));
+  return WorstLimited(*field_, {CornerAt(u), CornerAt(v), CornerAt(p)}, sagitta, options_.limits,
+                      options_.limits_scale);
 }
 
 Candidate GreedyTriangulation::Impl::WorstOnBorderOf(TriangleId t) {
@@ -379,7 +401,9 @@ Candidate GreedyTriangulation::Impl::WorstOnBorder(VertexId from, VertexId to) {
   const auto [begin, end] = along_x ? std::minmax(a.x, b.x) : std::minmax(a.y, b.y);
   BorderWorst& known = border_worst_[side][static_cast<std::size_t>(begin)];
   if (const auto edge_end = static_cast<std::uint32_t>(end); known.end != edge_end) {
-    const Candidate worst = WorstBorderSample(*field_, a, b, options_.borders[side]);
+    const BorderOptions& border = options_.borders[side];
+    const Candidate worst = options_.limits.empty() ? WorstBorderSample(*field_, a, b, border)
+                                                    : WorstLimitedBorderSample(*field_, a, b, border, options_.limits);
     known = {worst.error, worst.sample, edge_end};
   }
   return {known.error, known.sample};

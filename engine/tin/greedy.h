@@ -20,6 +20,7 @@
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"
+#include "engine/tin/sample_limits.h"
 
 namespace terrace::tin {
 
@@ -91,6 +92,8 @@ struct GreedyOptions {
   std::array<BorderOptions, 4> borders;  // by Side
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error
+  SampleLimits limits;          // may be empty
+  double limits_scale = 1;      // of caps inside (SampleLimits::Counted); borders keep theirs
   bool record = false;          // keep the order of insertions for MakeRefinement
 };
 

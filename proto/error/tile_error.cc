@@ -72,8 +72,14 @@ bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vert
 
 class TileErrorMeter::Impl {
  public:
-  Impl(const LatticeView& lattice, double bound_m)
-      : lattice_(lattice), cells_(lattice.cells()), bound_(bound_m), verticals_(lattice) {}
+  Impl(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m)
+      : lattice_(lattice),
+        cells_(lattice.cells()),
+        bound_(bound_m),
+        allowed_(std::move(allowed_m)),
+        least_(allowed_.empty() ? bound_m
+                                : std::min(bound_m, static_cast<double>(*std::ranges::min_element(allowed_)))),
+        verticals_(lattice) {}
 
   int cells() const { return cells_; }
   const Surface& surface() const { return surface_; }
@@ -93,7 +99,7 @@ class TileErrorMeter::Impl {
     for (std::size_t t = 0; t < readings_.size(); ++t) {
       Reading& reading = readings_[t];
       // Triangles that exceed the bound are reported again, because the samples that can be inserted change.
-      if (!is_alike || reading.most_m > bound_ || !IsSame(before, surface_, t, of_same_vertices))
+      if (!is_alike || reading.most_m > least_ || !IsSame(before, surface_, t, of_same_vertices))
         reading = ReadLinear(t);
       if (reading.most_m > readings_[worst].most_m) worst = t;
     }
@@ -103,9 +109,9 @@ class TileErrorMeter::Impl {
       if (!readings_[t].is_exact) readings_[t] = ReadBoth(t, result.misses, vertices);
       result.max_m = std::max(result.max_m, readings_[t].most_m);
     };
-    if (!readings_.empty() && readings_[worst].most_m <= bound_) measure(worst);
+    if (!readings_.empty() && readings_[worst].most_m <= least_) measure(worst);
     for (std::size_t t = 0; t < readings_.size(); ++t) {
-      if (readings_[t].most_m > std::min(result.max_m, bound_)) measure(t);
+      if (readings_[t].most_m > std::min(result.max_m, least_)) measure(t);
     }
     if (result.misses.empty()) result.misses = NeighboursOf(vertices);
     result.is_cut_through = result.misses.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
@@ -155,10 +161,16 @@ class TileErrorMeter::Impl {
 
   void Take(double error, int i, int j, Found& found) const {
     found.largest = std::max(found.largest, error);
-    if (!(error > bound_) || !IsInside(i, j)) return;
-    if (Miss& miss = MissOf(i, j, found); error > miss.error) {
-      miss = {error, {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)}};
+    const double counted = Counted(error, i, j);
+    if (!(counted > bound_) || !IsInside(i, j)) return;
+    if (Miss& miss = MissOf(i, j, found); counted > miss.error) {
+      miss = {counted, {static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j)}};
     }
+  }
+
+  // An error as a share of what is allowed, times the bound.
+  double Counted(double error, int i, int j) const {
+    return allowed_.empty() ? error : error * (bound_ / static_cast<double>(allowed_[NodeIndex(i, j)]));
   }
 
   Miss& MissOf(int i, int j, Found& found) const { return is_vertex_[NodeIndex(i, j)] ? found.vertex : found.sample; }
@@ -256,7 +268,7 @@ class TileErrorMeter::Impl {
           },
           [&](int j, int first, int last, double largest) {
             found.largest = std::max(found.largest, largest);
-            if (largest <= bound_) return;  // no samples of the row are skipped
+            if (largest <= least_) return;  // no samples of the row are skipped
             const double y = static_cast<double>(j * surface_.unit - p[0].y);
             for (int i = first; i <= last; ++i) {
               const double height = plane.At(static_cast<double>(i * surface_.unit - p[0].x), y);
@@ -294,10 +306,11 @@ class TileErrorMeter::Impl {
       const VerticalsInTriangle::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
       const double largest = verticals_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
-      if (largest <= found.largest && largest <= bound_) continue;
+      if (largest <= found.largest && largest <= least_) continue;
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
-        const bool counts = error > found.largest || (error > bound_ && error > MissOf(i, j, found).error);
+        const double counted = Counted(error, i, j);
+        const bool counts = error > found.largest || (counted > bound_ && counted > MissOf(i, j, found).error);
         if (!counts) continue;  // NaN: no height
         const bool meets = (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m ||
                            verticals_.Meets(corners, i, j);
@@ -311,6 +324,8 @@ class TileErrorMeter::Impl {
   const LatticeView lattice_;
   const int cells_;
   const double bound_;
+  const std::vector<float> allowed_;  // by node; empty: the bound
+  const double least_;                // of them
 
   // State of the mesh that is measured.
   Surface surface_;
@@ -320,8 +335,8 @@ class TileErrorMeter::Impl {
   const NodeVerticals verticals_;
 };
 
-TileErrorMeter::TileErrorMeter(const LatticeView& lattice, double bound_m)
-    : impl_(std::make_unique<Impl>(lattice, bound_m)) {}
+TileErrorMeter::TileErrorMeter(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m)
+    : impl_(std::make_unique<Impl>(lattice, bound_m, std::move(allowed_m))) {}
 TileErrorMeter::~TileErrorMeter() = default;
 
 TileError TileErrorMeter::Measure(const QuantizedTile& tile) {

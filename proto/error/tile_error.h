@@ -27,7 +27,8 @@ struct TileError {
 // call are not measured again. All meshes must be of the tile given by `lattice`.
 class TileErrorMeter {
  public:
-  TileErrorMeter(const LatticeView& lattice, double bound_m);
+  // `allowed_m`: the bound of each sample, at most `bound_m`, row by row; empty: `bound_m` everywhere.
+  TileErrorMeter(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m = {});
   ~TileErrorMeter();
 
   // Measures two surfaces at every lattice sample: the height interpolated in longitude and latitude, which clients

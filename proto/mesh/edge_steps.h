@@ -35,13 +35,31 @@ struct EdgeSteps {
   double Coarsest(tin::Side side) const;
 };
 
+// The smallest error that samples of each side and at each corner may have: that of the tile unless limits by place
+// (engine/tin/sample_limits.h) are smaller. What neighbours share has the same errors in both. An edge's step for its
+// error is at least an 8192nd of the step for the tile's error, so that in the proof above S <= 8192 M, and 16384 M + S
+// < 32767 M holds.
+struct EdgeErrors {
+  explicit EdgeErrors(double error_m) : tile(error_m) {
+    side.fill(error_m);
+    corner.fill(error_m);
+  }
+  double tile;
+  std::array<double, 4> side, corner;
+};
+
 double NeededStep(double min_height, double max_height);
 
 // `needed[row][column]` holds NeededStep of the tile (row = column = 1) and its eight neighbours, row 0 in the SOUTH.
 // `pole_step`: NeededStep of all heights of the dataset. `at_south_pole` / `at_north_pole`: the tile touches that pole;
 // the rows of `needed` beyond it are not read.
+EdgeSteps MakeEdgeSteps(const EdgeErrors& errors, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
+                        bool at_south_pole, bool at_north_pole);
 EdgeSteps MakeEdgeSteps(double error_m, const std::array<std::array<double, 3>, 3>& needed, double pole_step,
                         bool at_south_pole, bool at_north_pole);
+
+// The step of a vertex: that of its edge or corner; 0 inside the tile.
+double StepAt(const EdgeSteps& steps, int x, int y, int cells);
 
 // The multiple of `step` nearest to `height`; halves go up.
 double SnapHeight(double height, double step);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <set>
 #include <tuple>
 
 #include "engine/core/check.h"
@@ -71,13 +72,34 @@ std::vector<std::uint32_t> Rim(const tin::TinMesh& mesh, int cells) {
 //     |  /|
 //     | / |
 //     A---B
-void HangSkirt(const std::vector<std::uint32_t>& rim, std::uint32_t first_foot, std::vector<Triangle>& triangles) {
+//
+// `hangs`: from which of the rim's edges; empty: all.
+void HangSkirt(const std::vector<std::uint32_t>& rim, std::uint32_t first_foot, const std::vector<bool>& hangs,
+               std::vector<Triangle>& triangles) {
   const auto count = static_cast<std::uint32_t>(rim.size());
   for (std::uint32_t k = 0; k < count; ++k) {
+    if (!hangs.empty() && !hangs[k]) continue;
     const std::uint32_t next = (k + 1) % count;
     triangles.push_back({rim[k], first_foot + k, rim[next]});
     triangles.push_back({rim[next], first_foot + k, first_foot + next});
   }
+}
+
+// Removes triangles, and returns the rim's edges that are left.
+std::vector<bool> CutHoles(const std::vector<std::uint8_t>& left_out, const std::vector<std::uint32_t>& rim,
+                           std::vector<Triangle>& triangles) {
+  std::vector<Triangle> left;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> edges;
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (left_out[t] != 0) continue;
+    left.push_back(triangles[t]);
+    for (std::size_t k = 0; k < 3; ++k) edges.emplace(triangles[t][k], triangles[t][(k + 1) % 3]);
+  }
+  triangles = std::move(left);
+  std::vector<bool> hangs(rim.size());
+  for (std::size_t k = 0; k < rim.size(); ++k) hangs[k] = edges.contains({rim[k], rim[(k + 1) % rim.size()]});
+  if (triangles.empty()) hangs.front() = true;
+  return hangs;
 }
 
 bool HasMergedCorners(const Triangle& t, const std::vector<GridPoint>& points) {
@@ -134,6 +156,42 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
   return points;
 }
 
+GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double least_error_m, PositionWidth width)
+    : inside(GridStep(lattice, errors.tile, width)) {
+  // A step that does not fit would be doubled, but not by the neighbour (FitsFloats).
+  const double side_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees()) * lattice.cells;
+  const double finest_m = std::min(PowerOfTwoUpTo(side_m / 0x1p22), inside);
+  const auto step = [&](double error_m) { return std::max(GridStep(lattice, error_m, width), finest_m); };
+  for (std::size_t k = 0; k < 4; ++k) {
+    side[k] = step(errors.side[k]);
+    corner[k] = step(errors.corner[k]);
+  }
+  inside = step(std::min(errors.tile, least_error_m));
+}
+
+void GridSteps::Double() {
+  inside *= 2;
+  for (std::size_t k = 0; k < 4; ++k) side[k] *= 2, corner[k] *= 2;
+}
+
+std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, const GridSteps& steps) {
+  const NodePlacer placer(lattice);
+  EdgeSteps of_edges;
+  of_edges.side = steps.side;
+  of_edges.corner = steps.corner;
+  std::vector<GridPoint> points;
+  points.reserve(mesh.vertices.size());
+  for (const tin::SamplePosition node : mesh.vertices) {
+    const double on_edge = StepAt(of_edges, node.x, node.y, lattice.cells());
+    const double step = on_edge > 0 ? on_edge : steps.inside;
+    GridPoint point = Snap(placer.Place(node, 0), 1 / step);
+    const auto units = static_cast<std::int64_t>(step / steps.inside);
+    for (std::int64_t& axis : point) axis *= units;
+    points.push_back(point);
+  }
+  return points;
+}
+
 bool FitsFloats(const std::vector<GridPoint>& points, double step_m, double skirt_depth_m) {
   constexpr double kMaxSteps = 0x1p23;
   const GridBox box = BoxOf(points);
@@ -155,7 +213,8 @@ std::vector<geo::Vec3> GridPositions(const std::vector<GridPoint>& points, doubl
 }
 
 GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
-                      const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m) {
+                      const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
+                      const std::vector<std::uint8_t>& left_out) {
   TERRACE_CHECK(points.size() == mesh.vertices.size() && normals.size() == points.size());
   const NodePlacer placer(lattice);
   const std::vector<std::uint32_t> rim = Rim(mesh, lattice.cells());
@@ -168,7 +227,8 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
     nodes.push_back(mesh.vertices[top]);
   }
   std::vector<Triangle> triangles = mesh.triangles;
-  HangSkirt(rim, static_cast<std::uint32_t>(points.size()), triangles);
+  const std::vector<bool> hangs = left_out.empty() ? std::vector<bool>() : CutHoles(left_out, rim, triangles);
+  HangSkirt(rim, static_cast<std::uint32_t>(points.size()), hangs, triangles);
   if (std::erase_if(triangles, [&](const Triangle& t) { return HasMergedCorners(t, all); }) > 0) {
     Weld(all, all_normals, triangles);
   }

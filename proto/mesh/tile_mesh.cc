@@ -27,20 +27,6 @@ HeightScale ChooseScale(double low, double high) {
   }
 }
 
-// The height step of a vertex: that of its edge or corner; none inside the tile.
-double StepAt(const EdgeSteps& steps, int x, int y, int cells) {
-  const bool south = y == 0, east = x == cells, north = y == cells, west = x == 0;
-  if (south && west) return steps.corner[0];
-  if (south && east) return steps.corner[1];
-  if (north && east) return steps.corner[2];
-  if (north && west) return steps.corner[3];
-  if (south) return steps.side[0];
-  if (east) return steps.side[1];
-  if (north) return steps.side[2];
-  if (west) return steps.side[3];
-  return 0;
-}
-
 }  // namespace
 
 QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh, const EdgeSteps& steps) {

@@ -40,6 +40,7 @@ std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
   for (const config::SourceConfig& source : dataset.sources) {
     files.insert(files.end(), source.files.begin(), source.files.end());
   }
+  files.insert(files.end(), dataset.edits.begin(), dataset.edits.end());
   if (!dataset.water.mask.empty()) files.push_back(dataset.water.mask);
   if (!dataset.imagery.image.empty()) files.push_back(dataset.imagery.image);
   if (!dataset.baked.empty()) files.push_back(dataset.baked);

@@ -2,15 +2,16 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <mutex>
 #include <utility>
 
 namespace terrace::server {
 
 void BakedStore::Use(const std::vector<tiler::Dataset>& datasets) {
-  std::map<std::uint64_t, std::shared_ptr<const tiler::BakedTiles>> baked;
+  std::multimap<std::uint64_t, Archive> baked;
   for (const tiler::Dataset& dataset : datasets) {
-    if (dataset.baked) baked.emplace(dataset.generation, dataset.baked);
+    if (dataset.baked) baked.emplace(dataset.cache_generation(), Archive{dataset.baked, dataset.source});
   }
   const std::unique_lock lock(mutex_);
   baked_.swap(baked);
@@ -21,9 +22,14 @@ std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {
   std::shared_ptr<const tiler::BakedTiles> baked;
   {
     const std::shared_lock lock(mutex_);
-    const auto found = baked_.find(key.generation);
-    if (found == baked_.end()) return std::nullopt;
-    baked = found->second;
+    // Datasets may differ in their edits alone.
+    const auto [first, last] = baked_.equal_range(key.generation);
+    const auto found = std::find_if(first, last, [&](const auto& entry) {
+      const auto& source = entry.second.source;
+      return (source ? tiler::TileEdits(*source, key.request) : 0) == key.edits;
+    });
+    if (found == last) return std::nullopt;
+    baked = found->second.tiles;
   }
   Result<std::optional<tiler::EncodedTile>> tile = baked->Find(key.request);
   if (!tile) {

@@ -40,8 +40,12 @@ class BakedStore final : public tiler::TileStore {
   void Report(const std::string& fault);
 
   mutable std::shared_mutex mutex_;
-  std::map<std::uint64_t, std::shared_ptr<const tiler::BakedTiles>> baked_;  // by generation; guarded by mutex_
-  std::set<std::string> reported_;                                           // likewise
+  struct Archive {
+    std::shared_ptr<const tiler::BakedTiles> tiles;
+    std::shared_ptr<const dem::DemSource> source;  // whose edits the tiles have; null: without sources
+  };
+  std::multimap<std::uint64_t, Archive> baked_;  // by Dataset::cache_generation; guarded by mutex_
+  std::set<std::string> reported_;               // likewise
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0};
 };
 

@@ -62,6 +62,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.error_fraction = dataset.error_fraction;
   view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
+  view.unedited_generation = dataset.unedited_generation;
   if (dataset.baked) view.baked_coding = dataset.baked->coding();
   if (!dataset.source) {
     SetExtent(dataset, view);
@@ -76,6 +77,11 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.min_height_m = info.heights.min;
   view.max_height_m = info.heights.max;
   view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
+  if (info.edits > 0) {
+    view.edits_of = [pipeline, &source = *dataset.source](const tiler::TileRequest& request) {
+      return tiler::TileEdits(source, request);
+    };
+  }
   view.has_datum = dataset.source->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();

@@ -29,7 +29,10 @@ struct DatasetView {
   std::string attribution;
   double error_fraction = geo::kDefaultErrorFraction;
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
-  std::uint64_t generation = 0;                             // changes whenever the bytes of its tiles may change
+  std::uint64_t generation = 0;           // changes whenever the bytes of its tiles may change
+  std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
+  // tiler::TileEdits. Empty: there are no edits.
+  std::function<std::uint64_t(const tiler::TileRequest&)> edits_of = {};
   std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
   double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
   double min_height_m = 0, max_height_m = 0;                // of the data
@@ -49,6 +52,8 @@ struct DatasetView {
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
+  // What keys of caches contain.
+  std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
   // The deepest level of the sources; an archive may end above it.
   int deepest_level() const { return baked_alone ? baked_alone->extent().deepest_level : max_level(); }

@@ -1,5 +1,6 @@
 #include "server/tiles/tile_service.h"
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,9 +23,10 @@ std::string NameOf(const tiler::TileRequest& request) { return "tile " + geo::To
 
 // The generation identifies the dataset, because its index may differ in the next catalog.
 tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
-  const std::uint64_t generation = catalog.datasets[request.dataset].generation;
+  const DatasetView& dataset = catalog.datasets[request.dataset];
+  const std::uint64_t edits = dataset.edits_of ? dataset.edits_of(request) : 0;
   request.dataset = 0;
-  return {request, generation};
+  return {request, dataset.cache_generation(), edits};
 }
 
 }  // namespace
@@ -123,8 +125,23 @@ JobOrder TileService::OrderOf(Length length, Clock::time_point deadline, std::ui
 
 void TileService::RetainTilesOf(const Catalog& catalog) {
   std::vector<std::uint64_t> generations;
-  for (const DatasetView& dataset : catalog.datasets) generations.push_back(dataset.generation);
+  bool has_edits = false;
+  for (const DatasetView& dataset : catalog.datasets) {
+    generations.push_back(dataset.cache_generation());
+    has_edits |= static_cast<bool>(dataset.edits_of) || had_edits_;
+  }
   cache_.Retain(generations);
+  // Of datasets that stay: tiles that other edits touch than before.
+  if (has_edits) {
+    cache_.EraseIf([&](const tiler::CacheKey& key) {
+      return std::ranges::none_of(catalog.datasets, [&](const DatasetView& dataset) {
+        return dataset.cache_generation() == key.generation &&
+               key.edits == (dataset.edits_of ? dataset.edits_of(key.request) : 0);
+      });
+    });
+  }
+  had_edits_ = std::ranges::any_of(catalog.datasets,
+                                   [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_of); });
 }
 
 // Memory last: what is found in a slower tier meanwhile goes there.

@@ -111,6 +111,7 @@ class TileService {
   const BuildObserver observer_;
   const HeaderWriter write_head_;
   tiler::TileCache cache_;
+  std::atomic<bool> had_edits_{false};  // of the last catalog
   const std::vector<std::shared_ptr<tiler::TileStore>> stores_;
   WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;

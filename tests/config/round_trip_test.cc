@@ -35,6 +35,7 @@ TEST(ToJson, ComesBackWithEveryOptionSet) {
   dataset.nodata = {false, {-9999, 0.5}};
   dataset.attribution = "© \"ét\\é\"";
   dataset.error_fraction = 0.1;
+  dataset.edits = {"/data/runway.geojson", "/data/roads.geojson"};
   dataset.finest_error = 1e-3;
   dataset.floor = -0.3;
   dataset.max_void_gap = 7;
@@ -103,6 +104,7 @@ TEST(ToJson, NamesEveryOption) {
   config.admin_listen = ListenAddress{"127.0.0.1", 9090};
   config.access_log_file = "/var/log/terrace/access.log";
   DatasetConfig dataset = Dataset("a");
+  dataset.edits = {"/data/runway.geojson"};
   dataset.finest_error = 1;
   dataset.floor = 0;
   dataset.water.sea_level = 0;

@@ -13,6 +13,7 @@
 #include "proto/mesh/skirt.h"
 #include "proto/mesh/tile_normals.h"
 #include "tiler/encoders.h"
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/surface/drawn_triangles.h"
@@ -59,14 +60,22 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 
   tin::TinMesh& mesh = replayed->mesh;
-  double step_m = proto::GridStep(lattice.lattice, wanted_error_m, width);
+  const tin::SampleLimits limits = LimitsOf(*dataset.source, lattice.key);
+  std::vector<float> allowed = AllowedErrors(limits, replayed->error_m);
+  double least_m = wanted_error_m;
+  for (const float error_m : allowed) least_m = std::min(least_m, static_cast<double>(error_m));
+  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m), least_m, width);
+  double& step_m = steps.inside;
   const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
-  proto::TileErrorMeter meter(lattice, replayed->error_m);
+  proto::TileErrorMeter meter(lattice, replayed->error_m, std::move(allowed));
   std::vector<proto::GridPoint> points;
   std::vector<geo::Vec3> positions;
   const auto measure = [&](const tin::TinMesh& rounded) {
-    points = proto::SnapVertices(lattice, rounded, step_m);
-    while (!proto::FitsFloats(points, step_m, depth_m)) points = proto::SnapVertices(lattice, rounded, step_m *= 2);
+    points = proto::SnapVertices(lattice, rounded, steps);
+    while (!proto::FitsFloats(points, step_m, depth_m)) {
+      steps.Double();
+      points = proto::SnapVertices(lattice, rounded, steps);
+    }
     positions = proto::GridPositions(points, step_m);
     return meter.MeasureFlat(rounded, positions);
   };
@@ -74,8 +83,9 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
-  meshed.mesh = proto::MakeGridMesh(lattice, mesh, points,
-                                    RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m, depth_m);
+  meshed.mesh =
+      proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m,
+                          depth_m, TrianglesInHoles(*dataset.source, lattice.key, mesh));
   meshed.tin = std::move(mesh);
   meshed.positions = std::move(positions);
   return meshed;

@@ -7,6 +7,7 @@
 #include "proto/mesh/tile_normals.h"
 #include "proto/mesh/water_mask.h"
 #include "tiler/encoders.h"
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/tile_pipeline.h"
 
@@ -66,6 +67,8 @@ Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded
   if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
   const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
   if (!options) return tl::unexpected(options.error());
+  LeaveOut(TrianglesInHoles(*dataset.source, request.key, measured->mesh), measured->mesh, lattice.cells(),
+           measured->tile.triangles);
   encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
   encoded.times.refine += measured->replayed;
   encoded.times.encode = MicrosecondsSince(start) - measured->replayed;

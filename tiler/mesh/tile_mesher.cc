@@ -15,6 +15,7 @@
 #include "proto/mesh/edge_steps.h"
 #include "proto/mesh/tile_mesh.h"
 #include "tiler/mesh/inner_vertices.h"
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/restore_error_bound.h"
 
@@ -23,7 +24,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, double error_m) {
+proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, const proto::EdgeErrors& errors) {
   const std::int64_t rows = geo::TileRows(key.level);
   std::array<std::array<double, 3>, 3> needed{};
   for (int dy = -1; dy <= 1; ++dy) {
@@ -38,13 +39,13 @@ proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& k
   const dem::DemInfo& info = source.info();
   const double pole_step =
       proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
-  return proto::MakeEdgeSteps(error_m, needed, pole_step, key.y == 0, key.y == rows - 1);
+  return proto::MakeEdgeSteps(errors, needed, pole_step, key.y == 0, key.y == rows - 1);
 }
 
 // Quantizes, and inserts the samples that quantization pushed over the bound.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
-                          double error_m, const std::stop_token& stop) {
-  proto::TileErrorMeter meter(lattice, error_m);
+                          const tin::SampleLimits& limits, double error_m, const std::stop_token& stop) {
+  proto::TileErrorMeter meter(lattice, error_m, AllowedErrors(limits, error_m));
   MeshedTile meshed;
   const auto measure = [&](const tin::TinMesh& rounded) {
     meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
@@ -67,6 +68,7 @@ Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin
     tin::GreedyOptions options = plan;
     options.record = false;
     for (tin::BorderOptions& border : options.borders) border.scale = coarser;
+    options.limits_scale = coarser;
     for (tin::SeedGrid& grid : options.seeds) grid.below_error *= coarser;
     tin::GreedyTriangulation greedy(field, std::move(options));
     tin::GreedyGoal goal;
@@ -88,6 +90,7 @@ Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& 
   tin::DropOptions options;
   options.max_error = error_m * 31 / 32;
   options.curvature = plan.curvature;
+  if (!plan.limits.empty()) options.limits = &plan.limits;
   options.quantized_columns = quantized;
   options.quantized_rows = quantized;
   std::optional<tin::TinMesh> dropped = tin::DropVertices(field, mesh, options, stop);
@@ -114,8 +117,10 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
 
 tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
                                    tin::Criterion criterion) {
-  tin::GreedyOptions plan = MakeRefineOptions(lattice, EdgeStepsOf(source, lattice.key, proto::kHeightResolution));
+  const proto::EdgeErrors none(proto::kHeightResolution);
+  tin::GreedyOptions plan = MakeRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
   plan.criterion = criterion;
+  plan.limits = LimitsOf(source, lattice.key);
   return plan;
 }
 
@@ -138,13 +143,15 @@ Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::Latti
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
                             const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop) {
-  const proto::EdgeSteps steps = EdgeStepsOf(source, lattice.key, wanted_error_m);
+  const tin::SampleLimits limits = LimitsOf(source, lattice.key);
+  const proto::EdgeSteps steps =
+      EdgeStepsOf(source, lattice.key, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m));
   const Clock::time_point start = Clock::now();
   Result<ReplayedMesh> replayed = ReplayMesh(source, lattice, refinement, mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());
   double error_m = replayed->error_m;
   const auto replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), lattice, steps, error_m, stop);
+  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), lattice, steps, limits, error_m, stop);
   if (meshed) meshed->replayed = replay_time;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
@@ -152,7 +159,7 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
   Result<tin::TinMesh> mesh = RefineWithinFormat(
       FieldOf(lattice), RefineOptionsOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  meshed = Finish(*std::move(mesh), lattice, steps, error_m, stop);
+  meshed = Finish(*std::move(mesh), lattice, steps, limits, error_m, stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
     return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
   }

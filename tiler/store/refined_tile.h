@@ -25,8 +25,9 @@ inline std::size_t BytesOf(const RefinedTile& tile) {
 using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
 
 struct RefinedTileKey {
-  std::uint64_t generation = 0;  // identifies the dataset
+  std::uint64_t generation = 0;  // Dataset::cache_generation: identifies the dataset
   geo::TileKey key;
+  std::uint64_t edits = 0;  // TileEdits
 
   friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;
 };
@@ -35,7 +36,7 @@ struct RefinedTileKeyHash {
   std::size_t operator()(const RefinedTileKey& key) const noexcept {
     TileRequest request;
     request.key = key.key;
-    return TileRequestHash{}(request) ^ static_cast<std::size_t>(key.generation);
+    return TileRequestHash{}(request) ^ static_cast<std::size_t>(key.generation ^ key.edits);
   }
 };
 

@@ -42,7 +42,7 @@ std::string_view GetText(ByteReader& reader) {
 // All members are named, so that a new member fails to compile until it is added here: a key without it would find
 // tiles of other requests.
 std::string RecordKey(const CacheKey& key) {
-  const auto& [request, generation] = key;
+  const auto& [request, generation, edits] = key;
   const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
                height_encoding, height_size] = request;
   static_cast<void>(dataset);  // the generation identifies it
@@ -59,6 +59,7 @@ std::string RecordKey(const CacheKey& key) {
   writer.Put(static_cast<std::uint8_t>(metadata));
   writer.Put(static_cast<std::uint8_t>(height_encoding));
   writer.Put(static_cast<std::int32_t>(height_size));
+  writer.Put(edits);
   return writer.Take();
 }
 
@@ -66,6 +67,7 @@ std::string RecordKey(const RefinedTileKey& key) {
   ByteWriter writer;
   writer.Put(key.generation);
   Put(writer, key.key);
+  if (key.edits != 0) writer.Put(key.edits);
   return writer.Take();
 }
 
@@ -84,7 +86,7 @@ bool IsSelected(const TileSelection& selection, std::string_view record_key) {
   tile.x = reader.Get<std::int64_t>();
   tile.y = reader.Get<std::int64_t>();
   bool is_mercator = false;
-  if (reader.remaining() > 0) {  // a tile's
+  if (reader.remaining() > sizeof(std::uint64_t)) {  // a tile's
     reader.Get<std::int32_t>();
     is_mercator = reader.Get<std::uint8_t>() == static_cast<std::uint8_t>(TileFormat::kHeightPng);
   }

@@ -21,15 +21,16 @@ namespace terrace::tiler {
 // A request and the generation of its dataset, so that a replaced source never gets tiles of the old one. The
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
-  TileRequest request;  // its `dataset` is 0
-  std::uint64_t generation = 0;
+  TileRequest request;           // its `dataset` is 0
+  std::uint64_t generation = 0;  // Dataset::cache_generation
+  std::uint64_t edits = 0;       // TileEdits: tiles that an edit does not touch stay valid when it changes
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;
 };
 
 struct CacheKeyHash {
   std::size_t operator()(const CacheKey& key) const noexcept {
-    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation);
+    return TileRequestHash{}(key.request) ^ static_cast<std::size_t>(key.generation ^ key.edits);
   }
 };
 

@@ -53,6 +53,10 @@ class DropPass {
   bool IsOnBorder(SamplePosition p) const {
     return p.x == 0 || p.y == 0 || p.x == field_.width() - 1 || p.y == field_.height() - 1;
   }
+  bool IsForced(SamplePosition p) const {
+    if (options_.limits == nullptr || options_.limits->forced.empty()) return false;
+    return options_.limits->forced[static_cast<std::size_t>(p.y) * static_cast<std::size_t>(field_.width()) + p.x] != 0;
+  }
   std::vector<std::uint32_t> InOrderOfVisits(std::vector<std::uint32_t> sweep) const;
   bool Drop(std::uint32_t vertex);
   void LoadHole(std::uint32_t vertex);
@@ -113,7 +117,7 @@ std::vector<std::uint32_t> DropPass::InOrderOfVisits(std::vector<std::uint32_t> 
 
 bool DropPass::Drop(std::uint32_t vertex) {
   const std::span<const std::uint32_t> ring = rings_.Of(vertex);
-  if (ring.size() > Hole::kMaxSides) return false;
+  if (ring.size() > Hole::kMaxSides || IsForced(vertices_[vertex].position)) return false;
   LoadHole(vertex);
   for (const std::size_t apex : hole_.Fans(options_.max_error)) {
     if (!Fits(apex)) continue;
@@ -142,8 +146,11 @@ bool DropPass::Fits(std::size_t apex) const {
     const auto [a, b, c] = hole_.Triangle(apex, i);
     if (!TurnsOnWire(hole_.position(a), hole_.position(b), hole_.position(c))) return false;
     const std::array<Corner, 3> corners = {hole_.corner(a), hole_.corner(b), hole_.corner(c)};
-    const double bound = options_.max_error - sagitta_.Bound(hole_.position(a), hole_.position(b), hole_.position(c));
-    if (!SamplesAreWithin(field_, corners, bound)) return false;
+    const double sagitta = sagitta_.Bound(hole_.position(a), hole_.position(b), hole_.position(c));
+    const bool fits = options_.limits != nullptr
+                          ? SamplesAreAllowed(field_, corners, sagitta, *options_.limits, options_.max_error)
+                          : SamplesAreWithin(field_, corners, options_.max_error - sagitta);
+    if (!fits) return false;
   }
   return true;
 }

@@ -98,6 +98,7 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.voids = wanted.voids;
   options.cache = cache;
   options.feather = wanted.feather;
+  options.edits = wanted.edits;
   options.progress = progress;
   options.stop = std::move(stop);
   options.fault = std::move(fault);
@@ -125,6 +126,9 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   dataset.imagery = *std::move(imagery);
   dataset.metadata_levels = wanted.metadata_availability;
   dataset.generation = GenerationOf(wanted, dataset, version, dataset.source->fingerprint());
+  if (dataset.source->info().edits > 0) {
+    dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.source->unedited_fingerprint());
+  }
   dataset.options = GenerationOf(wanted, dataset, version, 0);
   return dataset;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -28,6 +29,7 @@
 #include "server/cli/common/option_flags.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
+#include "server/cli/info/edits_picture.h"
 #include "server/cli/info/mosaic_info.h"
 #include "tiler/encoder_version.h"
 
@@ -174,11 +176,23 @@ struct InfoArguments {
   std::vector<std::string> dems;
   std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
   bool json = false, mosaic = false;
+  std::string draw;  // file of a picture
 };
+
+// Writes the picture of a dataset's edits.
+int Draw(const dem::DemSource& source, const std::string& path) {
+  if (source.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
+  const Result<std::string> png = DrawEdits(source);
+  if (!png) return Fail(png.error().message, kExitFailure);
+  std::ofstream file(path, std::ios::binary);
+  file << *png;
+  file.close();
+  return file ? kExitOk : Fail(path + ": cannot be written", kExitFailure);
+}
 
 int Info(const InfoArguments& arguments) {
   spdlog::set_level(spdlog::level::err);  // what opening would log is printed below
-  const auto& [dems, dataset_flags, cache_flags, json, mosaic] = arguments;
+  const auto& [dems, dataset_flags, cache_flags, json, mosaic, draw] = arguments;
   config::DatasetConfig flags;
   config::Config config;
   std::vector<config::ConfigError> wrong;
@@ -219,11 +233,14 @@ int Info(const InfoArguments& arguments) {
       all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
       all.back()["left_out"] = info.left_out;
       all.back()["version"] = version;
+      if (info.edits > 0) all.back()["edits"] = info.edits;
     } else {
       is_one ? PrintText(info) : PrintMosaic(name, info);
       fmt::print("  {:<14}{}\n", "version", version);
+      if (info.edits > 0) fmt::print("  {:<14}{}\n", "edits", CountEdits(*source));
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
+    if (!draw.empty()) exit_code = std::max(exit_code, Draw(*source, draw));
   }
   if (!problem.empty()) {
     std::fprintf(stderr, "terrace: cache_dir %s: %s; what is learnt anew is not kept there\n",
@@ -244,7 +261,8 @@ void AddInfo(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  terrace info alps.tif andes.tif\n"
       "  terrace info alps.tif --json\n"
-      "  terrace info --mosaic lidar/ base.tif\n\n"
+      "  terrace info --mosaic lidar/ base.tif\n"
+      "  terrace info dem.tif --edits airport.geojson --draw airport.png\n\n"
       "A raster that cannot be served is reported on stderr, with the reason and the remedy, and the others\n"
       "are described. A folder or a mosaic with such a raster in it is not described at all: as a dataset\n"
       "it could not be served.");
@@ -252,11 +270,15 @@ void AddInfo(CLI::App& app, int& exit_code) {
   command->add_flag("--json", arguments->json, "Prints one JSON array instead of text");
   command->add_flag("--mosaic", arguments->mosaic,
                     "Describes all DEMs as one dataset; where they overlap, the first that has a height is used");
+  command->add_option("--draw", arguments->draw, "Writes a picture of the edits: hill shade with the features")
+      ->type_name("FILE.png");
   std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
-  about_heights.erase(
-      std::remove_if(about_heights.begin(), about_heights.end(),
-                     [](const auto& option) { return option.key != "vertical" && option.key != "nodata"; }),
-      about_heights.end());
+  about_heights.erase(std::remove_if(about_heights.begin(), about_heights.end(),
+                                     [](const auto& option) {
+                                       return option.key != "vertical" && option.key != "nodata" &&
+                                              option.key != "edits";
+                                     }),
+                      about_heights.end());
   AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });

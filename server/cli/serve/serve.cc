@@ -383,7 +383,7 @@ int Serve(const ServeArguments& arguments) {
     }
     baked->Use(served);
     std::vector<std::uint64_t> generations;
-    for (const tiler::Dataset& dataset : served) generations.push_back(dataset.generation);
+    for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
     refinements->Retain(generations);
   };
   hooks.reloaded = [&] {

@@ -161,6 +161,37 @@ TEST(TileService, ForgetsGenerationsThatAreGone) {
   EXPECT_EQ(service.stats().cache.entries, 1u) << "but not kept";
 }
 
+// Other edits are another generation, but the tiles that none of them touches have their old keys.
+TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
+  TileService service({});
+  const auto with_edits = [](std::uint64_t generation, std::uint64_t of_touched) {
+    const auto catalog = CatalogOf(BuildEmpty);
+    catalog->datasets[0].generation = generation;
+    catalog->datasets[0].unedited_generation = 1;
+    catalog->datasets[0].edits_of = [of_touched](const tiler::TileRequest& request) {
+      return request.key.x == 1 ? of_touched : std::uint64_t{0};
+    };
+    return catalog;
+  };
+  const auto unedited = CatalogOf(BuildEmpty), old = with_edits(2, 20), next = with_edits(3, 30);
+  tiler::TileRequest touched, untouched;
+  touched.key = {0, 1, 0};
+  untouched.key = {0, 0, 0};
+  for (const auto& catalog : {unedited, old, next}) service.RetainTilesOf(*catalog);
+  service.RetainTilesOf(*old);
+  EXPECT_EQ(Get(service, unedited, touched)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service, old, touched)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service, unedited, untouched)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service, old, untouched)->cache, CacheStatus::kHit);
+  service.RetainTilesOf(*next);
+  EXPECT_EQ(service.stats().cache.entries, 1u) << "two had edits that the new catalog does not have";
+  EXPECT_EQ(Get(service, next, touched)->cache, CacheStatus::kMiss);
+  EXPECT_EQ(Get(service, next, untouched)->cache, CacheStatus::kHit);
+  service.RetainTilesOf(*unedited);
+  EXPECT_EQ(service.stats().cache.entries, 1u);
+  EXPECT_EQ(Get(service, unedited, untouched)->cache, CacheStatus::kHit);
+}
+
 TEST(TileService, TellsTheObserverAboutEveryBuild) {
   std::atomic<int> good{0}, bad{0};
   TileService service({}, [&](const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {

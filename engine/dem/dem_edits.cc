@@ -1,0 +1,381 @@
+// Edits of a dataset: opening them, and their effect on what is read.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "engine/core/check.h"
+#include "engine/dem/crs/node_positions.h"
+#include "engine/dem/dem_impl.h"
+#include "engine/dem/edits/edit_shape.h"
+#include "engine/dem/edits/read_edits.h"
+#include "engine/dem/raster/grid_cells.h"
+#include "engine/geo/mercator_grid.h"
+
+namespace terrace::dem {
+namespace {
+
+bool Meets(const Box& box, const GeoBounds& bounds) {
+  const double east = bounds.west > bounds.east ? bounds.east + 360 : bounds.east;
+  if (box.north < bounds.south || box.south > bounds.north) return false;
+  return std::ranges::any_of(std::array{-360.0, 0.0, 360.0},
+                             [&](double turn) { return box.east + turn >= bounds.west && box.west + turn <= east; });
+}
+
+GeoPosition MiddleOf(const Edit& edit) { return {edit.plane.longitude, edit.plane.latitude}; }
+
+// Latitude and longitude in each other's place.
+Box Swapped(const Box& box) { return {box.south, box.west, box.north, box.east}; }
+
+EditFault FaultOf(const Edit& edit, std::string message) {
+  return {edit.file, edit.feature, MiddleOf(edit), std::move(message)};
+}
+
+// Positions on a grid over the polygon that lie inside it.
+std::vector<GeoPosition> PositionsInside(const Edit& edit) {
+  constexpr int kAcross = 32;
+  const double west = edit.reach.west + edit.blend_m / edit.plane.east_m;
+  const double east = edit.reach.east - edit.blend_m / edit.plane.east_m;
+  const double south = edit.reach.south + edit.blend_m / edit.plane.north_m;
+  const double north = edit.reach.north - edit.blend_m / edit.plane.north_m;
+  std::vector<GeoPosition> inside;
+  for (int j = 0; j < kAcross; ++j) {
+    const double latitude = south + (north - south) * (j + 0.5) / kAcross;
+    const EditRow row(edit, edit.plane.Y(latitude));
+    for (int i = 0; i < kAcross; ++i) {
+      const double longitude = west + (east - west) * (i + 0.5) / kAcross;
+      if (row.At(edit.plane.X(longitude)).is_inside) inside.push_back({longitude, latitude});
+    }
+  }
+  return inside;
+}
+
+std::optional<double> FlatHeightOf(FlatHeight kind, std::vector<float> heights) {
+  std::erase_if(heights, [](float height) { return std::isnan(height); });
+  if (heights.empty()) return std::nullopt;
+  if (kind == FlatHeight::kMean) {
+    double sum = 0;
+    for (const float height : heights) sum += static_cast<double>(height);
+    return static_cast<double>(RoundHeight(sum / static_cast<double>(heights.size())));
+  }
+  std::ranges::sort(heights);
+  return static_cast<double>(heights[heights.size() / 2]);
+}
+
+std::uint64_t MemoKey(const geo::TileKey& key) {
+  return static_cast<std::uint64_t>(key.level) << 58 ^ static_cast<std::uint64_t>(key.x) << 29 ^
+         static_cast<std::uint64_t>(key.y);
+}
+
+}  // namespace
+
+// Faults are collected: of files, of features, and of features and the sources together.
+Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
+  unedited_fingerprint = fingerprint;
+  unedited_heights = info.heights;
+  if (options.edits.empty()) return {};
+  std::vector<Edit> read;
+  std::vector<EditFault> faults;
+  edit_files = StampedFiles(options.edits);
+  for (const std::string& file : options.edits) ReadEdits(file, read, faults);
+  std::map<std::string, std::size_t> opened;
+  for (Edit& edit : read) {
+    if (options.stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
+    if (!Meets(edit.reach, info.bounds)) {
+      const bool is_swapped = Meets(Swapped(edit.reach), info.bounds);
+      faults.push_back(
+          FaultOf(edit, fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}",
+                                    info.bounds.south, info.bounds.north, info.bounds.west, info.bounds.east,
+                                    is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "")));
+      continue;
+    }
+    if (edit.op == EditOp::kFlatten && edit.flat != FlatHeight::kGiven) {
+      auto heights = PointsUnedited(PositionsInside(edit), HeightDatum::kEllipsoid, options.stop);
+      if (!heights) return tl::unexpected(std::move(heights).error());
+      const auto height = FlatHeightOf(edit.flat, *std::move(heights));
+      if (!height) {
+        faults.push_back(FaultOf(edit, "there are no heights inside it to take the mean or median of; give a height"));
+        continue;
+      }
+      edit.height_m = *height;
+      Complete(edit);
+    }
+    if (edit.op == EditOp::kReplace) {
+      const auto [known, is_new] = opened.emplace(edit.source, replacements.size());
+      if (is_new) {
+        DemOptions of_replacement;
+        of_replacement.source = options.source;
+        of_replacement.cache = options.cache;
+        of_replacement.stop = options.stop;
+        auto source = DemSource::Open(edit.source, of_replacement);
+        if (!source) {
+          opened.erase(known);
+          faults.push_back(FaultOf(edit, fmt::format("its source: {}", source.error().message)));
+          continue;
+        }
+        replacements.push_back(*std::move(source));
+      }
+      edit.replacement = known->second;
+      const DemSource& source = *replacements[edit.replacement];
+      edit.low_m = source.info().heights.min;
+      edit.high_m = source.info().heights.max;
+      ContentHasher hasher;
+      hasher.Add(edit.hash);
+      hasher.Add(source.fingerprint());
+      edit.hash = hasher.Hash();
+    }
+  }
+  if (const auto changed = edit_files.FirstChanged()) return tl::unexpected(ChangedError(*changed));
+  if (!faults.empty()) return MakeError(ErrorCode::kInvalidArgument, "edits: {}", TextOf(faults));
+  for (const auto& source : replacements) edit_files.Append(source->files());
+  ContentHasher hasher;
+  hasher.Add(unedited_fingerprint);
+  hasher.Add(std::uint64_t{read.size()});
+  std::vector<std::size_t> all;
+  for (const Edit& edit : read) {
+    hasher.Add(edit.hash);
+    all.push_back(all.size());
+  }
+  fingerprint = hasher.Hash().low;
+  edits = std::make_unique<const EditSet>(std::move(read));
+  info.heights = edits->Extended(info.heights, all, [&](const Edit& edit) -> HeightRange {
+    return {edit.low_m, edit.high_m};
+  });
+  info.edits = edits->edits().size();
+  return {};
+}
+
+template <typename NodeGrid>
+std::vector<std::size_t> DemSource::Impl::EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const {
+  if (edits == nullptr) return {};
+  return edits->Find(BoxOf(node_grid, window));
+}
+
+template <typename NodeGrid>
+Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
+                                         std::span<const std::size_t> which, std::span<float> heights,
+                                         const std::stop_token& stop, double* error_m) const {
+  // Of a replacement: heights before other edits, so that its voids show what is below.
+  const auto replaced = [&](const Edit& edit) -> Result<ReplacedHeights> {
+    const Impl& other = *replacements[edit.replacement]->impl_;
+    std::vector<PartTrace> traces;
+    auto read = other.ReadGrids(node_grid, window, HeightDatum::kEllipsoid, edit.source, stop,
+                                error_m != nullptr ? &traces : nullptr);
+    if (!read) return tl::unexpected(std::move(read).error());
+    ReplacedHeights result{*std::move(read), 0};
+    if constexpr (std::is_same_v<NodeGrid, geo::Lattice>) {
+      if (error_m != nullptr) {
+        TileHeights tile{node_grid, window.columns, result.heights};
+        for (std::size_t k = 0; k < tile.heights.size(); ++k) {
+          if (std::isnan(tile.heights[k])) tile.heights[k] = heights[k];
+        }
+        const auto bound = other.BoundError(tile, window, std::move(traces), stop);
+        if (!bound) return tl::unexpected(bound.error());
+        result.error_m = *bound;
+      }
+    }
+    return result;
+  };
+  return edits->Apply(node_grid, window, which, heights, replaced, error_m);
+}
+
+template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
+template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::MercatorGrid&, const NodeWindow&) const;
+template Result<void> DemSource::Impl::ApplyEdits(const geo::Lattice&, const NodeWindow&, std::span<const std::size_t>,
+                                                  std::span<float>, const std::stop_token&, double*) const;
+template Result<void> DemSource::Impl::ApplyEdits(const geo::MercatorGrid&, const NodeWindow&,
+                                                  std::span<const std::size_t>, std::span<float>,
+                                                  const std::stop_token&, double*) const;
+
+// Edits have heights above the ellipsoid. Heights in another datum change by as much as those.
+Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
+                                                      const std::string& what, const std::stop_token& stop) const {
+  const geo::Lattice& lattice = LatticeOf(level);
+  auto heights = ReadUnedited(level, window, datum, what, stop);
+  if (!heights) return heights;
+  const std::vector<std::size_t> which = EditsAt(lattice, window);
+  if (which.empty()) return heights;
+  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
+    if (auto edited = ApplyEdits(lattice, window, which, *heights, stop); !edited) {
+      return tl::unexpected(std::move(edited).error());
+    }
+    return heights;
+  }
+  const auto before = ReadUnedited(level, window, HeightDatum::kEllipsoid, what, stop);
+  if (!before) return before;
+  std::vector<float> after = *before;
+  if (auto edited = ApplyEdits(lattice, window, which, after, stop); !edited) {
+    return tl::unexpected(std::move(edited).error());
+  }
+  for (std::size_t k = 0; k < after.size(); ++k) {
+    if (after[k] == (*before)[k]) continue;
+    (*heights)[k] = RoundHeight(static_cast<double>((*heights)[k]) + static_cast<double>(after[k]) -
+                                static_cast<double>((*before)[k]));
+  }
+  return heights;
+}
+
+// Where there is no height, an edit whose share is 1 makes one, but above the ellipsoid alone.
+Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                         std::span<float> heights, const std::stop_token& stop) const {
+  std::vector<std::size_t> edited;
+  std::vector<std::vector<std::size_t>> which;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double x = std::remainder(points[i].longitude, 360.0), y = points[i].latitude;
+    if (auto found = edits->Find({x, y, x, y}); !found.empty()) {
+      edited.push_back(i);
+      which.push_back(std::move(found));
+    }
+  }
+  if (edited.empty()) return {};
+  std::vector<GeoPosition> at;
+  for (const std::size_t i : edited) at.push_back(points[i]);
+  std::vector<float> above;
+  if (datum != HeightDatum::kEllipsoid) {
+    auto read = PointsUnedited(at, HeightDatum::kEllipsoid, stop);
+    if (!read) return tl::unexpected(std::move(read).error());
+    above = *std::move(read);
+  }
+  std::vector<std::optional<std::vector<float>>> others(replacements.size());
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    for (const std::size_t number : which[k]) {
+      const Edit& edit = edits->edits()[number];
+      if (edit.op != EditOp::kReplace || others[edit.replacement]) continue;
+      auto read = replacements[edit.replacement]->ReadPoints(at, HeightDatum::kEllipsoid, stop);
+      if (!read) return tl::unexpected(std::move(read).error());
+      others[edit.replacement] = *std::move(read);
+    }
+  }
+  for (std::size_t k = 0; k < at.size(); ++k) {
+    float& height = heights[edited[k]];
+    const double before = static_cast<double>(above.empty() ? height : above[k]);
+    const double after = edits->ApplyAt(
+        at[k], which[k], before, [&](const Edit& edit) { return static_cast<double>((*others[edit.replacement])[k]); });
+    if (above.empty()) {
+      height = static_cast<float>(after);
+    } else if (!(after == before)) {
+      height = RoundHeight(static_cast<double>(height) + after - before);
+    }
+  }
+  return {};
+}
+
+HeightRange DemSource::Impl::RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice,
+                                                const geo::TileKey& key) const {
+  return replacements[edit.replacement]->impl_->UneditedRange(lattice, key);
+}
+
+HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
+  const HeightRange range = impl_->UneditedRange(lattice, key);
+  const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
+  if (which.empty()) return range;
+  return impl_->edits->Extended(range, which,
+                                [&](const Edit& edit) { return impl_->RangeOfReplacement(edit, lattice, key); });
+}
+
+MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  if (impl_->edits == nullptr) return {};
+  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
+  const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells + 1, lattice.cells + 1};
+  const auto which = impl_->EditsAt(lattice, window);
+  if (which.empty()) return {};
+  return impl_->edits->DemandsOf(lattice, window, which);
+}
+
+std::uint64_t DemSource::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
+
+std::uint64_t DemSource::EditsOf(const geo::TileKey& key) const {
+  if (impl_->edits == nullptr || !geo::IsValid(key) || key.level > geo::kMaxLevel) return 0;
+  return impl_->HashEditsOf(key);
+}
+
+std::uint64_t DemSource::EditsOfMercator(int depth, const NodeWindow& window) const {
+  if (impl_->edits == nullptr) return 0;
+  const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window);
+  if (which.empty()) return 0;
+  ContentHasher hasher;
+  for (const std::size_t number : which) hasher.Add(impl_->edits->edits()[number].hash);
+  return hasher.Hash().low | 1;
+}
+
+// The edits that reach the tile's samples or their halo, and the ranges of neighbours that edits have changed, on which
+// the height steps of common edges depend (proto/mesh/edge_steps.h).
+std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
+  const geo::Lattice& lattice = LatticeOf(key.level);
+  const bool is_polar = key.y == 0 || key.y == geo::TileRows(key.level) - 1;
+  const bool is_range_edited = unedited_heights.min != info.heights.min || unedited_heights.max != info.heights.max;
+  NodeWindow around = WindowOfTile(lattice, key);
+  around.column -= lattice.cells;
+  around.columns += 2 * lattice.cells;
+  const std::int64_t first = std::max<std::int64_t>(around.row - lattice.cells, 0);
+  const std::int64_t last = std::min(around.row + around.rows + lattice.cells, lattice.rows() + 1);
+  around.row = first;
+  around.rows = static_cast<int>(last - first);
+  Box box = BoxOf(lattice, around);
+  box.Grow(1e-8, 1e-8);  // contains the boxes of all nine tiles, whose corners are rounded in other ways
+  const bool is_alone = edits->Find(box).empty();
+  if (is_alone && !(is_polar && is_range_edited)) return 0;
+  {
+    const std::lock_guard lock(hashes_mutex);
+    if (const auto known = hashes.find(MemoKey(key)); known != hashes.end()) return known->second;
+  }
+  ContentHasher hasher;
+  bool is_touched = false;
+  for (const std::size_t number : EditsAt(lattice, WindowOfTile(lattice, key))) {
+    hasher.Add(edits->edits()[number].hash);
+    is_touched = true;
+  }
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
+      if ((dx == 0 && dy == 0) || neighbour.y < 0 || neighbour.y >= geo::TileRows(key.level)) continue;
+      const auto which = EditsAt(lattice, WindowOfTile(lattice, neighbour));
+      if (which.empty()) continue;
+      const HeightRange before = UneditedRange(lattice, neighbour);
+      const HeightRange after = edits->Extended(
+          before, which, [&](const Edit& edit) { return RangeOfReplacement(edit, lattice, neighbour); });
+      if (after.min == before.min && after.max == before.max) continue;
+      is_touched = true;
+      for (const double value : {double(dx), double(dy), after.min, after.max}) hasher.Add(value);
+    }
+  }
+  if (is_polar && is_range_edited) {
+    is_touched = true;
+    hasher.Add(info.heights.min);
+    hasher.Add(info.heights.max);
+  }
+  const std::uint64_t hash = is_touched ? hasher.Hash().low | 1 : 0;
+  constexpr std::size_t kMost = std::size_t{1} << 18;
+  const std::lock_guard lock(hashes_mutex);
+  if (hashes.size() >= kMost) hashes.clear();
+  hashes.emplace(MemoKey(key), hash);
+  return hash;
+}
+
+std::vector<EditOutline> DemSource::Edits() const {
+  std::vector<EditOutline> outlines;
+  if (impl_->edits == nullptr) return outlines;
+  for (const Edit& edit : impl_->edits->edits()) {
+    EditOutline& outline = outlines.emplace_back();
+    outline.op = NameOf(edit.op);
+    outline.is_area = edit.is_area;
+    outline.file = edit.file;
+    outline.feature = edit.feature;
+    for (const auto& ring : edit.rings) {
+      auto& line = outline.lines.emplace_back();
+      for (const PlanPoint point : ring) {
+        line.push_back(
+            {edit.plane.longitude + point.x / edit.plane.east_m, edit.plane.latitude + point.y / edit.plane.north_m});
+      }
+      if (edit.is_area) line.push_back(line.front());
+    }
+  }
+  return outlines;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,217 @@
+#include "engine/dem/edits/edit_shape.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "engine/geo/ellipsoid.h"
+
+namespace terrace::dem {
+namespace {
+
+double Cross(PlanPoint a, PlanPoint b, PlanPoint c) { return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x); }
+
+double Sign(const std::vector<PlanPoint>& ring) {
+  double area = 0;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const PlanPoint a = ring[i], b = ring[(i + 1) % ring.size()];
+    area += a.x * b.y - b.x * a.y;
+  }
+  return area < 0 ? -1 : 1;
+}
+
+bool IsConvex(const std::vector<PlanPoint>& ring) {
+  const double sign = Sign(ring);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (sign * Cross(ring[i], ring[(i + 1) % ring.size()], ring[(i + 2) % ring.size()]) < 0) return false;
+  }
+  return true;
+}
+
+// The height of a point in the plane through a triangle's corners, and the gradient.
+std::array<double, 3> PlaneThrough(PlanPoint a, PlanPoint b, PlanPoint c, double ha, double hb, double hc) {
+  const double area = Cross(a, b, c), d1 = hb - ha, d2 = hc - ha;
+  const double gx = (d1 * (c.y - a.y) - d2 * (b.y - a.y)) / area;
+  const double gy = (d2 * (b.x - a.x) - d1 * (c.x - a.x)) / area;
+  return {gx, gy, ha - gx * a.x - gy * a.y};
+}
+
+std::size_t EdgesOf(const Edit& edit, std::size_t ring) { return edit.rings[ring].size() - (edit.is_area ? 0 : 1); }
+
+}  // namespace
+
+double EditPlane::X(double lon) const { return std::remainder(lon - longitude, 360.0) * east_m; }
+
+EditRow::EditRow(const Edit& edit, double y) : edit_(edit), y_(y) {
+  const double reach = edit.reach_m();
+  for (std::uint32_t r = 0; r < edit.rings.size(); ++r) {
+    const auto& ring = edit.rings[r];
+    for (std::uint32_t e = 0; e < EdgesOf(edit, r); ++e) {
+      const PlanPoint a = ring[e], b = ring[(e + 1) % ring.size()];
+      if (edit.is_area && (a.y <= y) != (b.y <= y)) crossings_.push_back(a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y));
+      const auto [low, high] = std::minmax(a.y, b.y);
+      if (y < low - reach || y > high + reach) continue;
+      const double dx = b.x - a.x, dy = b.y - a.y, length2 = dx * dx + dy * dy;
+      edges_.push_back({a, b, length2 > 0 ? 1 / length2 : 0, r, e});
+    }
+  }
+  std::ranges::sort(crossings_);
+}
+
+EditPlace EditRow::At(double x) const {
+  EditPlace place;
+  const auto before = std::ranges::lower_bound(crossings_, x) - crossings_.begin();
+  if (before % 2 == 1) {
+    place.is_inside = true;
+    return place;
+  }
+  // Beyond the reach nothing depends on the distance.
+  const double reach = edit_.reach_m();
+  double best = std::numeric_limits<double>::infinity();
+  for (const Edge& edge : edges_) {
+    const auto [west, east] = std::minmax(edge.a.x, edge.b.x);
+    if (x < west - reach || x > east + reach) continue;
+    const double dx = edge.b.x - edge.a.x, dy = edge.b.y - edge.a.y;
+    const double t = std::clamp(((x - edge.a.x) * dx + (y_ - edge.a.y) * dy) * edge.inverse_length2, 0.0, 1.0);
+    const double ex = edge.a.x + t * dx - x, ey = edge.a.y + t * dy - y_, square = ex * ex + ey * ey;
+    if (square >= best) continue;
+    best = square;
+    place.ring = edge.ring;
+    place.edge = edge.edge;
+    place.along = t;
+  }
+  place.distance_m = std::isfinite(best) ? std::sqrt(best) : 2 * reach + 1;
+  return place;
+}
+
+double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
+  if (edit.op == EditOp::kFlatten) return edit.height_m;
+  if (!place.is_inside) {
+    const auto& heights = edit.heights[place.ring];
+    const double from = heights[place.edge], to = heights[(place.edge + 1) % heights.size()];
+    return from + place.along * (to - from);
+  }
+  std::array<double, 3> slope = edit.slope;
+  if (!edit.triangles.empty()) {
+    // The triangle that contains the point, or is nearest to containing it: rounding may leave it outside all.
+    double best = -std::numeric_limits<double>::infinity();
+    const auto& ring = edit.rings.front();
+    const auto& heights = edit.heights.front();
+    for (const auto& [a, b, c] : edit.triangles) {
+      const double sign = Cross(ring[a], ring[b], ring[c]) < 0 ? -1 : 1;
+      const double depth = std::min({sign * Cross(ring[a], ring[b], point), sign * Cross(ring[b], ring[c], point),
+                                     sign * Cross(ring[c], ring[a], point)});
+      if (depth <= best) continue;
+      best = depth;
+      slope = PlaneThrough(ring[a], ring[b], ring[c], heights[a], heights[b], heights[c]);
+    }
+  }
+  return slope[0] * point.x + slope[1] * point.y + slope[2];
+}
+
+std::vector<std::array<std::uint32_t, 3>> CutEars(const std::vector<PlanPoint>& ring) {
+  std::vector<std::uint32_t> left(ring.size());
+  std::iota(left.begin(), left.end(), 0U);
+  const double sign = Sign(ring);
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  while (left.size() >= 3) {
+    const std::size_t n = left.size();
+    std::size_t ear = n;
+    for (std::size_t i = 0; i < n && ear == n; ++i) {
+      const std::uint32_t a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
+      const double area = sign * Cross(ring[a], ring[b], ring[c]);
+      if (area < 0 || (area == 0 && n > 3)) continue;
+      const bool is_free = std::ranges::none_of(left, [&](std::uint32_t k) {
+        if (k == a || k == b || k == c) return false;
+        return sign * Cross(ring[a], ring[b], ring[k]) >= 0 && sign * Cross(ring[b], ring[c], ring[k]) >= 0 &&
+               sign * Cross(ring[c], ring[a], ring[k]) >= 0;
+      });
+      if (is_free) ear = i;
+    }
+    if (ear == n) return {};
+    const std::uint32_t a = left[(ear + n - 1) % n], b = left[ear], c = left[(ear + 1) % n];
+    if (Cross(ring[a], ring[b], ring[c]) != 0) triangles.push_back({a, b, c});
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(ear));
+  }
+  return triangles;
+}
+
+namespace {
+
+// Lowest, highest and steepest of the target heights.
+void MeasureTarget(Edit& edit) {
+  edit.low_m = std::numeric_limits<double>::infinity();
+  edit.high_m = -edit.low_m;
+  edit.steepest = 0;
+  if (edit.op == EditOp::kFlatten) edit.low_m = edit.high_m = edit.height_m;
+  if (edit.triangles.empty()) {
+    edit.steepest = std::hypot(edit.slope[0], edit.slope[1]);
+  } else {
+    const auto& ring = edit.rings.front();
+    const auto& heights = edit.heights.front();
+    for (const auto& [a, b, c] : edit.triangles) {
+      const auto slope = PlaneThrough(ring[a], ring[b], ring[c], heights[a], heights[b], heights[c]);
+      edit.steepest = std::max(edit.steepest, std::hypot(slope[0], slope[1]));
+    }
+  }
+  for (std::size_t r = 0; r < edit.heights.size(); ++r) {
+    for (const double height : edit.heights[r]) {
+      edit.low_m = std::min(edit.low_m, height);
+      edit.high_m = std::max(edit.high_m, height);
+    }
+    for (std::size_t e = 0; e < EdgesOf(edit, r); ++e) {
+      const auto& ring = edit.rings[r];
+      const std::size_t next = (e + 1) % ring.size();
+      const double length = std::hypot(ring[next].x - ring[e].x, ring[next].y - ring[e].y);
+      if (length > 0)
+        edit.steepest = std::max(edit.steepest, std::abs(edit.heights[r][next] - edit.heights[r][e]) / length);
+    }
+  }
+}
+
+void HashContent(Edit& edit) {
+  ContentHasher hasher;
+  hasher.Add(static_cast<std::uint8_t>(edit.op));
+  hasher.Add(edit.is_area);
+  for (const double value : {edit.plane.longitude, edit.plane.latitude, edit.blend_m, edit.half_width_m, edit.height_m,
+                             edit.offset_m, edit.error_m, edit.factor}) {
+    hasher.Add(value);
+  }
+  hasher.Add(edit.min_level);
+  for (const auto& ring : edit.rings) {
+    hasher.Add(std::uint64_t{ring.size()});
+    for (const PlanPoint point : ring) {
+      hasher.Add(point.x);
+      hasher.Add(point.y);
+    }
+  }
+  for (const auto& heights : edit.heights) {
+    for (const double height : heights) hasher.Add(height);
+  }
+  edit.hash = hasher.Hash();
+}
+
+}  // namespace
+
+void Complete(Edit& edit) {
+  double west = 0, east = 0, south = 0, north = 0;
+  for (const auto& ring : edit.rings) {
+    for (const PlanPoint point : ring) {
+      west = std::min(west, point.x);
+      east = std::max(east, point.x);
+      south = std::min(south, point.y);
+      north = std::max(north, point.y);
+    }
+  }
+  const double reach = edit.reach_m();
+  const EditPlane& plane = edit.plane;
+  edit.reach = {plane.longitude + (west - reach) / plane.east_m, plane.latitude + (south - reach) / plane.north_m,
+                plane.longitude + (east + reach) / plane.east_m, plane.latitude + (north + reach) / plane.north_m};
+  constexpr double kSlack = 1e-9;
+  edit.reach.Grow(kSlack, kSlack);
+  edit.is_convex = edit.is_area && edit.rings.size() == 1 && IsConvex(edit.rings.front());
+  MeasureTarget(edit);
+  HashContent(edit);
+}
+
+}  // namespace terrace::dem

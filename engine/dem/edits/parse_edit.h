@@ -1,0 +1,19 @@
+// One GeoJSON feature as an edit.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/dem/edits/edit.h"
+#include "engine/dem/edits/read_edits.h"
+
+namespace terrace::dem {
+
+// A feature without properties.terrain is no edit: nothing. `file` and `feature` name it. Appends what is wrong; then
+// there is no edit either.
+std::optional<Edit> ParseEdit(const nlohmann::json& json, const std::string& file, std::size_t feature,
+                              std::vector<EditFault>& faults);
+
+}  // namespace terrace::dem

@@ -1,0 +1,72 @@
+// Limits of the error that differ from sample to sample: precision by place, and features that are inserted first.
+//
+// Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5. An error e of
+// a sample counts as
+//   weight e           while e <= cap,
+//   weight e 2^34      above: every cap in metres precedes every error of a run (below 2^34 times the smallest cap),
+//   max(e, 1) 2^40     if the sample is forced, whatever its error is.
+// None of this depends on the goal of a run, so coarser meshes stay prefixes of finer ones. A mesh to the error E has
+// e <= min(E / weight, cap) at every sample, and all forced samples as vertices.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "engine/tin/mesh/candidate.h"
+#include "engine/tin/mesh/height_field.h"
+#include "engine/tin/mesh/plane.h"
+
+namespace terrace::tin {
+
+// All members have a value for each sample, row by row, or are empty.
+struct SampleLimits {
+  std::vector<float> weights;        // at least 1
+  std::vector<float> caps;           // metres, above 0; infinite: none. As long as `weights`
+  std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
+
+  bool empty() const { return weights.empty() && forced.empty(); }
+
+  // What the error of a sample counts as. `scale`: caps count this many times, and from 1024 on nothing is forced: for
+  // runs that may not take more vertices.
+  double Counted(std::size_t sample, double error, double scale = 1) const {
+    constexpr double kBeyondCap = 0x1p34, kForced = 0x1p40, kGiveUp = 1024;
+    if (!forced.empty() && forced[sample] != 0 && scale < kGiveUp) return std::max(error, 1.0) * kForced;
+    if (weights.empty()) return error;
+    const double weighted = error * static_cast<double>(weights[sample]);
+    return error > scale * static_cast<double>(caps[sample]) ? weighted * kBeyondCap : weighted;
+  }
+
+  // The largest error that a run to `error` leaves at a sample.
+  double Allowed(std::size_t sample, double error) const {
+    if (weights.empty()) return error;
+    return std::min(error / static_cast<double>(weights[sample]), static_cast<double>(caps[sample]));
+  }
+};
+
+// A box of samples.
+struct SampleBox {
+  int west = std::numeric_limits<int>::max(), south = west, east = -1, north = -1;
+
+  void Add(int x, int y) {
+    west = std::min(west, x), east = std::max(east, x);
+    south = std::min(south, y), north = std::max(north, y);
+  }
+};
+
+// The samples that have a limit.
+SampleBox BoxOfLimits(const SampleLimits& limits, int width, int height);
+
+// The worst sample of a closed triangle without its corners and without the field's border, by what errors count as.
+// `sagitta_m` is added to distances. Safe to call from many threads at once.
+Candidate WorstLimited(const HeightField& field, const std::array<Corner, 3>& corners, double sagitta_m,
+                       const SampleLimits& limits, double scale);
+
+// As SamplesAreWithin (scan/triangle_spans.h), with max_error as the run's error; `sagitta_m` counts.
+bool SamplesAreAllowed(const HeightField& field, const std::array<Corner, 3>& corners, double sagitta_m,
+                       const SampleLimits& limits, double max_error);
+
+}  // namespace terrace::tin

@@ -1,0 +1,255 @@
+// Edits: what is wrong with files, and heights at points, nodes and pixels.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+// A slope of 1 m a pixel to the east from 100 m, at 10 .. 10.4 E, 50 .. 50.4 N.
+std::string WriteSlope(const TempDir& dir) {
+  RasterSpec spec;
+  spec.width = spec.height = 400;
+  spec.geo_transform = {10, 0.001, 0, 50.4, 0, -0.001};
+  spec.value = [](int column, int) { return 100.0 + column; };
+  return WriteRaster(dir, spec);
+}
+
+std::string WriteEdits(const TempDir& dir, const std::string& features, const std::string& name = "edits.geojson") {
+  std::ofstream(dir.File(name)) << R"({"type":"FeatureCollection","features":[)" << features << "]}";
+  return dir.File(name);
+}
+
+std::string Rectangle(const std::string& terrain, double west, double south, double east, double north) {
+  return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{0}}},"geometry":{{"type":"Polygon","coordinates":)"
+                     R"([[[{1},{2}],[{3},{2}],[{3},{4}],[{1},{4}],[{1},{2}]]]}}}})",
+                     terrain, west, south, east, north);
+}
+std::string Middle(const std::string& terrain) { return Rectangle(terrain, 10.15, 50.15, 10.25, 50.25); }
+
+class TerrainEdits : public testing::Test {
+ protected:
+  std::unique_ptr<DemSource> Open(const std::string& features) {
+    DemOptions options;
+    options.edits = {WriteEdits(dir_, features)};
+    return OpenOrFail(slope_, options);
+  }
+  std::string MessageOf(const std::string& features) {
+    DemOptions options;
+    options.edits = {WriteEdits(dir_, features)};
+    const auto opened = DemSource::Open(slope_, options);
+    EXPECT_FALSE(opened.has_value());
+    return opened ? "" : opened.error().message;
+  }
+  static double At(const DemSource& source, double longitude, double latitude) {
+    const auto heights = source.ReadPoints(std::array{GeoPosition{longitude, latitude}});
+    EXPECT_TRUE(heights.has_value());
+    return heights ? static_cast<double>(heights->front()) : 0;
+  }
+
+  const TempDir dir_;
+  const std::string slope_ = WriteSlope(dir_);
+};
+
+TEST_F(TerrainEdits, FlattenInsideBlendOutsideAndNothingBeyond) {
+  const auto source = Open(Middle(R"({"op":"flatten","height":500,"blend_m":1000})"));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(At(*source, 10.2, 50.2), 500);
+  // Half of the blend: half of the way. A degree is 71,500 m long here.
+  const double half = 10.25 + 500 / 71'578.0;
+  const double before = 100 + (half - 10.0005) * 1000;
+  EXPECT_NEAR(At(*source, half, 50.2), (500 + before) / 2, 1);
+  EXPECT_NEAR(At(*source, 10.3, 50.2), 100 + (10.3 - 10.0005) * 1000, 0.01);
+}
+
+TEST_F(TerrainEdits, TakeTheMeanOrTheMedian) {
+  const auto mean = Open(Middle(R"({"op":"flatten","height":"mean"})"));
+  const auto median = Open(Middle(R"({"op":"flatten","height":"median"})"));
+  ASSERT_TRUE(mean && median);
+  EXPECT_NEAR(At(*mean, 10.2, 50.2), 299.5, 0.01);
+  EXPECT_NEAR(At(*median, 10.2, 50.2), 299.5, 4);
+}
+
+TEST_F(TerrainEdits, SlopeIsAPlaneOrTriangles) {
+  const auto plane = Open(Middle(R"({"op":"slope","heights":[100,200,null,100]})"));
+  ASSERT_NE(plane, nullptr);
+  EXPECT_NEAR(At(*plane, 10.2, 50.2), 150, 0.01);
+  EXPECT_NEAR(At(*plane, 10.24, 50.24), 190, 0.01);
+  // Two triangles that share the diagonal of the corners at 0 m.
+  const auto bent = Open(Middle(R"({"op":"slope","heights":[0,100,0,300]})"));
+  ASSERT_NE(bent, nullptr);
+  const double near_east = At(*bent, 10.24, 50.16), near_west = At(*bent, 10.16, 50.24);
+  const bool one = std::abs(near_east - 80) < 0.1 && std::abs(near_west - 240) < 0.1;
+  const bool other = std::abs(near_east - 92) < 0.1 || std::abs(near_west - 255) < 50;
+  EXPECT_TRUE(one || other) << near_east << " " << near_west;
+}
+
+TEST_F(TerrainEdits, OffsetAddsAndLaterFeaturesAreOverEarlierOnes) {
+  const std::string flat = Middle(R"({"op":"flatten","height":500})"), up = Middle(R"({"op":"offset","metres":-7.5})");
+  const auto offset = Open(flat + "," + up), flattened = Open(up + "," + flat);
+  ASSERT_TRUE(offset && flattened);
+  EXPECT_EQ(At(*offset, 10.2, 50.2), 492.5);
+  EXPECT_EQ(At(*flattened, 10.2, 50.2), 500);
+}
+
+TEST_F(TerrainEdits, CarveOnlyLowersAndRaiseOnlyRaises) {
+  const auto line = [](const char* op) {
+    return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{{"op":"{}","width_m":200,"height":250}}}},)"
+                       R"("geometry":{{"type":"LineString","coordinates":[[10.05,50.2],[10.35,50.2]]}}}})",
+                       op);
+  };
+  const auto carved = Open(line("carve")), raised = Open(line("raise"));
+  ASSERT_TRUE(carved && raised);
+  EXPECT_NEAR(At(*carved, 10.1, 50.2), 199.5, 0.01);
+  EXPECT_EQ(At(*carved, 10.3, 50.2), 250);
+  EXPECT_EQ(At(*raised, 10.1, 50.2), 250);
+  EXPECT_NEAR(At(*raised, 10.3, 50.2), 399.5, 0.01);
+  EXPECT_NEAR(At(*carved, 10.3, 50.21), 399.5, 0.01);
+}
+
+TEST_F(TerrainEdits, HolesHaveNoHeight) {
+  const auto source = Open(Middle(R"({"op":"hole"})"));
+  ASSERT_NE(source, nullptr);
+  EXPECT_TRUE(std::isnan(At(*source, 10.2, 50.2)));
+  EXPECT_FALSE(std::isnan(At(*source, 10.3, 50.2)));
+}
+
+TEST_F(TerrainEdits, ReplaceTakesTheHeightsOfAnotherFile) {
+  RasterSpec other = FlatSquare(10.1, 50.3, 200, 0.001, 42);
+  WriteRaster(dir_, other, "other.tif");
+  const auto source = Open(Middle(R"({"op":"replace","source":"other.tif"})"));
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(At(*source, 10.2, 50.2), 42);
+  EXPECT_NEAR(At(*source, 10.3, 50.2), 399.5, 0.01);
+}
+
+// Points, nodes and pixels of height images have the same edit.
+TEST_F(TerrainEdits, ShowInNodesAndPixels) {
+  const auto source = Open(Middle(R"({"op":"flatten","height":777})"));
+  ASSERT_NE(source, nullptr);
+  const int level = source->max_level();
+  const geo::Lattice lattice = source->LatticeOf(level);
+  const double step = lattice.StepDegrees();
+  const NodeWindow window{static_cast<std::int64_t>((10.2 + 180) / step), static_cast<std::int64_t>((50.2 + 90) / step),
+                          3, 3};
+  const auto nodes = source->ReadNodes(level, window);
+  ASSERT_TRUE(nodes.has_value());
+  for (const float height : *nodes) EXPECT_EQ(height, 777);
+  const int depth = source->info().max_mercator_depth;
+  const double pixels = 256.0 * static_cast<double>(std::int64_t{1} << depth);
+  const double y =
+      std::log(std::tan(0.25 * 3.14159265358979 + 0.5 * 50.2 * 3.14159265358979 / 180)) / (2 * 3.14159265358979);
+  const auto image = source->ReadMercator(depth, {static_cast<std::int64_t>((10.2 + 180) / 360 * pixels),
+                                                  static_cast<std::int64_t>((0.5 - y) * pixels), 2, 2});
+  ASSERT_TRUE(image.has_value());
+  for (const float height : *image) EXPECT_EQ(height, 777);
+  EXPECT_EQ(source->info().heights.max, 777);
+  EXPECT_NE(source->fingerprint(), source->unedited_fingerprint());
+}
+
+TEST_F(TerrainEdits, HeightsLieWithinRangeBounds) {
+  const auto source =
+      Open(Middle(R"({"op":"offset","metres":600,"blend_m":500})") + "," +
+           Rectangle(R"({"op":"slope","heights":[0,-50,-100,5],"blend_m":300})", 10.3, 50.1, 10.35, 50.3));
+  ASSERT_NE(source, nullptr);
+  for (int level = 6; level <= source->max_level(); ++level) {
+    for (const geo::TileRange& range : source->Available(level)) {
+      const geo::TileKey key{level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
+      const auto tile = source->Read(key);
+      ASSERT_TRUE(tile.has_value());
+      const HeightRange bound = source->RangeBound(key);
+      for (int j = 0; j <= tile->lattice.cells; ++j) {
+        for (int i = 0; i <= tile->lattice.cells; ++i) {
+          ASSERT_GE(tile->At(i, j), bound.min);
+          ASSERT_LE(tile->At(i, j), bound.max);
+        }
+      }
+    }
+  }
+}
+
+TEST_F(TerrainEdits, CollectWhatIsWrong) {
+  const std::string good = Middle(R"({"op":"offset","metres":1})");
+  const auto geometry = [](const char* terrain, const char* geometry) {
+    return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{}}},"geometry":{}}})", terrain, geometry);
+  };
+  const std::string message = MessageOf(
+      good + "," + Middle(R"({"op":"flaten","height":1})") + "," + Middle(R"({"op":"flatten"})") + "," +
+      Rectangle(R"({"op":"offset","metres":1})", 50.15, 10.15, 50.25, 10.25) + "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.1,50.2],[10.1,50.1]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[10.1,50.1],[10.2,50.2],[10.2,50.1],[10.15,50.3]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[179,50],[-179,50],[-179,51],[179,51],[179,50]]]})") +
+      "," +
+      geometry(R"({"op":"hole"})",
+               R"({"type":"Polygon","coordinates":[[[50.1,100.1],[50.2,100.1],[50.2,100.2],[50.1,100.1]]]})") +
+      "," +
+      geometry(R"({"op":"carve","width_m":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") +
+      "," +
+      geometry(R"({"op":"carve","height":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") +
+      "," + Rectangle(R"({"op":"offset","metres":1})", 20, 50.15, 21, 50.25) + "," +
+      Middle(R"({"op":"offset","meters":1})") + "," + Rectangle(R"({"op":"hole"})", 10, 89.5, 11, 89.95));
+  for (const char* part : {"feature 1 at",  "did you mean \"flatten\"?",
+                           "feature 2 at",  "flatten needs a \"height\"",
+                           "feature 3 at",  "are the axes swapped?",
+                           "feature 4 at",  "rings intersect themselves",
+                           "feature 5 at",  "the ring is open",
+                           "feature 6 at",  "crosses the antimeridian",
+                           "feature 7 at",  "latitude 100.1 is beyond 90",
+                           "feature 8 at",  "heights are missing",
+                           "feature 9 at",  "needs its \"width_m\"",
+                           "feature 10 at", "outside of the data",
+                           "feature 11 at", "did you mean \"metres\"?",
+                           "feature 12 at", "reaches a pole",
+                           "edits.geojson"}) {
+    EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
+  }
+  EXPECT_EQ(message.find("feature 0 "), std::string::npos);
+}
+
+TEST_F(TerrainEdits, RefuseFilesThatAreNoGeoJson) {
+  for (const char* text : {"{", "[]", R"({"type":"Feature)", R"({"type":"FeatureCollection"})", ""}) {
+    std::ofstream(dir_.File("bad.geojson")) << text;
+    DemOptions options;
+    options.edits = {dir_.File("bad.geojson")};
+    const auto opened = DemSource::Open(slope_, options);
+    ASSERT_FALSE(opened.has_value()) << text;
+    EXPECT_NE(opened.error().message.find("bad.geojson"), std::string::npos);
+  }
+}
+
+// Units of archives know which edits touch them.
+TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
+  const auto plain = OpenOrFail(slope_);
+  const auto edited = Open(Rectangle(R"({"op":"offset","metres":1})", 10.35, 50.35, 10.36, 50.36));
+  ASSERT_TRUE(plain && edited);
+  const int level = 10;
+  int same = 0, changed = 0;
+  for (const geo::TileRange& range : plain->Available(level)) {
+    for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+        const bool is_same =
+            plain->ContentBelow({level, x, y}, level + 2) == edited->ContentBelow({level, x, y}, level + 2);
+        ++(is_same ? same : changed);
+        EXPECT_FALSE(is_same && edited->EditsOf({level, x, y}) != 0);
+      }
+    }
+  }
+  EXPECT_GT(same, 0);
+  EXPECT_GT(changed, 0);
+}
+
+}  // namespace
+}  // namespace terrace::dem

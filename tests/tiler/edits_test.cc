@@ -1,0 +1,314 @@
+// Tiles of a dataset with edits: edges, errors, holes, and what does not change.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/geo/ellipsoid.h"
+#include "engine/geo/error_ladder.h"
+#include "tests/proto/glb_decoder.h"
+#include "tests/proto/quantized_mesh_decoder.h"
+#include "tests/support/scratch_directory.h"
+#include "tests/support/source_dir.h"
+#include "tests/tiler/decoded_error.h"
+#include "tests/tiler/fetched_tile.h"
+#include "tests/tiler/source_samples.h"
+#include "tests/tiler/tile_surface.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::tiler {
+namespace {
+
+// In the middle of config/samples/jacksboro.tif, on the corner of four tiles of level 11.
+constexpr double kLongitude = -84.1985, kLatitude = 36.2992;
+
+std::string Jacksboro() { return (test_support::SourceDir() / "config/samples/jacksboro.tif").string(); }
+
+std::string Position(double east, double north, double height = 0) {
+  return fmt::format("[{:.8f},{:.8f},{}]", kLongitude + east, kLatitude + north, height);
+}
+
+// A slanted rectangle of about 1.8 x 0.7 km.
+std::string Polygon() {
+  return fmt::format(R"({{"type":"Polygon","coordinates":[[{},{},{},{},{}]]}})", Position(-0.011, -0.004, 300),
+                     Position(0.010, -0.002, 320), Position(0.009, 0.005, 330), Position(-0.012, 0.003, 310),
+                     Position(-0.011, -0.004, 300));
+}
+std::string Line() {
+  return fmt::format(R"({{"type":"LineString","coordinates":[{},{},{}]}})", Position(-0.015, -0.003, 280),
+                     Position(0.001, 0.002, 300), Position(0.014, 0.0005, 320));
+}
+std::string Feature(const std::string& terrain, const std::string& geometry) {
+  return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{}}},"geometry":{}}})", terrain, geometry);
+}
+
+const std::map<std::string, std::string>& Kinds() {
+  static const std::map<std::string, std::string> kinds = {
+      {"flatten", Feature(R"({"op":"flatten","height":"mean","blend_m":150})", Polygon())},
+      {"slope", Feature(R"({"op":"slope","blend_m":150})", Polygon())},
+      {"offset", Feature(R"({"op":"offset","metres":60,"blend_m":150})", Polygon())},
+      {"replace", Feature(R"({"op":"replace","source":"etopo5.tif","blend_m":150})", Polygon())},
+      {"carve", Feature(R"({"op":"carve","width_m":60,"blend_m":100})", Line())},
+      {"raise", Feature(R"({"op":"raise","height":500,"width_m":60,"blend_m":100})", Line())},
+      {"precision", Feature(R"({"op":"precision","error_m":1,"blend_m":300})", Polygon())},
+      {"factor", Feature(R"({"op":"precision","factor":0.1,"width_m":200,"blend_m":300})", Line())},
+      {"breakline", Feature(R"({"op":"breakline"})", Line())},
+      {"hole", Feature(R"({"op":"hole"})", Polygon())}};
+  return kinds;
+}
+
+class Edits : public testing::Test {
+ protected:
+  TilePipeline Open(const std::vector<std::string>& features, MeshOptions mesh = {}) {
+    dem::DemOptions options;
+    if (!features.empty()) {
+      const std::string path = dir_.path() / fmt::format("{}.geojson", files_++);
+      std::ofstream file(path);
+      file << R"({"type":"FeatureCollection","features":[)";
+      for (std::size_t i = 0; i < features.size(); ++i) file << (i > 0 ? "," : "") << features[i];
+      file << "]}";
+      std::filesystem::copy_file(test_support::SourceDir() / "config/samples/etopo5.tif", dir_.path() / "etopo5.tif",
+                                 std::filesystem::copy_options::skip_existing);
+      options.edits = {path};
+    }
+    auto source = dem::DemSource::Open(Jacksboro(), options);
+    EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
+    Dataset dataset;
+    dataset.name = "edited";
+    dataset.mesh_options = mesh;
+    if (source) dataset.source = *std::move(source);
+    dataset.generation = dataset.source->fingerprint();
+    dataset.unedited_generation = dataset.source->unedited_fingerprint();
+    std::vector<Dataset> datasets;
+    datasets.push_back(std::move(dataset));
+    return TilePipeline(std::move(datasets));
+  }
+
+ private:
+  const test_support::ScratchDirectory dir_;
+  int files_ = 0;
+};
+
+geo::TileKey TileAt(int level, std::int64_t dx = 0, std::int64_t dy = 0) {
+  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+  return {level, static_cast<std::int64_t>((kLongitude + 180) / side) + dx,
+          static_cast<std::int64_t>((kLatitude + 90) / side) + dy};
+}
+
+TileRequest RequestFor(const geo::TileKey& key, int step) {
+  TileRequest request;
+  request.key = key;
+  request.error_step = step;
+  return request;
+}
+
+const dem::DemSource& SourceOf(const TilePipeline& pipeline) { return *pipeline.datasets().front().source; }
+
+constexpr std::array kSteps = {-8, 0, 8, 20};
+constexpr std::array kLevels = {9, 11, 12};
+
+// All common edges of 5 x 5 tiles: positions, heights and normals.
+TEST_F(Edits, LeaveEdgesOfNeighboursEqual) {
+  const std::array<MeshOptions, 3> meshes = {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
+                                             MeshOptions{tin::Criterion::kDelaunay, true}};
+  for (const auto& [kind, feature] : Kinds()) {
+    for (const MeshOptions& mesh : meshes) {
+      const TilePipeline pipeline = Open({feature}, mesh);
+      for (const int level : kLevels) {
+        for (const int step : kSteps) {
+          std::map<std::pair<int, int>, FetchedTile> tiles;
+          for (int dy = -2; dy <= 2; ++dy) {
+            for (int dx = -2; dx <= 2; ++dx) {
+              const geo::TileKey key = TileAt(level, dx, dy);
+              if (SourceOf(pipeline).IsAvailable(key)) tiles[{dx, dy}] = FetchTile(pipeline, RequestFor(key, step));
+            }
+          }
+          ASSERT_GE(tiles.size(), 4u);
+          int compared = 0;
+          for (const auto& [at, tile] : tiles) {
+            const auto& [dx, dy] = at;
+            if (const auto east = tiles.find({dx + 1, dy}); east != tiles.end()) {
+              ASSERT_EQ(EdgeOf(tile, true, 32767), EdgeOf(east->second, true, 0))
+                  << kind << " " << level << " " << step;
+              ++compared;
+            }
+            if (const auto north = tiles.find({dx, dy + 1}); north != tiles.end()) {
+              ASSERT_EQ(EdgeOf(tile, false, 32767), EdgeOf(north->second, false, 0))
+                  << kind << " " << level << " " << step;
+              ++compared;
+            }
+          }
+          EXPECT_GE(compared, 4);
+        }
+      }
+    }
+  }
+}
+
+// The share of nodes of the tile for which the edits ask more, each measured by an independent decoder.
+TEST_F(Edits, KeepThePrecisionAtEverySample) {
+  for (const MeshOptions& mesh : {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
+                                  MeshOptions{tin::Criterion::kDelaunay, true}}) {
+    for (const char* kind : {"precision", "factor"}) {
+      const TilePipeline pipeline = Open({Kinds().at(kind)}, mesh);
+      std::size_t limited = 0, exceeded = 0;
+      for (const int level : kLevels) {
+        for (const int step : kSteps) {
+          for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {-1, -1}}) {
+            const geo::TileKey key = TileAt(level, dx, dy);
+            const FetchedTile tile = FetchTile(pipeline, RequestFor(key, step));
+            const auto heights = SourceOf(pipeline).Read(key);
+            ASSERT_TRUE(heights.has_value());
+            const dem::MeshDemands demands = SourceOf(pipeline).DemandsOf(key);
+            const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
+            const double error_m = geo::LadderError(level, step);
+            for (std::size_t k = 0; k < demands.weights.size(); ++k) {
+              const double allowed =
+                  std::min(error_m / static_cast<double>(demands.weights[k]), static_cast<double>(demands.caps[k]));
+              if (allowed >= error_m) continue;
+              ++limited;
+              // The rounding of an edge's positions counts up to four times the error alone (tin::kMaxBorderWeight).
+              const auto side = static_cast<std::size_t>(heights->lattice.cells) + 1, x = k % side, y = k / side;
+              const bool on_edge = x == 0 || y == 0 || x + 1 == side || y + 1 == side;
+              const double slack = 0x1p-11 + (on_edge && allowed < 0.05 ? 0.01 : 0);
+              EXPECT_LE(errors[k], allowed + slack) << kind << " " << geo::ToString(key) << " step " << step;
+              exceeded += errors[k] > allowed + slack ? 1 : 0;
+            }
+          }
+        }
+      }
+      EXPECT_GT(limited, 1000u);
+      EXPECT_EQ(exceeded, 0u);
+    }
+  }
+}
+
+TEST_F(Edits, LeaveTheBytesOfTilesThatTheyDoNotTouch) {
+  const TilePipeline plain = Open({});
+  for (const auto& [kind, feature] : Kinds()) {
+    const TilePipeline edited = Open({feature});
+    int same = 0, touched = 0, differ = 0;
+    for (int level = 0; level <= SourceOf(plain).max_level(); ++level) {
+      for (int dy = -3; dy <= 3; ++dy) {
+        for (int dx = -3; dx <= 3; ++dx) {
+          const geo::TileKey key = TileAt(level, dx, dy);
+          if (!SourceOf(plain).IsAvailable(key)) continue;
+          for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
+            TileRequest request = RequestFor(key, 0);
+            request.format = format;
+            const auto a = plain.Build(request, {}), b = edited.Build(request, {});
+            ASSERT_TRUE(a.has_value() && b.has_value());
+            const bool is_touched = SourceOf(edited).EditsOf(key) != 0;
+            if (is_touched) {
+              ++touched;
+              differ += a->bytes != b->bytes ? 1 : 0;
+            } else {
+              ++same;
+              ASSERT_EQ(a->bytes, b->bytes) << kind << " " << geo::ToString(key);
+            }
+          }
+        }
+      }
+    }
+    EXPECT_GT(same, 50) << kind;
+    EXPECT_GT(touched, 5) << kind;
+    EXPECT_GT(differ, 2) << kind;
+  }
+}
+
+// Every sample of the raster, edited, against the decoded mesh.
+TEST_F(Edits, AreCertified) {
+  const std::vector<Sample> samples = SamplesOf(Jacksboro());
+  for (const auto& [kind, feature] : Kinds()) {
+    if (kind == "replace" || kind == "hole") continue;  // samples are another source's, or missing
+    const TilePipeline pipeline = Open({feature});
+    std::vector<dem::GeoPosition> positions;
+    for (const Sample& sample : samples) positions.push_back({sample.longitude, sample.latitude});
+    const auto heights = SourceOf(pipeline).ReadPoints(positions);
+    ASSERT_TRUE(heights.has_value());
+    std::vector<Sample> edited = samples;
+    for (std::size_t i = 0; i < edited.size(); ++i) edited[i].height = static_cast<double>((*heights)[i]);
+    const SampleIndex index(std::move(edited));
+    for (const int level : {7, 9, 10, 11, 12}) {
+      for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}}) {
+        const FetchedTile tile = FetchTile(pipeline, RequestFor(TileAt(level, dx, dy), 8));
+        const double error = TileSurface(tile.mesh, TileAt(level, dx, dy)).LargestError(index);
+        EXPECT_LE(error, tile.encoded.certified_error_m.value_or(0)) << kind << " level " << level;
+      }
+    }
+  }
+}
+
+// Positions of the common edge of two GLB tiles, without the feet of skirts: bit-equal, though the grid inside of a
+// tile with precision is finer than that of its neighbours.
+TEST_F(Edits, LeaveEdgesOfGlbTilesEqual) {
+  const auto rim = [](const TilePipeline& pipeline, const geo::TileKey& key, int step, geo::Vec3 across) {
+    TileRequest request = RequestFor(key, step);
+    request.format = TileFormat::kGlb;
+    const auto tile = pipeline.Build(request, {});
+    EXPECT_TRUE(tile.has_value());
+    const auto glb = proto::DecodeGlb(tile->bytes);
+    EXPECT_TRUE(glb.has_value());
+    std::set<proto::Corner> feet, points;
+    for (const auto& [from, to] : proto::OpenSidesOf(*glb).sides) feet.insert(from);
+    for (const geo::Vec3& p : glb->positions) {
+      const proto::Corner point{p.x, p.y, p.z};
+      if (std::abs(geo::Dot(across, p)) < 0.01 && !feet.contains(point)) points.insert(point);
+    }
+    return points;
+  };
+  for (const char* kind : {"precision", "factor", "flatten", "breakline"}) {
+    const TilePipeline pipeline = Open({Kinds().at(kind)});
+    for (const int level : {11, 12}) {
+      for (const int step : kSteps) {
+        for (const auto& [dx, dy] : {std::pair{-1, 0}, {-1, -1}, {0, 0}}) {
+          const geo::TileKey west = TileAt(level, dx, dy), east = geo::Neighbour(west, 1, 0);
+          const geo::Lattice lattice = SourceOf(pipeline).LatticeOf(level);
+          const geo::Vec3 meridian = geo::SurfaceNormal(lattice.Longitude(lattice.FirstColumn(east)), 0);
+          const geo::Vec3 across{-meridian.y, meridian.x, 0};
+          const auto a = rim(pipeline, west, step, across), b = rim(pipeline, east, step, across);
+          EXPECT_GE(a.size(), 2u);
+          EXPECT_EQ(a, b) << kind << " " << geo::ToString(west) << " step " << step;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(Edits, CutHoles) {
+  const TilePipeline plain = Open({}), pipeline = Open({Kinds().at("hole")});
+  const auto middle = SourceOf(pipeline).ReadPoints(std::array{dem::GeoPosition{kLongitude, kLatitude}});
+  ASSERT_TRUE(middle.has_value());
+  EXPECT_TRUE(std::isnan(middle->front()));
+  for (const int step : kSteps) {
+    const geo::TileKey key = TileAt(12);
+    const FetchedTile tile = FetchTile(pipeline, RequestFor(key, step));
+    const double side = 180.0 / static_cast<double>(geo::TileRows(12));
+    std::size_t real = 0;
+    for (const auto& triangle : tile.mesh.triangles) {
+      double east = 0, north = 0;
+      for (const std::uint32_t k : triangle) {
+        east += (static_cast<double>(key.x) + tile.mesh.u[k] / 32767.0) * side / 3;
+        north += (static_cast<double>(key.y) + tile.mesh.v[k] / 32767.0) * side / 3;
+      }
+      if (triangle[0] == triangle[1]) continue;
+      ++real;
+      // A rectangle well inside of the polygon.
+      const double dx = east - 180 - kLongitude, dy = north - 90 - kLatitude;
+      EXPECT_FALSE(std::abs(dx) < 0.007 && dy > -0.0015 && dy < 0.002) << dx << " " << dy;
+    }
+    EXPECT_GT(real, 2u);
+    EXPECT_NE(tile.encoded.bytes, FetchTile(plain, RequestFor(key, step)).encoded.bytes);
+  }
+}
+
+}  // namespace
+}  // namespace terrace::tiler

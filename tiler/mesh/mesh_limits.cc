@@ -1,0 +1,94 @@
+#include "tiler/mesh/mesh_limits.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "engine/tin/scan/triangle_rows.h"
+
+namespace terrace::tiler {
+
+double MeshError(double error_m) {
+  constexpr double kRounding = 0x1p-11 + 0x1p-14;
+  return std::max(error_m - kRounding, error_m / 2);
+}
+
+tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key) {
+  dem::MeshDemands demands = source.DemandsOf(key);
+  tin::SampleLimits limits;
+  for (float& cap : demands.caps) cap = static_cast<float>(MeshError(static_cast<double>(cap)));
+  limits.weights = std::move(demands.weights);
+  limits.caps = std::move(demands.caps);
+  limits.forced = std::move(demands.forced);
+  return limits;
+}
+
+std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m) {
+  std::vector<float> allowed;
+  allowed.reserve(limits.weights.size());
+  for (std::size_t k = 0; k < limits.weights.size(); ++k) {
+    allowed.push_back(static_cast<float>(limits.Allowed(k, error_m)));
+  }
+  return allowed;
+}
+
+proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m) {
+  proto::EdgeErrors errors(error_m);
+  if (limits.weights.empty()) return errors;
+  const auto at = [&](int x, int y) {
+    return limits.Allowed(
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(cells + 1) + static_cast<std::size_t>(x), error_m);
+  };
+  for (int k = 1; k < cells; ++k) {
+    const std::array<double, 4> of_sides = {at(k, 0), at(cells, k), at(k, cells), at(0, k)};
+    for (std::size_t side = 0; side < 4; ++side) errors.side[side] = std::min(errors.side[side], of_sides[side]);
+  }
+  errors.corner = {at(0, 0), at(cells, 0), at(cells, cells), at(0, cells)};
+  return errors;
+}
+
+std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
+                                           const tin::TinMesh& mesh) {
+  const dem::MeshDemands demands = source.DemandsOf(key);
+  if (demands.hole.empty()) return {};
+  const auto side = static_cast<std::size_t>(source.LatticeOf(key.level).cells) + 1;
+  std::vector<std::uint8_t> in_hole(mesh.triangles.size(), 0);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    bool is_inside = true, is_outline = true;
+    tin::ForEachRow({mesh.vertices[a], mesh.vertices[b], mesh.vertices[c]}, [&](int y, int first, int last) {
+      for (int x = first; x <= last && is_inside; ++x) {
+        const std::size_t k = static_cast<std::size_t>(y) * side + static_cast<std::size_t>(x);
+        const bool is_forced = !demands.forced.empty() && demands.forced[k] != 0;
+        is_inside = demands.hole[k] != 0 || is_forced;
+        is_outline = is_outline && demands.hole[k] == 0;
+      }
+    });
+    // A triangle between nodes of the outline alone may be outside.
+    in_hole[t] = is_inside && !is_outline ? 1 : 0;
+  }
+  if (std::ranges::all_of(in_hole, [](std::uint8_t is) { return is == 0; })) return {};
+  return in_hole;
+}
+
+void LeaveOut(const std::vector<std::uint8_t>& in_hole, const tin::TinMesh& mesh, int cells,
+              std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  if (in_hole.empty()) return;
+  std::vector<std::array<std::uint32_t, 3>> left;
+  std::vector<std::uint8_t> has_triangle(mesh.vertices.size(), 0);
+  for (std::size_t t = 0; t < triangles.size(); ++t) {
+    if (in_hole[t] != 0) continue;
+    left.push_back(triangles[t]);
+    for (const std::uint32_t k : triangles[t]) has_triangle[k] = 1;
+  }
+  for (std::uint32_t k = 0; k < mesh.vertices.size(); ++k) {
+    const tin::SamplePosition p = mesh.vertices[k];
+    const bool on_edge = p.x == 0 || p.y == 0 || p.x == cells || p.y == cells;
+    if (on_edge && has_triangle[k] == 0) left.push_back({k, k, k});
+  }
+  triangles = std::move(left);
+}
+
+}  // namespace terrace::tiler
