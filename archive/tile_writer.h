@@ -24,7 +24,7 @@ struct UnitSummary {
 
 // Used by one thread at a time. The same tiles make the same bytes, in whatever order they were added.
 // Destroyed without Finish: removes what it wrote. A process that is killed leaves files that end with ".partial",
-// which the next writer of the same unit replaces, and which readers ignore.
+// which readers ignore, and which bake::TidyPlace removes when all is done.
 class TileWriter {
  public:
   virtual ~TileWriter() = default;

@@ -13,14 +13,13 @@
 
 #include "bake/copy_unit.h"
 #include "bake/order.h"
+#include "bake/queue/local_queue.h"
 #include "bake/unit_key.h"
 
 namespace terrace::bake {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-constexpr int kMaxAttempts = 3;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -45,18 +44,16 @@ class OpenUnit {
 
 class Run {
  public:
-  Run(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets, const UnitPlan& plan,
+  Run(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets, const UnitPlan& plan, UnitQueue& queue,
       const BakeOptions& options, Counters& counters)
       : pipeline_(pipeline),
         dataset_(pipeline.datasets().front()),
         targets_(targets),
         plan_(plan),
+        queue_(queue),
         options_(options),
         counters_(counters),
-        reports_(plan.units.size()),
-        attempts_(plan.units.size()) {
-    for (std::size_t i = 0; i < plan.units.size(); ++i) pending_.push_back(i);
-  }
+        reports_(plan.units.size()) {}
 
   std::vector<UnitReport> Do() {
     {
@@ -83,22 +80,24 @@ class Run {
       std::unique_lock lock(mutex_);
       if (own && own->parts.empty()) own = nullptr;
       UnitPtr unit = own;
-      if (!unit && !pending_.empty()) {
-        const std::size_t index = pending_.front();
-        pending_.pop_front();
-        ++opening_;
-        lock.unlock();
-        own = Open(index);
-        lock.lock();
-        --opening_;
-        if (own) open_.push_back(own);
-        changed_.notify_all();
-        continue;
-      }
-      if (!unit) unit = UnitToHelp();
+      UnitQueue::Taken taken;
       if (!unit) {
-        if (open_.empty() && opening_ == 0 && pending_.empty()) return;
-        changed_.wait(lock);
+        lock.unlock();
+        taken = queue_.Take();
+        if (taken.state == UnitQueue::Taken::State::kUnit) own = Open(taken);
+        lock.lock();
+        if (own) {
+          open_.push_back(own);
+          changed_.notify_all();
+        }
+        if (taken.state == UnitQueue::Taken::State::kUnit) continue;
+        unit = UnitToHelp();
+      }
+      if (!unit) {
+        if (taken.state == UnitQueue::Taken::State::kOver && open_.empty()) return;
+        // A unit may come back from other processes as well, which notify no one here.
+        constexpr std::chrono::milliseconds kPause{200};
+        changed_.wait_for(lock, kPause);
         continue;
       }
       // The owner begins at the front, helpers at the back: far from each other.
@@ -134,13 +133,18 @@ class Run {
   }
 
   // Finds which files of the unit are there; creates the others. Null: nothing is left to do, or it failed.
-  UnitPtr Open(std::size_t index) {
+  UnitPtr Open(const UnitQueue::Taken& taken) {
+    const std::size_t index = taken.unit;
     const UnitPlan::Of& of = plan_.units[index];
-    WaitBefore(attempts_[index]);
+    if (taken.attempt == 0) Forget(index);
+    WaitBefore(taken.attempt);
     auto unit = std::make_shared<OpenUnit>();
     unit->index = index;
     for (const std::size_t target : of.targets) {
-      if (options_.stop.stop_requested()) return nullptr;
+      if (options_.stop.stop_requested()) {
+        queue_.Return(index);
+        return nullptr;
+      }
       if (HasReport(index, target)) continue;
       const Target& to = targets_[target];
       const std::uint64_t key = UnitKey(dataset_, to.manifest, of.unit);
@@ -161,7 +165,10 @@ class Run {
       Close(*unit);
       return nullptr;
     }
-    if (unit->outputs.empty()) return nullptr;
+    if (unit->outputs.empty()) {
+      queue_.Done(index);
+      return nullptr;
+    }
     for (const Part& part : PartsOf(of.unit)) unit->parts.push_back(part);
     return unit;
   }
@@ -254,14 +261,10 @@ class Run {
                           SecondsSince(unit.start),
                           {}});
     }
-    if (!unit.error || options_.stop.stop_requested()) return;
+    if (options_.stop.stop_requested()) return queue_.Return(unit.index);
+    if (!unit.error) return queue_.Done(unit.index);
+    if (queue_.Fail(unit.index, *unit.error)) return;
     const std::lock_guard lock(mutex_);
-    // A changed file stays changed for this process: it fails a second time.
-    const int limit = unit.error->code == ErrorCode::kChanged ? kMaxAttempts - 1 : kMaxAttempts;
-    if (++attempts_[unit.index] < limit) {
-      pending_.push_back(unit.index);
-      return;
-    }
     for (OpenUnit::Output& output : unit.outputs) {
       if (HasReportLocked(unit.index, output.target)) continue;
       ReportLocked(unit.index, {output.target,
@@ -272,6 +275,12 @@ class Run {
     }
   }
 
+  // A unit that is handed out anew is done from the beginning, whatever became of it before.
+  void Forget(std::size_t index) {
+    const std::lock_guard lock(mutex_);
+    counters_.units -= reports_[index].size();
+    reports_[index].clear();
+  }
   bool HasReportLocked(std::size_t index, std::size_t target) const {
     return std::ranges::find(reports_[index], target, &UnitReport::target) != reports_[index].end();
   }
@@ -293,16 +302,14 @@ class Run {
   const tiler::Dataset& dataset_;
   const std::vector<Target>& targets_;
   const UnitPlan& plan_;
+  UnitQueue& queue_;
   const BakeOptions& options_;
   Counters& counters_;
 
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<std::size_t> pending_;  // units that no thread has opened
   std::list<UnitPtr> open_;
-  int opening_ = 0;
   std::vector<std::vector<UnitReport>> reports_;  // by unit
-  std::vector<int> attempts_;                     // that failed, by unit
 };
 
 }  // namespace
@@ -340,7 +347,13 @@ UnitPlan UnitPlan::Make(const std::vector<Target>& targets, const Shard& shard) 
 
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                              const UnitPlan& plan, const BakeOptions& options, Counters& counters) {
-  return Run(pipeline, targets, plan, options, counters).Do();
+  LocalQueue queue(plan.units.size());
+  return Bake(pipeline, targets, plan, queue, options, counters);
+}
+
+std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
+                             const UnitPlan& plan, UnitQueue& queue, const BakeOptions& options, Counters& counters) {
+  return Run(pipeline, targets, plan, queue, options, counters).Do();
 }
 
 }  // namespace terrace::bake

@@ -13,6 +13,7 @@
 
 #include "archive/manifest.h"
 #include "archive/tile_writer.h"
+#include "bake/queue/unit_queue.h"
 #include "bake/units.h"
 #include "engine/core/result.h"
 #include "tiler/tile_pipeline.h"
@@ -93,5 +94,9 @@ struct UnitPlan {
 // no files and have no reports. The files do not depend on the number of threads, nor on interruptions.
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                              const UnitPlan& plan, const BakeOptions& options, Counters& counters);
+
+// The same with the units that `queue` hands out: its units are those of the plan. Returns when it is over.
+std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
+                             const UnitPlan& plan, UnitQueue& queue, const BakeOptions& options, Counters& counters);
 
 }  // namespace terrace::bake

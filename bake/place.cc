@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <set>
 #include <sstream>
 #include <system_error>
@@ -24,6 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kIdentityFile = "bake.json";
+constexpr const char* kPlaceIdFile = "bake-place.id";
 
 std::string HostName() {
   std::array<char, 256> name{};
@@ -174,8 +176,8 @@ bool IsContent(const std::string& name) {
 }
 
 bool IsOurs(const std::string& name) {
-  return name == kIdentityFile || name == archive::kManifestFile || name == "lost+found" || IsContent(name) ||
-         IsLock(name) || IsPartial(name);
+  return name == kIdentityFile || name == kPlaceIdFile || name == archive::kManifestFile || name == "lost+found" ||
+         IsContent(name) || IsLock(name) || IsPartial(name);
 }
 
 // The differences between a noted identity and this one, as one sentence; empty: none.
@@ -319,7 +321,56 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
     }
     for (const fs::path& file : leftovers) fs::remove(file, ignored);
   }
+  fs::remove(fs::path(place) / kPlaceIdFile, ignored);
   fs::remove(fs::path(place) / kIdentityFile, ignored);
+}
+
+Result<std::string> PlaceId(const std::string& place) {
+  const fs::path file = fs::path(place) / kPlaceIdFile;
+  std::random_device random;
+  const int error = CreateFile(file.string(), fmt::format("{:08x}{:08x}", random(), random()));
+  std::string id;
+  std::istringstream(ReadText(file)) >> id;
+  if (!id.empty()) return id;
+  return MakeError(ErrorCode::kUnavailable, "{}: cannot be {}: {}", file.string(),
+                   error != 0 && error != EEXIST ? "written" : "read", WhyOf(error == EEXIST ? EIO : error));
+}
+
+bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
+  std::error_code ignored;
+  for (const archive::Manifest& manifest : manifests) {
+    const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
+    if (!fs::exists(folder / archive::kManifestFile, ignored)) return false;
+  }
+  fs::remove(fs::path(place) / kPlaceIdFile, ignored);
+  fs::remove(fs::path(place) / kIdentityFile, ignored);
+  return true;
+}
+
+void LeaveEmpty(const std::string& place, const std::string& own_lock) {
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(place, error)) {
+    const std::string name = entry.path().filename().string();
+    if (name != kIdentityFile && name != kPlaceIdFile && name != fmt::format("bake-{}.lock", own_lock)) return;
+  }
+  fs::remove(fs::path(place) / kPlaceIdFile, error);
+  fs::remove(fs::path(place) / kIdentityFile, error);
+}
+
+void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker) {
+  const std::string own = fmt::format("bake-{}.lock", LockOfWorker(but_of_worker, job));
+  const std::string ending = LockOfWorker("", job) + ".lock";
+  std::error_code ignored;
+  std::vector<fs::path> locks;
+  for (const auto& entry : fs::directory_iterator(place, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (IsLock(name) && name.ends_with(ending) && name != own) locks.push_back(entry.path());
+  }
+  for (const fs::path& lock : locks) fs::remove(lock, ignored);
+}
+
+std::string LockOfWorker(const std::string& worker, const std::string& job) {
+  return fmt::format("{}-of-job-{}", worker, job);
 }
 
 }  // namespace terrace::bake

@@ -50,4 +50,20 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 // Removes what only an unfinished bake needs: the identity, and leftovers of units that were interrupted.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
+// Workers of a job share a place.
+
+// A random number that is kept in the place until the bake is finished: workers that have the same one write into the
+// same place, wherever it is mounted. kUnavailable: the place cannot be written.
+Result<std::string> PlaceId(const std::string& place);
+// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted.
+bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
+// Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
+// refused.
+void LeaveEmpty(const std::string& place, const std::string& own_lock);
+// The name of a worker's lock for PlaceLock::Take: the workers of one job exclude all but one another.
+std::string LockOfWorker(const std::string& worker, const std::string& job);
+// Removes the locks that workers of the job have left which were killed. The job is done: what still runs is not waited
+// for.
+void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker);
+
 }  // namespace terrace::bake

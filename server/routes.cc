@@ -122,6 +122,9 @@ std::string_view LiteralOf(std::string_view segment) {
 // digits, and three bytes per separator in a form.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
+// The same for rays of six numbers.
+std::size_t MaxRaysBytes(std::size_t max_rays) { return 4096 + 192 * max_rays; }
+
 // RouteRow::handle of documents.
 template <DocumentAnswer (*describe)(const Handlers&, const RequestContext&)>
 Answer Write(const Handlers& from, const RequestContext& context) {
@@ -143,6 +146,8 @@ constexpr RouteRow kRows[] = {
     {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
     {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
     {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
+    {.label = "grid", .pattern = "/{dataset}/grid", .handle = AnswerGrid},
+    {.label = "sight", .pattern = "/{dataset}/sight", .handle = AnswerSight, .max_body_bytes = MaxRaysBytes},
     {.label = "mesh", .pattern = "/{dataset}/mesh", .handle = AnswerArea},
     {.label = "datasets",
      .pattern = "/datasets",

@@ -10,6 +10,9 @@
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
 #include "tiler/strong_etag.h"
+#include "tiler/surface/drawn_sight.h"
+#include "tiler/surface/drawn_triangles.h"
+#include "tiler/surface/source_normals.h"
 
 namespace terrace::tiler {
 namespace {
@@ -42,7 +45,9 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement
     : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
-    : datasets_(std::move(datasets)), refinements_(std::move(refinements)) {}
+    : datasets_(std::move(datasets)),
+      drawn_(std::make_unique<DrawnMeshCache>(kDrawnMeshBytes)),
+      refinements_(std::move(refinements)) {}
 
 // Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
@@ -124,6 +129,73 @@ Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<c
   Result<std::vector<float>> heights = datasets_[dataset].source->ReadPoints(points, datum, std::move(stop), filled);
   if (!heights) return tl::unexpected(std::move(heights).error());
   return PointHeights{*std::move(heights), std::move(filled)};
+}
+
+Result<std::vector<std::array<float, 3>>> TilePipeline::ReadNormals(std::uint32_t dataset,
+                                                                    std::span<const dem::GeoPosition> points,
+                                                                    std::stop_token stop) const {
+  if (!datasets_[dataset].source) return NoSources();
+  return SourceNormals(*datasets_[dataset].source, points, stop);
+}
+
+Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dataset, const TileRequest& request,
+                                                              const std::stop_token& stop) const {
+  const bool is_glb = request.format == TileFormat::kGlb;
+  const DrawnMeshKey cache_key{dataset.generation, request.key, request.error_step, is_glb,
+                               is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
+  if (std::shared_ptr<const DrawnMesh> known = drawn_->Find(cache_key)) return known;
+  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  EncodedTile encoded;
+  Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
+  if (!refined) return tl::unexpected(std::move(refined).error());
+  const EncoderInput input{dataset, request, refined->get(), error_m};
+  Result<DrawnTriangles> drawn = is_glb ? DrawnByGlb(input, stop) : DrawnByQuantizedMesh(input, stop);
+  if (!drawn) return tl::unexpected(std::move(drawn).error());
+  auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(drawn));
+  drawn_->Insert(cache_key, mesh);
+  return std::shared_ptr<const DrawnMesh>(std::move(mesh));
+}
+
+MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& surface,
+                                  const std::stop_token& stop) const {
+  return [this, dataset, surface, stop](const geo::TileKey& key) {
+    const Dataset& of = datasets_[dataset];
+    TileRequest request;
+    request.dataset = dataset;
+    request.key = key;
+    const bool is_deepest = key.level == of.source->max_level();
+    request.error_step = ErrorStep(surface.requested, key.level, is_deepest, of.error_fraction);
+    request.format = surface.format;
+    request.compression = surface.compression;
+    return MeshOf(of, request, stop);
+  };
+}
+
+Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
+                                                   std::span<const dem::GeoPosition> points, bool normals,
+                                                   std::stop_token stop) const {
+  const Dataset& of = datasets_[dataset];
+  if (!of.source) return NoSources();
+  const int deepest = of.source->max_level();
+  const Result<int> level = LevelOf(surface, deepest, of.error_fraction);
+  if (!level) return tl::unexpected(level.error());
+  return tiler::ReadDrawnPoints(*of.source, *level, points, normals, MeshesOf(dataset, surface, stop), stop);
+}
+
+Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
+                                                              const std::optional<DrawnSurface>& surface,
+                                                              std::span<const dem::SightRay> rays,
+                                                              const dem::SightOptions& options,
+                                                              std::stop_token stop) const {
+  const Dataset& of = datasets_[dataset];
+  if (!of.source) return NoSources();
+  if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded)
+    return tl::unexpected(bounded.error());
+  if (!surface) return of.source->LookAlong(rays, options, std::move(stop));
+  const int deepest = of.source->max_level();
+  const Result<int> level = LevelOf(*surface, deepest, of.error_fraction);
+  if (!level) return tl::unexpected(level.error());
+  return LookAlongDrawn(*of.source, *level, rays, options, MeshesOf(dataset, *surface, stop), stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {

@@ -1,6 +1,7 @@
 // Builds a tile: from a request to bytes, in one blocking function. The server, tests and benchmarks use it.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -22,6 +23,8 @@
 #include "tiler/store/baked_tiles.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/refinement_cache.h"
+#include "tiler/surface/drawn_mesh_cache.h"
+#include "tiler/surface/drawn_points.h"
 #include "tiler/tile_request.h"
 
 namespace terrace::tiler {
@@ -74,7 +77,11 @@ struct EncoderInput {
 // Heights of a dataset at points, NaN where it has none.
 struct PointHeights {
   std::vector<float> heights;
-  std::vector<std::uint8_t> filled = {};  // by point: 1 where a void was filled in; empty: none was
+  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled in; empty: none was
+  std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
+  // Of drawn surfaces: the tiles that were read, and which of them each point lies in; empty: of the sources.
+  std::vector<geo::TileKey> tiles = {};
+  std::vector<std::uint32_t> tile_of_point = {};
 };
 
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
@@ -102,6 +109,24 @@ class TilePipeline {
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
+  // The normals at points of the sources' surface (surface/source_normals.h).
+  virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
+                                                                std::span<const dem::GeoPosition> points,
+                                                                std::stop_token stop) const;
+
+  // Heights of the meshes that clients decode (surface/drawn_points.h). Keeps meshes between calls. kInvalidArgument:
+  // the dataset has no such level, or the points lie in too many tiles. Other errors: those of Build.
+  virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
+                                               std::span<const dem::GeoPosition> points, bool normals,
+                                               std::stop_token stop) const;
+
+  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
+  // rays cross too many samples. Other errors: those of the two functions above.
+  virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
+                                                          const std::optional<DrawnSurface>& surface,
+                                                          std::span<const dem::SightRay> rays,
+                                                          const dem::SightOptions& options, std::stop_token stop) const;
+
   // PlanArea reads nothing and returns at once; BuildArea blocks (area_mesh.h).
   virtual Result<AreaPlan> PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const;
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
@@ -113,7 +138,12 @@ class TilePipeline {
   Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
 
+  MeshOfTile MeshesOf(std::uint32_t dataset, const DrawnSurface& surface, const std::stop_token& stop) const;
+  Result<std::shared_ptr<const DrawnMesh>> MeshOf(const Dataset& dataset, const TileRequest& request,
+                                                  const std::stop_token& stop) const;
+
   const std::vector<Dataset> datasets_;
+  const std::unique_ptr<DrawnMeshCache> drawn_;
   const std::shared_ptr<RefinementCache> refinements_;
 };
 

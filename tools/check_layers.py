@@ -29,12 +29,12 @@ CONFIG = ["config/common", "config/config.h", "config/input", "config/options", 
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
-       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/bound", "engine/dem/image"]
+       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/sight", "engine/dem/bound", "engine/dem/image", "engine/dem/export"]
 # Headers below a module that count as that module's own: every module that may include it may include these.
 PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
-    "engine/dem": ("dem_types.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
+    "engine/dem": ("dem_types.h", "export/output_grid.h", "common/box_index.h", "common/content_hash.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
                    "gdal/gdal_runtime.h", "gdal/remote_file.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
-                   "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
+                   "sight/sight_ray.h", "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
     "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
                "options/options.h"),
 }.items() for name in names}
@@ -59,7 +59,9 @@ MODULES = {
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
     "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
-    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive"],
+    "bake/queue": ["engine/core", "redis"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive", "bake/queue"],
+    "redis": ["engine/core"],
     "server/asio.h": [],
     "server/jobs": ["engine/core", "server/asio.h"],
     "server/net": ["engine/core", "server/asio.h"],
@@ -76,7 +78,7 @@ MODULES = {
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
     **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli/bake": ENGINE + ["bake", "server/store", "server/cli/common"],
+    "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/store", "server/cli/common"],
     "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake"],
 }
 
@@ -96,11 +98,12 @@ LIBRARIES = [
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("libwebp", r"webp/.*", r"proto/.*\.cc"),
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
+    Library("hiredis", r"hiredis/.*", r"redis/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
     Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
     Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"server/http/request\.cc"),
-    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|server/net/.*)\.cc"),
+    Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|redis/socket|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"server/"),
@@ -109,11 +112,11 @@ LIBRARIES = [
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # Libraries that a module promises not to use: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|server)/"),
-    Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|server|engine/dem)/"),
+    Library("clocks", r"(chrono|ctime)", r"(config|bake|tiler|redis|server|engine/dem)/"),
     Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
-    Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|tiler|archive|bake|server)/.*\.cc"),
+    Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",
+            r"(config|engine/dem|tiler|archive|bake|redis|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 

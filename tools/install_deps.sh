@@ -13,16 +13,16 @@ build_packages=(
   g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
   libgdal-dev libproj-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
   libssl-dev libdeflate-dev zlib1g-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
-  libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev
+  libjpeg62-turbo-dev libwebp-dev librocksdb-dev libsystemd-dev libhiredis-dev
 )
 runtime_packages=(
   ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 zlib1g libbrotli1 libzstd1
-  libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0
+  libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0 libhiredis0.14
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
   clang-14 libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3
-  debhelper help2man lintian mkdocs
+  debhelper help2man lintian mkdocs redis-server
 )
 
 die() { echo "install_deps: $*" >&2; exit 1; }
@@ -66,8 +66,13 @@ install_packages() {
   refresh_package_lists
   echo "install_deps: apt-get install ${missing[*]}"
   as_root apt-get -qq install -y --no-install-recommends "${missing[@]}"
-  # The tests start their own nginx; the service on port 80 is not wanted.
-  if [[ " ${missing[*]} " == *" nginx-light "* && -d /run/systemd/system ]]; then as_root systemctl disable --quiet --now nginx || true; fi
+  # The tests start their own nginx and Redis; the services on ports 80 and 6379 are not wanted.
+  local service
+  for service in nginx:nginx-light redis-server:redis-server; do
+    if [[ " ${missing[*]} " == *" ${service#*:} "* && -d /run/systemd/system ]]; then
+      as_root systemctl disable --quiet --now "${service%%:*}" || true
+    fi
+  done
 }
 
 # Boost 1.81 or later. Debian 12 has 1.81, but its -dev package conflicts with the 1.74 that libgdal-dev depends on: unpack

@@ -7,7 +7,9 @@
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+#include <random>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "engine/dem/common/content_hash.h"
@@ -33,6 +35,16 @@ Result<void> WriteAll(int descriptor, std::string_view bytes, const std::string&
   return {};
 }
 
+// A new file beside `path`, and its name. Bakers that share a place may write one file at the same time: none may
+// rename or truncate what another is still writing. Below 0: errno says why.
+std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
+  while (true) {
+    std::string name = fmt::format("{}.{:08x}{}", path, std::random_device()(), kPartial);
+    const int descriptor = ::open(name.c_str(), access | O_CREAT | O_EXCL | O_CLOEXEC, kMode);
+    if (descriptor >= 0 || errno != EEXIST) return {descriptor, std::move(name)};
+  }
+}
+
 std::string ParentOf(const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   return folder.empty() ? "." : folder;
@@ -48,7 +60,7 @@ Result<void> MakeFolder(const std::string& path) {
 }  // namespace
 
 struct OutputFile::Impl {
-  explicit Impl(std::string p) : path(std::move(p)), partial(path + std::string(kPartial)) {}
+  explicit Impl(std::string p) : path(std::move(p)) {}
   ~Impl() {
     if (descriptor < 0) return;
     ::close(descriptor);
@@ -63,7 +75,8 @@ struct OutputFile::Impl {
     return written;
   }
 
-  const std::string path, partial;
+  const std::string path;
+  std::string partial;
   dem::ContentHasher hasher;
   int descriptor = -1;
   std::uint64_t size = 0;
@@ -77,8 +90,7 @@ OutputFile::~OutputFile() = default;
 Result<OutputFile> OutputFile::Create(const std::string& path) {
   if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
   auto impl = std::make_unique<Impl>(path);
-  ::unlink(impl->partial.c_str());  // of an earlier run, perhaps with other permissions
-  impl->descriptor = ::open(impl->partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+  std::tie(impl->descriptor, impl->partial) = CreatePartial(path, O_WRONLY);
   if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
   return OutputFile(std::move(impl));
 }
@@ -139,8 +151,8 @@ Result<SpoolFile> SpoolFile::Create(const std::string& path) {
   const std::string folder = ParentOf(path);
   int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
   if (descriptor < 0) {  // a file system without nameless files
-    std::string name = path + ".spool" + std::string(kPartial);
-    descriptor = ::open(name.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, kMode);
+    std::string name;
+    std::tie(descriptor, name) = CreatePartial(path, O_RDWR);
     if (descriptor < 0) return CannotWrite(name, errno);
     ::unlink(name.c_str());
   }

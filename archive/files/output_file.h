@@ -16,7 +16,7 @@ inline constexpr std::string_view kPartial = ".partial";
 // kUnavailable: the file cannot be written; the message names it and the reason. Used by one thread at a time.
 class OutputFile {
  public:
-  // Replaces an unfinished file of the same name. Makes the folders of `path`.
+  // Makes the folders of `path`. The unfinished file has a name of its own: several may write the same file at a time.
   static Result<OutputFile> Create(const std::string& path);
   ~OutputFile();  // removes an unfinished file
   OutputFile(OutputFile&&) noexcept;

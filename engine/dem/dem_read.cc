@@ -308,6 +308,22 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
                                                  std::stop_token stop, std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
+  const auto take_smooth = [&] {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (!std::isnan(heights[i]) || std::isnan(smooth[i])) continue;
+      heights[i] = smooth[i];
+      if (!filled.empty()) filled[i] = 1;
+    }
+  };
+  if (impl_->grids.size() == 1) {
+    std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
+    const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
+    std::ranges::fill(marks, std::uint8_t{0});
+    const auto read = impl_->grids.front().FillPoints(points, datum, {heights, {}, smooth}, marks, stop);
+    if (!read) return tl::unexpected(read.error());
+    take_smooth();
+    return heights;
+  }
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have heights for them
   for (std::size_t i = 0; i < points.size(); ++i) {
     const double x = std::remainder(points[i].longitude, 360), y = points[i].latitude;
@@ -331,11 +347,7 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
       if (std::isnan(smooth[those[k]])) smooth[those[k]] = found_smooth[k];
     }
   }
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!std::isnan(heights[i]) || std::isnan(smooth[i])) continue;
-    heights[i] = smooth[i];
-    if (!filled.empty()) filled[i] = 1;
-  }
+  take_smooth();
   return heights;
 }
 

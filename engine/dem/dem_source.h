@@ -17,6 +17,7 @@
 #include "engine/dem/common/content_hash.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/gdal/file_stamp.h"
+#include "engine/dem/sight/sight_ray.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
 
@@ -73,6 +74,12 @@ class DemSource {
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
+
+  // Looks along rays over the surface of ReadPoints, without its rounding; one answer for each ray. Heights of rays are
+  // above the ellipsoid. Precondition: finite positions on Earth, rays no longer than kMaxSightLength. Errors: those of
+  // ReadPoints.
+  Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
+                                             std::stop_token stop = {}) const;
 
   // Whether the vertical datum of every source is known. Orthometric heights need it.
   bool has_datum() const;

@@ -107,6 +107,16 @@ Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem:
 std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
 
+// For each point its height as a little-endian 32-bit float, NaN where there is none, and its normal if there are
+// normals: east, north, up.
+std::string HeightsBytes(const tiler::PointHeights& known);
+
+// GET /{dataset}/grid (server/query/grid_query.h). The Terrain-Grid header has the grid's size, place and scale.
+Answer AnswerGrid(const Handlers& from, const RequestContext& context);
+
+// GET and POST /{dataset}/sight (server/query/sight_query.h)
+Answer AnswerSight(const Handlers& from, const RequestContext& context);
+
 // GET /{dataset}/mesh
 Answer AnswerArea(const Handlers& from, const RequestContext& context);
 // Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/geo/ellipsoid.h"
 #include "proto/error_text.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
@@ -22,15 +24,7 @@
 namespace terrace::server {
 namespace {
 
-// A point on the edge between two tiles belongs to the eastern and to the northern tile.
-geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
-  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
-  const auto number = [side](double degrees, std::int64_t count) {
-    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(degrees / side)), 0, count - 1);
-  };
-  const double longitude = point.longitude == 180 ? -180 : point.longitude;
-  return {level, number(longitude + 180, geo::TileColumns(level)), number(point.latitude + 90, geo::TileRows(level))};
-}
+using tiler::TileAt;
 
 // Thousands of points, and geodesics between them, take a tenth of a second, which would block the io thread. A query
 // of at most this many bytes has a few points and is parsed in microseconds.
@@ -98,6 +92,18 @@ asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& from, std::uint
   co_return points;
 }
 
+// Heights of the surface that the query names, with normals if it wants them.
+Result<tiler::PointHeights> ReadSurface(const tiler::TilePipeline& pipeline, std::uint32_t dataset,
+                                        const HeightsQuery& query, const std::stop_token& stop) {
+  if (query.drawn) return pipeline.ReadDrawnPoints(dataset, *query.drawn, query.points, query.wants_normals, stop);
+  Result<tiler::PointHeights> heights = pipeline.ReadPoints(dataset, query.points, query.datum, stop);
+  if (!heights || !query.wants_normals) return heights;
+  Result<std::vector<std::array<float, 3>>> normals = pipeline.ReadNormals(dataset, query.points, stop);
+  if (!normals) return tl::unexpected(std::move(normals).error());
+  heights->normals = *std::move(normals);
+  return heights;
+}
+
 asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
   const DatasetView& view = from.catalog->datasets[dataset];
@@ -114,11 +120,13 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     co_return ClientErrorResponse(unknown, request.id);
   }
 
-  const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
+  const bool is_binary = parsed->is_binary;
+  // 32-bit floats of heights hardly shrink, and compression takes longer than reading them.
+  const tiler::Coding coding = is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
   Response response;
-  response.content_type = "application/json";
+  response.content_type = is_binary ? "application/octet-stream" : "application/json";
   response.content_encoding = tiler::NameOf(coding);
-  response.vary = "Accept-Encoding";
+  if (!is_binary) response.vary = "Accept-Encoding";
   response.cache_control = "no-store";
   if (request.method != Method::kPost) {
     // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
@@ -141,25 +149,28 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     if (!known) co_return co_await BackendFailure(known.error(), request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
-  const auto length = parsed->points.size() > kShortList ? TileService::Length::kLong : TileService::Length::kShort;
+  const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);
+  const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   Work<Made> work = [catalog = from.catalog, dataset, coding, query, certified,
                      asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<Made> {
     Made made;
     made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
-    const Result<tiler::PointHeights> heights =
-        catalog->pipeline->ReadPoints(dataset, query->points, query->datum, stop);
+    const Result<tiler::PointHeights> heights = ReadSurface(*catalog->pipeline, dataset, *query, stop);
     if (!heights) return tl::unexpected(heights.error());
     made.times.read = tiler::MicrosecondsSince(begun);
-    made.bytes = HeightsJson(*query, *heights, catalog->datasets[dataset].name, certified.get(), stop);
+    made.bytes = query->is_binary
+                     ? HeightsBytes(*heights)
+                     : HeightsJson(*query, *heights, catalog->datasets[dataset].name, certified.get(), stop);
     made.bytes = tiler::Compress(std::move(made.bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
   Result<Made> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
   const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
-  if (is_absent) co_return ClientErrorResponse(made.error(), request.id);
+  const bool is_wrong = !made && made.error().code == ErrorCode::kInvalidArgument;
+  if (is_absent || is_wrong) co_return ClientErrorResponse(made.error(), request.id);
   if (!made) co_return co_await BackendFailure(made.error(), request.id);
   response.body = std::make_shared<const std::string>(std::move(made->bytes));
   response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
@@ -171,12 +182,26 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
 Answer AnswerHeights(const Handlers& from, const RequestContext& context) {
   const Request& request = *context.request;
   if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
-    return ProblemResponse(415, "the body's Content-Type must be application/json or application/x-www-form-urlencoded",
+    return ProblemResponse(415,
+                           "the body's Content-Type must be application/json, application/x-www-form-urlencoded or "
+                           "application/octet-stream",
                            request.id);
   }
   const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   return ReadHeights(from, context, *dataset);
+}
+
+std::string HeightsBytes(const tiler::PointHeights& known) {
+  const std::size_t columns = known.normals.empty() ? 1 : 4;
+  std::string bytes(known.heights.size() * columns * sizeof(float), '\0');
+  char* to = bytes.data();
+  for (std::size_t i = 0; i < known.heights.size(); ++i) {
+    std::memcpy(to, &known.heights[i], sizeof(float));
+    if (columns > 1) std::memcpy(to + sizeof(float), known.normals[i].data(), 3 * sizeof(float));
+    to += columns * sizeof(float);
+  }
+  return bytes;
 }
 
 std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
@@ -198,6 +223,14 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
     if (!query.distances_m.empty()) fmt::format_to(out, ",\"distance\":{}", query.distances_m[i]);
     const bool is_filled = !known.filled.empty() && known.filled[i] != 0 && !std::isnan(heights[i]);
     if (is_filled) json += ",\"filled\":true";
+    if (!known.normals.empty() && !std::isnan(known.normals[i][2])) {
+      const auto& [east, north, up] = known.normals[i];
+      fmt::format_to(out, ",\"normal\":[{},{},{}],\"slope\":{:.3f}", east, north, up,
+                     geo::ToDegrees(std::atan2(std::hypot(east, north), up)));
+    }
+    if (!known.tiles.empty()) {
+      fmt::format_to(out, ",\"tile\":\"{}\"", geo::ToString(known.tiles[known.tile_of_point[i]]));
+    }
     if (certified != nullptr && !std::isnan(heights[i])) {
       const std::size_t tile = certified->tile_of_point[i];
       const std::optional<double>& error_m = certified->errors_m[tile];

@@ -8,8 +8,8 @@ namespace {
 std::string HeadersOf(std::string_view origin) {
   return fmt::format(
       "Access-Control-Allow-Origin: {0}\r\n"
-      "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, Retry-After, "
-      "Server-Timing\r\n"
+      "Access-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, "
+      "Terrain-Grid, Retry-After, Server-Timing\r\n"
       "Timing-Allow-Origin: {0}\r\n",
       origin);
 }

@@ -10,13 +10,16 @@
 namespace terrace::server {
 namespace {
 
-constexpr const char* kTextNames[] = {"step", "samples", "datum", "certify"};
+constexpr const char* kTextNames[] = {"step",  "samples", "datum",    "certify", "normals", "surface",
+                                      "level", "error",   "fraction", "atleast", "format",  "compression"};
 static_assert(std::size(kTextNames) == HeightsParameters::kTexts);
-constexpr std::size_t kLongestName = 9;
+constexpr std::size_t kLongestName = 11;
 
 tl::unexpected<Error> Unknown() {
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "unknown parameter; known are locations, path, step, samples, datum, certify");
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "unknown parameter; known are locations, path, step, samples, datum, certify, normals, surface, and with "
+      "surface=served level, error, fraction, atleast, format, compression");
 }
 
 tl::unexpected<Error> Repeated(const char* name) {

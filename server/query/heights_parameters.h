@@ -19,7 +19,21 @@ namespace terrace::server {
 // the parameter and the item, and quotes no text of the client.
 class HeightsParameters final : public ParameterSink {
  public:
-  enum Text { kStep, kSamples, kDatum, kCertify, kTexts };
+  enum Text {
+    kStep,
+    kSamples,
+    kDatum,
+    kCertify,
+    kNormals,
+    kSurface,
+    kLevel,
+    kError,
+    kFraction,
+    kAtLeast,
+    kFormat,
+    kCompression,
+    kTexts
+  };
 
   // Limit for the text of one point, and of any value that is not a list. Two numbers with all digits take 50 bytes.
   static constexpr std::size_t kMaxItemBytes = 1000;

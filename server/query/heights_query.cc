@@ -1,13 +1,16 @@
 #include "server/query/heights_query.h"
 
 #include <charconv>
+#include <cmath>
 #include <string>
 #include <utility>
 
+#include "engine/core/bytes.h"
 #include "engine/core/plain_number.h"
 #include "engine/dem/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
 #include "server/http/text.h"
+#include "server/query/drawn_parameters.h"
 #include "server/query/heights_parameters.h"
 #include "server/query/parameters.h"
 
@@ -21,17 +24,39 @@ bool HasMediaType(std::string_view content_type, std::string_view type) {
 bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
 bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
 
-Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, HeightsParameters& parameters) {
-  std::size_t at = 0;
-  Result<void> read = ReadForm(PartsOf(input.query, stop), PlusSign::kIsPlus, parameters, at);
-  if (!read || input.content_type.empty()) return read;
-  const TextParts parts = PartsOf(input.body, stop);
-  read = IsForm(input.content_type) ? ReadForm(parts, PlusSign::kIsBlank, parameters, at)
-                                    : ReadJsonObject(parts, parameters, at);
-  if (!read && read.error().code == ErrorCode::kInvalidArgument) {
-    return MakeError(ErrorCode::kInvalidArgument, "the body, byte {}: {}", at, read.error().message);
+// Longitude and latitude of each point as 64-bit floats.
+Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::string_view body, std::size_t max_locations,
+                                 const std::stop_token& stop) {
+  constexpr std::size_t kPointBytes = 2 * sizeof(double), kStopPeriod = 65536;
+  if (parameters.has_points()) {
+    return MakeError(ErrorCode::kInvalidArgument, "locations and path exclude a body of points");
   }
-  return read;
+  if (body.empty() || body.size() % kPointBytes != 0) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "the body has {} bytes, which is no multiple of 16 above 0: each point is its longitude and its "
+                     "latitude as little-endian 64-bit floats",
+                     body.size());
+  }
+  const std::size_t count = body.size() / kPointBytes;
+  if (count > max_locations) return TooManyPoints("the body", max_locations);
+  HeightsQuery query;
+  query.is_binary = true;
+  query.points.reserve(count);
+  ByteReader reader(body);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i % kStopPeriod == 0 && stop.stop_requested()) break;
+    const double longitude = reader.Get<double>(), latitude = reader.Get<double>();
+    // Also false for NaN.
+    if (!(std::abs(longitude) <= 180) || !(std::abs(latitude) <= 90)) {
+      const bool is_longitude = !(std::abs(longitude) <= 180);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "the body, byte {}: point {}: the {} must be a number from -{} to {}; the longitude comes first",
+                       i * kPointBytes + (is_longitude ? 0 : sizeof(double)), i + 1,
+                       is_longitude ? "longitude" : "latitude", is_longitude ? 180 : 90, is_longitude ? 180 : 90);
+    }
+    query.points.push_back({longitude, latitude});
+  }
+  return query;
 }
 
 Result<std::vector<dem::PathPoint>> Along(const dem::GeodesicPath& path, const HeightsParameters& parameters,
@@ -115,12 +140,30 @@ Result<void> SetDatum(std::string_view text, HeightsQuery& query) {
 
 }  // namespace
 
-bool IsHeightsBody(std::string_view content_type) { return IsForm(content_type) || IsJson(content_type); }
+Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters) {
+  std::size_t at = 0;
+  Result<void> read = ReadForm(PartsOf(input.query, stop), PlusSign::kIsPlus, parameters, at);
+  if (!read || input.content_type.empty() || IsBinaryBody(input.content_type)) return read;
+  const TextParts parts = PartsOf(input.body, stop);
+  read = IsForm(input.content_type) ? ReadForm(parts, PlusSign::kIsBlank, parameters, at)
+                                    : ReadJsonObject(parts, parameters, at);
+  if (!read && read.error().code == ErrorCode::kInvalidArgument) {
+    return MakeError(ErrorCode::kInvalidArgument, "the body, byte {}: {}", at, read.error().message);
+  }
+  return read;
+}
+
+bool IsBinaryBody(std::string_view content_type) { return HasMediaType(content_type, "application/octet-stream"); }
+bool IsHeightsBody(std::string_view content_type) {
+  return IsForm(content_type) || IsJson(content_type) || IsBinaryBody(content_type);
+}
 
 Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations, const std::stop_token& stop) {
   HeightsParameters parameters(max_locations, input.query.size() + input.body.size());
   if (const Result<void> read = ReadInput(input, stop, parameters); !read) return tl::unexpected(read.error());
-  Result<HeightsQuery> query = ParsePoints(parameters, max_locations, stop);
+  const bool is_binary = IsBinaryBody(input.content_type);
+  Result<HeightsQuery> query = is_binary ? ParseBinary(parameters, input.body, max_locations, stop)
+                                         : ParsePoints(parameters, max_locations, stop);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the request any more");
   if (!query) return query;
   if (const auto& certify = parameters.text(HeightsParameters::kCertify)) {
@@ -130,6 +173,30 @@ Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_loc
   }
   if (const auto& datum = parameters.text(HeightsParameters::kDatum)) {
     if (const Result<void> set = SetDatum(*datum, *query); !set) return tl::unexpected(set.error());
+  }
+  if (const auto& normals = parameters.text(HeightsParameters::kNormals)) {
+    if (*normals != "0" && *normals != "1") return MakeError(ErrorCode::kInvalidArgument, "normals must be 0 or 1");
+    query->wants_normals = *normals == "1";
+  }
+  DrawnTexts texts;
+  for (const auto& [text, of] :
+       {std::pair(HeightsParameters::kSurface, &texts.surface), std::pair(HeightsParameters::kLevel, &texts.level),
+        std::pair(HeightsParameters::kError, &texts.error), std::pair(HeightsParameters::kFraction, &texts.fraction),
+        std::pair(HeightsParameters::kAtLeast, &texts.at_least), std::pair(HeightsParameters::kFormat, &texts.format),
+        std::pair(HeightsParameters::kCompression, &texts.compression)}) {
+    *of = parameters.text(text);
+  }
+  Result<std::optional<tiler::DrawnSurface>> drawn = ParseDrawn(texts);
+  if (!drawn) return tl::unexpected(drawn.error());
+  query->drawn = *std::move(drawn);
+  if (query->drawn && query->certify_level) {
+    return MakeError(ErrorCode::kInvalidArgument, "certify is for heights of the sources, not for surface=served");
+  }
+  if (query->drawn && query->datum != dem::HeightDatum::kEllipsoid) {
+    return MakeError(ErrorCode::kInvalidArgument, "surface=served has ellipsoidal heights alone, as tiles have");
+  }
+  if (query->is_binary && query->certify_level) {
+    return MakeError(ErrorCode::kInvalidArgument, "certify needs a reply in JSON; send the points as JSON");
   }
   return query;
 }

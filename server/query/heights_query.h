@@ -9,6 +9,8 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "server/query/parameters.h"
+#include "tiler/surface/drawn_points.h"
 
 namespace terrace::server {
 
@@ -18,6 +20,9 @@ struct HeightsQuery {
   dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
   // If certified errors are requested: the deepest level of the tiles to use; geo::kMaxLevel: the deepest available.
   std::optional<int> certify_level;
+  bool is_binary = false;  // the points were numbers of 64 bits, and the heights are to be numbers of 32 bits
+  bool wants_normals = false;
+  std::optional<tiler::DrawnSurface> drawn;  // nothing: heights of the sources
 };
 
 // The parts of a request that contain parameters.
@@ -27,14 +32,22 @@ struct HeightsInput {
   std::string_view body;
 };
 
-// Whether bodies of this Content-Type are supported: a JSON object of texts and numbers, or a form.
+// Whether bodies of this Content-Type are supported: a JSON object of texts and numbers, a form, or points as numbers:
+// application/octet-stream, longitude and latitude of each point as little-endian 64-bit floats.
 bool IsHeightsBody(std::string_view content_type);
+bool IsBinaryBody(std::string_view content_type);
+
+// Passes the parameters of the query and of the body, unless it is binary, to a sink. Errors: those of the readers
+// (parameters.h) and of the sink; those of the body name its byte.
+Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters);
 
 // `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; with either,
-// `datum=ellipsoid` or `datum=orthometric`, and `certify=LEVEL` or `certify=deepest`; `v` is ignored. Each may occur
-// once in query and body together. kInvalidArgument: anything else, numbers that are not finite or not a position on
-// Earth, or more than `max_locations` points; the message is for the client, and names the item and the byte of the
-// body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes of the text.
+// `datum=ellipsoid` or `datum=orthometric`, `certify=LEVEL` or `certify=deepest`, `normals=1`, and `surface=source` or
+// `surface=served`; with the latter `level`, `error`, `fraction`, `atleast`, `format` and `compression`, as for tiles;
+// `v` is ignored. Each may occur once in query and body together. kInvalidArgument: anything else, numbers that are not
+// finite or not a position on Earth, or more than `max_locations` points; the message is for the client, and names the
+// item and the byte of the body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes
+// of the text.
 Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations,
                                   const std::stop_token& stop = {});
 

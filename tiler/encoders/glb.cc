@@ -15,6 +15,7 @@
 #include "tiler/encoders.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/surface/drawn_triangles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
@@ -38,6 +39,8 @@ struct MeshedGlb {
   double max_error_m = 0;                // of the flat triangles, measured on the grid points
   double surface_error_m = 0;            // the same everywhere, not only at the lattice's samples
   std::chrono::microseconds replayed{};  // time until the mesh was replayed
+  tin::TinMesh tin;                      // without skirts
+  std::vector<geo::Vec3> positions;      // of its vertices
 };
 
 // Takes the mesh of the tile's quantized-mesh form at the same error, and rounds its vertices to the grid of
@@ -73,6 +76,8 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
   meshed.mesh = proto::MakeGridMesh(lattice, mesh, points,
                                     RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m, depth_m);
+  meshed.tin = std::move(mesh);
+  meshed.positions = std::move(positions);
   return meshed;
 }
 
@@ -94,17 +99,33 @@ Result<void> AddTexture(const ImageryOptions& imagery, const TileRequest& reques
   return {};
 }
 
+Result<MeshedGlb> MeshGlb(const EncoderInput& input, const std::stop_token& stop) {
+  const auto& [dataset, request, refined, error_m] = input;
+  const bool is_deepest = request.key.level == dataset.source->max_level();
+  const double skirt_error_m =
+      proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
+  return MeshGlb(dataset, input.lattice(), refined->refinement, error_m, skirt_error_m,
+                 proto::WidthOf(request.compression), stop);
+}
+
 }  // namespace
+
+Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop) {
+  Result<MeshedGlb> meshed = MeshGlb(input, stop);
+  if (!meshed) return tl::unexpected(std::move(meshed).error());
+  DrawnTriangles drawn;
+  const double cells = input.lattice().cells();
+  for (const tin::SamplePosition& vertex : meshed->tin.vertices)
+    drawn.places.push_back({vertex.x / cells, vertex.y / cells});
+  drawn.positions = std::move(meshed->positions);
+  drawn.triangles = std::move(meshed->tin.triangles);
+  return drawn;
+}
 
 Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
   const auto start = Clock::now();
-  const proto::LatticeView lattice = input.lattice();
-  const bool is_deepest = request.key.level == dataset.source->max_level();
-  const double skirt_error_m =
-      proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
-  const Result<MeshedGlb> meshed =
-      MeshGlb(dataset, lattice, refined->refinement, error_m, skirt_error_m, proto::WidthOf(request.compression), stop);
+  const Result<MeshedGlb> meshed = MeshGlb(input, stop);
   if (!meshed) return tl::unexpected(meshed.error());
   proto::GlbOptions options = dataset.glb;
   options.compression = request.compression;

@@ -25,6 +25,7 @@
 #include "engine/dem/mosaic/grid_members.h"
 #include "engine/dem/mosaic/grid_voids.h"
 #include "engine/dem/mosaic/harmonic_fill.h"
+#include "engine/dem/mosaic/point_blocks.h"
 #include "engine/dem/raster/grid_cells.h"
 #include "engine/geo/mercator_grid.h"
 
@@ -121,6 +122,14 @@ class RasterGrid {
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
                           std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
+  // Whether a position lies in a member, as points do that Fill gives heights to. With wrapping: in 0 .. columns().
+  bool Covers(const Position& pixel) const { return cover_.Inside(std::span(&pixel, 1))[0] != 0; }
+
+  // Returns the block of cells with these numbers (PointBlockKey), and keeps it. Does not check whether the files are
+  // unchanged if the block was kept. Errors: those of Fill.
+  Result<PointBlockPtr> FindPointBlock(std::int64_t block_column, std::int64_t block_row,
+                                       const std::stop_token& stop) const;
+
   // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
   // that wraps, columns are taken modulo columns(). Errors: those of Fill.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
@@ -185,6 +194,9 @@ class RasterGrid {
   Result<void> GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions, VoidGrid& grid,
                           const std::stop_token& stop) const;
   GridWindow Grown(const GridWindow& window, int halo, int factor) const;
+  Result<PointBlock> ReadPointBlock(const GridWindow& window, const std::stop_token& stop) const;
+  GridWindow WindowOfPointBlock(std::int64_t block_column, std::int64_t block_row) const;
+  Result<PointBlockPtr> BlockOfCells(std::vector<GridCell>& cells, const std::stop_token& stop) const;
 
   // Returns the pixel positions of the window's nodes for averages by `factor`.
   template <typename NodeGrid>
@@ -208,6 +220,9 @@ class RasterGrid {
     std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};
   };
 
+  static std::uint64_t NextId();
+
+  std::uint64_t id_ = NextId();  // of its blocks in PointBlockCache
   Georeference georeference_;
   std::shared_ptr<const Undulations> undulations_;  // null: heights are ellipsoidal, or taken as such
   std::shared_ptr<Counts> counts_ = std::make_shared<Counts>();

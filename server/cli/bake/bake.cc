@@ -10,6 +10,7 @@
 #include "config/options/options.h"
 #include "server/cli/bake/bake_arguments.h"
 #include "server/cli/bake/bake_run.h"
+#include "server/cli/bake/bake_status.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/option_flags.h"
 
@@ -92,6 +93,32 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->group(kWhat);
 }
 
+void AddQueueSecrets(CLI::App& command, BakeArguments& arguments) {
+  command
+      .add_option("--queue-password-file", arguments.queue_password_file,
+                  "The password of Redis; else that of the environment variable TERRACE_QUEUE_PASSWORD")
+      ->type_name("FILE")
+      ->group(kHow);
+  command
+      .add_option("--queue-ca", arguments.queue_ca,
+                  "The certificates (PEM) that may sign that of rediss://; by default the system's")
+      ->type_name("FILE")
+      ->group(kHow);
+}
+
+void AddStatus(CLI::App& bake, int& exit_code) {
+  auto arguments = std::make_shared<BakeArguments>();
+  auto how = std::make_shared<StatusView>();
+  CLI::App* command = bake.add_subcommand("status", "Tells how far a job of --queue is");
+  command->add_option("--queue", arguments->queue, "Redis of the job")->type_name("redis://HOST:PORT/DB")->required();
+  command->add_option("--job", arguments->job, "The name of the job")->type_name("NAME")->required();
+  AddQueueSecrets(*command, *arguments);
+  command->add_flag("--json", how->json, "Prints JSON, with --watch a line each time");
+  command->add_flag("--watch", how->watch, "Again every two seconds, until the job has ended");
+  command->add_flag("--remove", how->remove, "Forgets the job in Redis; files of the bake stay");
+  command->callback([arguments, how, &exit_code] { exit_code = FinishOutput(ShowStatus(*arguments, *how)); });
+}
+
 void AddHow(CLI::App& command, BakeArguments& arguments) {
   const auto whole = [](const std::string& text) {
     unsigned number = 0;
@@ -114,6 +141,18 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
   command
       .add_flag("--finish", arguments.finish, "Bakes nothing: checks all files, and writes the manifest after shards")
       ->group(kHow);
+  command
+      .add_option(
+          "--queue", arguments.queue,
+          "Redis of which this and other workers take the units of the job, into the same place; rediss:// with "
+          "TLS")
+      ->type_name("redis://HOST:PORT/DB")
+      ->group(kHow);
+  command.add_option("--job", arguments.job, "With --queue: the name of the job")->type_name("NAME")->group(kHow);
+  AddQueueSecrets(command, arguments);
+  command.add_option("--lease", arguments.lease)
+      ->check(NumberAbove0("a number of seconds above 0"))
+      ->group("");  // for tests: how long a worker may be silent
   command
       .add_option("--update", arguments.update,
                   "An older bake in chunks: what did not change is copied from it, the rest is baked")
@@ -160,6 +199,8 @@ void AddBake(CLI::App& app, int& exit_code) {
       "  terrace bake --config terrace.json --dataset maui --out maui --format terrain,glb\n"
       "  terrace bake alps.tif --out alps-2 --update alps\n"
       "  terrace bake --config terrace.json --dataset maui --into-cache /var/cache/terrace\n"
+      "  terrace bake alps.tif --out /mnt/alps --queue redis://10.0.0.5:6379/0 --job alps    (on many machines)\n"
+      "  terrace bake status --queue redis://10.0.0.5:6379/0 --job alps --watch\n"
       "  terrace bake alps.tif --dry-run\n\n"
       "A bake that was interrupted goes on when the same command is run again: finished files are checked and\n"
       "kept. The manifest is written last. Exit codes: 0 complete; 1 files failed or are missing, and are listed;\n"
@@ -172,7 +213,9 @@ void AddBake(CLI::App& app, int& exit_code) {
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
   AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
-  command->callback([arguments, &exit_code] {
+  AddStatus(*command, exit_code);
+  command->callback([arguments, command, &exit_code] {
+    if (!command->get_subcommands().empty()) return;
     while (arguments->out.size() > 1 && arguments->out.ends_with('/')) arguments->out.pop_back();
     exit_code = FinishOutput(Bake(*arguments));
   });

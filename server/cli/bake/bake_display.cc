@@ -22,12 +22,6 @@ using Json = nlohmann::ordered_json;
 
 std::string Print(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
-std::string Duration(double seconds) {
-  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
-  return fmt::format("{:.1f} h", seconds / 3600);
-}
-
 const char* OutcomeName(bake::UnitOutcome outcome) {
   switch (outcome) {
     case bake::UnitOutcome::kBaked:
@@ -45,6 +39,12 @@ const char* OutcomeName(bake::UnitOutcome outcome) {
 }
 
 }  // namespace
+
+std::string Duration(double seconds) {
+  if (seconds < 100) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
 
 std::string Bytes(double bytes) {
   constexpr std::array<const char*, 6> kUnits = {"bytes", "kB", "MB", "GB", "TB", "PB"};

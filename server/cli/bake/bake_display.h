@@ -19,6 +19,9 @@ std::string Grouped(std::uint64_t number);
 // "12.3 MB"
 std::string Bytes(double bytes);
 
+// "42 s", "12 min", "3.4 h"
+std::string Duration(double seconds);
+
 // Shows on stderr, until it is destroyed, tiles, tiles a second, bytes, units and the time left: on a terminal one line
 // that is rewritten, else a line every ten seconds.
 class BakeDisplay {

@@ -1,6 +1,7 @@
 #include "server/cli/bake/bake_run.h"
 
 #include <fmt/format.h>
+#include <spdlog/sinks/stdout_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@
 #include "engine/dem/statistics/cache_folder.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/bake/bake_export.h"
+#include "server/cli/bake/bake_queue.h"
 #include "server/cli/bake/seed_cache.h"
 #include "server/cli/bake/stop_signals.h"
 #include "server/cli/common/command.h"
@@ -175,12 +177,15 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   }
   const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
-  const auto lock =
-      bake::PlaceLock::Take(place, shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string());
+  const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
+  std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
+  if (!worker.empty()) lock_name = bake::LockOfWorker(worker, arguments.job);
+  const auto lock = bake::PlaceLock::Take(place, lock_name);
   if (!lock) return Fail(lock.error());
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
   if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed)
     return Fail(claimed.error());
+  if (!worker.empty() && IsFinished(place, targets)) return kExitOk;
   if (!arguments.update.empty()) {
     if (const auto read = ReadOld(arguments.update, targets); !read) return Fail(read.error());
   }
@@ -198,6 +203,21 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   }
   const Clock::time_point start = Clock::now();
   std::vector<bake::UnitReport> reports;
+  if (!worker.empty()) {
+    const auto finish = [&](const std::vector<bake::UnitReport>& all) {
+      auto finished = Finish(targets, all, place, identity);
+      if (finished) bake::RemoveLocksOfJob(place, arguments.job, worker);
+      return finished;
+    };
+    const int code = BakeFromQueue({arguments, pipeline, targets, plan, options, place, worker, identity, finish},
+                                   counters, reports);
+    if (signals.signal() != 0) return StopCode(signals);
+    BakeSummary summary =
+        Summarize(reports, counters, place, std::chrono::duration<double>(Clock::now() - start).count());
+    summary.is_complete = code == kExitOk;
+    if (code != kExitUsage) fmt::print("{}\n", arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
+    return code;
+  }
   {
     const BakeDisplay display(dataset.name, plan.tiles, plan.files, counters);
     reports = bake::Bake(pipeline, targets, plan, options, counters);
@@ -272,9 +292,10 @@ std::string WrongTogether(const BakeArguments& arguments) {
                : "give DEMs, or a configuration with --config, not both";
   }
   if (given(arguments.into_cache)) {
-    if (given(arguments.out) || given(arguments.update) || arguments.finish || arguments.form != kChunks ||
-        arguments.no_gzip) {
-      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --finish and --no-gzip";
+    if (given(arguments.out) || given(arguments.update) || given(arguments.queue) || arguments.finish ||
+        arguments.form != kChunks || arguments.no_gzip) {
+      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --queue, --finish and "
+             "--no-gzip";
     }
     return {};
   }
@@ -283,9 +304,16 @@ std::string WrongTogether(const BakeArguments& arguments) {
   if (arguments.out.starts_with("/vsi")) {
     return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
   }
+  if (given(arguments.queue) != given(arguments.job)) return "--queue and --job belong together: give both";
+  if (given(arguments.queue) && (given(arguments.shard) || arguments.finish)) {
+    return "--queue hands out the units and finishes the bake: leave --shard and --finish out";
+  }
+  if ((given(arguments.queue_password_file) || given(arguments.queue_ca)) && !given(arguments.queue)) {
+    return "--queue-password-file and --queue-ca are for --queue";
+  }
   if (given(arguments.shard) && arguments.finish) return "--finish is for all shards together: leave --shard out";
-  if ((given(arguments.shard) || arguments.finish) && arguments.form != kChunks) {
-    return fmt::format("--form {} is written from all units: bake and finish shards with --form chunks",
+  if ((given(arguments.shard) || arguments.finish || given(arguments.queue)) && arguments.form != kChunks) {
+    return fmt::format("--form {} is written from all units: bake with shards or a queue --form chunks",
                        arguments.form);
   }
   if (given(arguments.update)) {
@@ -304,6 +332,7 @@ int Bake(const BakeArguments& arguments) {
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
   const StopSignals signals;
+  spdlog::set_default_logger(spdlog::stderr_logger_mt("terrace"));  // stdout is for --json
   spdlog::set_level(spdlog::level::warn);
   if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) {
     return cli::Fail(wrong + "\nRun 'terrace bake --help' for what is accepted.", kExitUsage);

@@ -55,6 +55,23 @@ TEST(Points, AreFilledInSmallVoids) {
   EXPECT_EQ(filled, (std::vector<std::uint8_t>{1, 1, 0}));
 }
 
+TEST(Points, NeverShowTheSeaFloorOfACoarseSourceThroughAPinhole) {
+  const TempDir dir;
+  RasterSpec floor{.width = 40, .height = 40, .geo_transform = {5, .5, 0, 25, 0, -.5}};
+  floor.value = [](int, int) { return -4000.0; };
+  const auto source = OpenOrFail({{.path = WriteRaster(dir, Steps(), "fine.tif"), .rank = 0},
+                                  {.path = WriteRaster(dir, floor, "floor.tif"), .rank = 1}});
+  ASSERT_TRUE(source);
+  const std::vector<GeoPosition> points = {At(300.5, 300.5), At(300.2, 300.8), At(-5, 300)};
+  std::vector<std::uint8_t> filled(points.size());
+  const auto heights = source->ReadPoints(points, HeightDatum::kEllipsoid, {}, filled);
+  ASSERT_TRUE(heights);
+  EXPECT_NEAR((*heights)[0], 300 + 30'000, .1);
+  EXPECT_NEAR((*heights)[1], 299.7 + 30'030, 10);
+  EXPECT_EQ((*heights)[2], -4000) << "beside the fine source";
+  EXPECT_EQ(filled, (std::vector<std::uint8_t>{1, 1, 0}));
+}
+
 TEST(Points, DoNotDependOnEachOtherOrTheirOrder) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, Steps()));

@@ -33,7 +33,7 @@ TEST(Response, CarriesCorsAndALength) {
        {"\r\nContent-Length: 5\r\n", "\r\nContent-Encoding: gzip\r\n", "\r\nETag: \"e\"\r\n",
         "\r\nVary: Accept, Accept-Encoding\r\n", "\r\nAccess-Control-Allow-Origin: *\r\n",
         "\r\nAccess-Control-Expose-Headers: ETag, Terrain-Max-Error, Terrain-Certified-Error, Terrain-Origin, "
-        "Retry-After, Server-Timing\r\n",
+        "Terrain-Grid, Retry-After, Server-Timing\r\n",
         "\r\nTiming-Allow-Origin: *\r\n", "\r\nConnection: close\r\n", "\r\nDate: "}) {
     EXPECT_NE(head.find(line), std::string::npos) << line;
   }

@@ -1,0 +1,37 @@
+#include "bake/find_missing.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+#include "archive/pmtiles/pmtiles_file.h"
+#include "archive/tile_scheme.h"
+#include "bake/unit_key.h"
+
+namespace terrace::bake {
+namespace {
+
+bool IsThere(const tiler::Dataset& dataset, const Target& target, const Unit& unit) {
+  const std::string path = target.place + "/" + archive::UnitPath(unit.name);
+  std::error_code ignored;
+  if (!std::filesystem::exists(path, ignored)) return false;
+  const auto file = archive::PmtilesFile::Open(path);
+  return file && archive::UnitKeyIn((*file)->metadata()) == UnitKey(dataset, target.manifest, unit);
+}
+
+}  // namespace
+
+std::vector<std::size_t> FindMissing(const tiler::Dataset& dataset, const std::vector<Target>& targets,
+                                     const UnitPlan& plan) {
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0; i < plan.units.size(); ++i) {
+    const UnitPlan::Of& of = plan.units[i];
+    const bool is_there =
+        std::ranges::all_of(of.targets, [&](std::size_t target) { return IsThere(dataset, targets[target], of.unit); });
+    if (!is_there) missing.push_back(i);
+  }
+  return missing;
+}
+
+}  // namespace terrace::bake

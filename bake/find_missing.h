@@ -1,0 +1,16 @@
+// Which units of a plan have no file yet.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "bake/baker.h"
+
+namespace terrace::bake {
+
+// The indexes of the units of the plan of which a file is absent or has another key. Reads the keys in the files, not
+// the tiles: what is damaged is found when the bake is finished.
+std::vector<std::size_t> FindMissing(const tiler::Dataset& dataset, const std::vector<Target>& targets,
+                                     const UnitPlan& plan);
+
+}  // namespace terrace::bake

@@ -1,0 +1,52 @@
+// A job in Redis: where it is, what it bakes, and the commands of its scripts.
+#pragma once
+
+#include <chrono>
+#include <initializer_list>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "redis/connection.h"
+
+namespace terrace::bake {
+
+struct JobPlace {
+  redis::Address address;
+  std::string ca_file = {};  // as in redis::ConnectionOptions
+  std::string name;
+
+  std::string Key(const std::string& what) const;
+};
+
+// kInvalidArgument: a name must have 1 to 64 letters, digits, "_", "-" and ".".
+Result<void> CheckJobName(const std::string& name);
+
+// Connects, and checks that the server has what the queue needs. Errors: as redis::Connection::Open; kInvalidArgument:
+// a Redis before 6.2.
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place);
+
+// What all workers of a job must agree on: names and values.
+using JobIdentity = std::vector<std::pair<std::string, std::string>>;
+
+// A script of job_scripts.h with its keys and arguments.
+redis::Command ScriptCommand(const JobPlace& place, const char* script, std::vector<std::string> arguments);
+
+// A unit that was given up.
+struct DeadUnit {
+  std::string unit, why, worker;
+  int deliveries = 0;
+};
+Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobPlace& place);
+
+// The fields of the hash of the job; empty: there is none.
+Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection, const JobPlace& place);
+// The value of a field; empty: it has none.
+std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fields, const std::string& name);
+
+// Forgets a job, with all that it knows. The files of the bake stay.
+Result<void> RemoveJob(redis::Connection& connection, const JobPlace& place);
+
+}  // namespace terrace::bake

@@ -1,0 +1,152 @@
+// The state of a job in Redis, and the scripts that change it. Redis runs a script as a whole, so that a worker that is
+// killed leaves no half of a change.
+//
+//   terrace:{JOB}:job     hash: what is baked (fields of JobIdentity), incarnation, state, lease_ms, units
+//   terrace:{JOB}:units   stream with the consumer group "bakers": the units that are not done, field "unit"
+//   terrace:{JOB}:dead    stream: the units that were given up: unit, why, deliveries, worker
+//   terrace:{JOB}:taken   hash: unit -> "id worker milliseconds", by Redis's clock; for people
+//   terrace:{JOB}:done    stream: the last units that were done: unit, worker, seconds; for people
+//   terrace:{JOB}:errors  hash: unit -> why it failed last
+//
+// A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node of a cluster.
+// The incarnation is a random number of the moment at which the queue was filled: a worker that took its unit from an
+// earlier filling must not acknowledge in a later one.
+#pragma once
+
+namespace terrace::bake::scripts {
+
+// The unit after all others: writing the manifest.
+inline constexpr const char* kFinishUnit = "*finish";
+// The consumer of units that wait to be handed out again.
+inline constexpr const char* kNobody = "-";
+
+// Before each of the others. KEYS: as above. ARGV[1]: the incarnation; empty: there is no job. Redis 6.2 needs
+// replicate_commands for scripts that ask the time and then write.
+inline constexpr const char* kPrelude = R"lua(
+local job, units, dead, taken, done, errors = KEYS[1], KEYS[2], KEYS[3], KEYS[4], KEYS[5], KEYS[6]
+if redis.replicate_commands then redis.replicate_commands() end
+if (redis.call('HGET', job, 'incarnation') or '') ~= ARGV[1] then return {'gone'} end
+local function remove(id, name)
+  local noted = redis.call('HGET', taken, name)
+  if noted and string.sub(noted, 1, #id + 1) == id .. ' ' then redis.call('HDEL', taken, name) end
+  local acked = redis.call('XACK', units, 'bakers', id)
+  redis.call('XDEL', units, id)
+  return acked == 1
+end
+)lua";
+
+// ARGV: incarnation, number of fields, fields and values, units. A Redis that is full refuses only the first write of a
+// script, and never DEL.
+inline constexpr const char* kFill = R"lua(
+redis.call('HSET', job, 'state', 'filling')
+redis.call('DEL', job, units, dead, taken, done, errors)
+local fields = tonumber(ARGV[2])
+for i = 1, fields do redis.call('HSET', job, ARGV[1 + 2 * i], ARGV[2 + 2 * i]) end
+redis.call('XGROUP', 'CREATE', units, 'bakers', '0', 'MKSTREAM')
+for i = 3 + 2 * fields, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, units. A job that ended incomplete tries again what it gave up.
+inline constexpr const char* kRevive = R"lua(
+if redis.call('XLEN', units) > 0 or redis.call('XLEN', dead) == 0 then return {'ok'} end
+for i = 2, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
+redis.call('DEL', dead, errors)
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, worker, lease in ms. New units first, then those whose worker was not heard of for a lease; then
+// the end. Idle times are Redis's, so that the clocks of the workers do not matter.
+inline constexpr const char* kTake = R"lua(
+local worker, lease = ARGV[2], ARGV[3]
+local function hand_out(message, deliveries)
+  local name = ''
+  for i = 1, #message[2], 2 do
+    if message[2][i] == 'unit' then name = message[2][i + 1] end
+  end
+  local time = redis.call('TIME')
+  redis.pcall('HSET', taken, name, message[1] .. ' ' .. worker .. ' ' .. time[1] .. string.format('%03d', math.floor(time[2] / 1000)))
+  return {'unit', message[1], name, deliveries}
+end
+local function new()
+  local streams = redis.call('XREADGROUP', 'GROUP', 'bakers', worker, 'COUNT', 1, 'STREAMS', units, '>')
+  return streams and streams[1][2][1]
+end
+local message = new()
+if message then return hand_out(message, 1) end
+local from = '0-0'
+repeat
+  local claimed = redis.call('XAUTOCLAIM', units, 'bakers', worker, lease, from, 'COUNT', 1)
+  from = claimed[1]
+  message = claimed[2][1]
+  if message then
+    return hand_out(message, redis.call('XPENDING', units, 'bakers', message[1], message[1], 1)[1][4])
+  end
+until from == '0-0'
+if redis.call('XLEN', units) > 0 then return {'wait'} end
+if redis.call('XLEN', dead) > 0 then return {'incomplete'} end
+if redis.call('HGET', job, 'state') == 'finished' then return {'finished'} end
+redis.call('XADD', units, '*', 'unit', '*finish')
+return hand_out(new(), 1)
+)lua";
+
+// ARGV: incarnation, worker, ids. Only what is still this worker's.
+inline constexpr const char* kBeat = R"lua(
+for i = 3, #ARGV do
+  local pending = redis.call('XPENDING', units, 'bakers', ARGV[i], ARGV[i], 1)[1]
+  if pending and pending[2] == ARGV[2] then
+    redis.call('XCLAIM', units, 'bakers', ARGV[2], 0, ARGV[i], 'JUSTID')
+  end
+end
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, id, unit, worker, seconds.
+inline constexpr const char* kDone = R"lua(
+if remove(ARGV[2], ARGV[3]) then
+  redis.call('HDEL', errors, ARGV[3])
+  redis.pcall('XADD', done, 'MAXLEN', '~', 1000, '*', 'unit', ARGV[3], 'worker', ARGV[4], 'seconds', ARGV[5])
+end
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, id, unit, worker, why (empty: stopped), deliveries that count, idle time in ms that it begins
+// with.
+inline constexpr const char* kGiveBack = R"lua(
+local pending = redis.call('XPENDING', units, 'bakers', ARGV[2], ARGV[2], 1)[1]
+if not pending or pending[2] ~= ARGV[4] then return {'ok'} end
+if ARGV[5] ~= '' then redis.pcall('HSET', errors, ARGV[3], ARGV[5]) end
+redis.call('HDEL', taken, ARGV[3])
+redis.call('XCLAIM', units, 'bakers', '-', 0, ARGV[2], 'IDLE', ARGV[7], 'RETRYCOUNT', ARGV[6], 'JUSTID')
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, id, unit, worker, why (empty: as noted), deliveries.
+inline constexpr const char* kBury = R"lua(
+local why = ARGV[5]
+if why == '' then
+  why = redis.call('HGET', errors, ARGV[3]) or 'its workers ended before it was done: killed, out of memory, or cut off'
+end
+if remove(ARGV[2], ARGV[3]) then
+  redis.call('XADD', dead, '*', 'unit', ARGV[3], 'why', why, 'deliveries', ARGV[6], 'worker', ARGV[4])
+end
+redis.call('HDEL', errors, ARGV[3])
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, id of the finishing unit, units that are not there after all.
+inline constexpr const char* kAddMissing = R"lua(
+for i = 3, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
+remove(ARGV[2], '*finish')
+return {'ok'}
+)lua";
+
+// ARGV: incarnation, id of the finishing unit. A finished job is forgotten after a week.
+inline constexpr const char* kFinished = R"lua(
+redis.call('HSET', job, 'state', 'finished')
+remove(ARGV[2], '*finish')
+for i = 1, #KEYS do redis.call('EXPIRE', KEYS[i], 604800) end
+return {'ok'}
+)lua";
+
+}  // namespace terrace::bake::scripts

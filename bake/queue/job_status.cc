@@ -1,0 +1,122 @@
+#include "bake/queue/job_status.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cstdlib>
+#include <map>
+#include <string_view>
+#include <tuple>
+
+#include "bake/queue/job_scripts.h"
+
+namespace terrace::bake {
+namespace {
+
+std::int64_t NumberOf(std::string_view text) {
+  std::int64_t number = 0;
+  std::from_chars(text.data(), text.data() + text.size(), number);
+  return number;
+}
+
+// The words of "id worker milliseconds" in the hash of taken units.
+std::array<std::string_view, 3> WordsOf(std::string_view noted) {
+  const std::size_t first = std::min(noted.find(' '), noted.size());
+  const std::size_t last = std::max(std::min(noted.rfind(' '), noted.size()), first);
+  const auto after = [&](std::size_t at) { return noted.substr(std::min(at + 1, noted.size())); };
+  return {noted.substr(0, first), after(first).substr(0, last > first ? last - first - 1 : 0), after(last)};
+}
+
+bool IsOfQueue(const std::string& field) {
+  return field == "incarnation" || field == "state" || field == "lease_ms" || field == "units";
+}
+
+// Units an hour over the last ten minutes, or over all that is remembered if that is less than ten units.
+double RateOf(const redis::ReplyView& done, std::int64_t now_ms) {
+  constexpr std::int64_t kWindowMs = 600'000;
+  constexpr std::size_t kMinUnits = 10;
+  const std::size_t count = done.size();
+  if (count < 2) return 0;
+  const auto time_of = [&](std::size_t i) {
+    const std::string_view id = done[i][0].text();
+    return NumberOf(id.substr(0, id.find('-')));
+  };
+  std::size_t first = 0;
+  while (count - first > kMinUnits && time_of(first) < now_ms - kWindowMs) ++first;
+  const double elapsed_ms = static_cast<double>(std::max<std::int64_t>(now_ms - time_of(first), 1));
+  return static_cast<double>(count - first - 1) / elapsed_ms * 3.6e6;
+}
+
+}  // namespace
+
+Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& place) {
+  const auto job = ReadJob(connection, place);
+  if (!job) return tl::unexpected(job.error());
+  if (job->empty()) {
+    return MakeError(ErrorCode::kNotFound,
+                     "Redis at {}: has no job {}; either none was begun, or Redis lost it: the next worker fills it "
+                     "again",
+                     place.address.Text(), place.name);
+  }
+  const std::string units = place.Key("units");
+  const std::array<redis::Command, 6> commands = {{{"TIME"},
+                                                   {"XLEN", units},
+                                                   {"XPENDING", units, "bakers", "-", "+", "100000"},
+                                                   {"HGETALL", place.Key("taken")},
+                                                   {"XRANGE", place.Key("done"), "-", "+"},
+                                                   {"HGET", place.Key("job"), "state"}}};
+  const auto replies = connection.CallAll(commands);
+  if (!replies) return tl::unexpected(replies.error());
+  for (std::size_t i = 0; i < replies->size(); ++i) {
+    if ((*replies)[i].is_error()) return tl::unexpected(connection.Refusal(commands[i].front(), (*replies)[i]));
+  }
+  auto dead = ReadDead(connection, place);
+  if (!dead) return tl::unexpected(dead.error());
+
+  JobStatus status;
+  status.dead = *std::move(dead);
+  status.state = (*replies)[5].text();
+  for (const auto& field : *job) {
+    if (!IsOfQueue(field.first)) status.identity.push_back(field);
+  }
+  status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(NumberOf(FieldOf(*job, "units")), 0));
+  status.lease_seconds = static_cast<double>(NumberOf(FieldOf(*job, "lease_ms"))) / 1000;
+  const std::int64_t now_ms = NumberOf((*replies)[0][0].text()) * 1000 + NumberOf((*replies)[0][1].text()) / 1000;
+
+  struct Pending {
+    std::string worker;
+    std::int64_t idle_ms = 0, deliveries = 1;
+  };
+  std::map<std::string, Pending, std::less<>> pending;  // by id
+  for (std::size_t i = 0; i < (*replies)[2].size(); ++i) {
+    const redis::ReplyView one = (*replies)[2][i];
+    if (one[1].text() == scripts::kNobody) continue;
+    pending.emplace(one[0].text(), Pending{std::string(one[1].text()), one[2].integer(), one[3].integer()});
+  }
+  bool is_finishing = false;
+  const redis::ReplyView taken = (*replies)[3];
+  for (std::size_t i = 0; i + 1 < taken.size(); i += 2) {
+    const auto [id, worker, since] = WordsOf(taken[i + 1].text());
+    const auto found = pending.find(id);
+    if (found == pending.end()) continue;
+    is_finishing |= taken[i].text() == scripts::kFinishUnit;
+    status.running.push_back({std::string(taken[i].text()), found->second.worker,
+                              static_cast<double>(std::max<std::int64_t>(now_ms - NumberOf(since), 0)) / 1000,
+                              static_cast<double>(found->second.idle_ms) / 1000,
+                              static_cast<int>(found->second.deliveries)});
+  }
+  std::ranges::sort(status.running, {}, [](const JobStatus::Running& one) { return std::tie(one.worker, one.unit); });
+  const auto queued = static_cast<std::uint64_t>((*replies)[1].integer()) - (is_finishing ? 1U : 0U);
+  status.done = status.units - std::min<std::uint64_t>(status.units, queued + status.dead.size());
+  const std::uint64_t running = status.running.size() - (is_finishing ? 1U : 0U);
+  status.waiting = queued - std::min(queued, running);
+  if (status.state == "baking" && is_finishing) status.state = "finishing";
+  if (status.state == "baking" && queued == 0 && !status.dead.empty()) status.state = "incomplete";
+  status.units_per_hour = RateOf((*replies)[4], now_ms);
+  if (status.units_per_hour > 0 && status.state == "baking") {
+    status.seconds_left = static_cast<double>(queued) / status.units_per_hour * 3600;
+  }
+  return status;
+}
+
+}  // namespace terrace::bake

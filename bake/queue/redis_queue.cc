@@ -1,0 +1,355 @@
+#include "bake/queue/redis_queue.h"
+
+#include <algorithm>
+#include <charconv>
+#include <condition_variable>
+#include <random>
+#include <utility>
+
+#include "bake/queue/job_scripts.h"
+
+namespace terrace::bake {
+namespace {
+
+using std::chrono::milliseconds;
+
+// Between two attempts at the same unit, at two takes when there was nothing, and at two connections.
+constexpr milliseconds kPauseAfterFailure{500}, kPauseWithoutUnits{500}, kPauseWithoutRedis{1000};
+
+std::string RandomName() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
+std::string Millis(milliseconds time) { return std::to_string(std::max<milliseconds::rep>(time.count(), 0)); }
+
+}  // namespace
+
+Result<std::unique_ptr<RedisQueue>> RedisQueue::Join(RedisQueueOptions options) {
+  std::unique_ptr<RedisQueue> queue(new RedisQueue(std::move(options)));
+  {
+    const std::lock_guard lock(queue->mutex_);
+    if (auto connected = queue->Connect(); !connected) return tl::unexpected(connected.error());
+    if (auto entered = queue->Enter(false); !entered) return tl::unexpected(entered.error());
+    if (auto revived = queue->Revive(); !revived) return tl::unexpected(revived.error());
+  }
+  RedisQueue* const self = queue.get();
+  queue->beat_ = std::jthread([self](const std::stop_token& stop) {
+    std::mutex mutex;
+    std::unique_lock lock(mutex);
+    std::condition_variable_any ended;
+    while (true) {
+      milliseconds pause;
+      {
+        const std::lock_guard of_queue(self->mutex_);
+        pause = self->lease_ / 3;
+      }
+      if (ended.wait_for(lock, stop, pause, [&stop] { return stop.stop_requested(); })) return;
+      const std::lock_guard of_queue(self->mutex_);
+      self->Beat();
+    }
+  });
+  return queue;
+}
+
+RedisQueue::RedisQueue(RedisQueueOptions options) : options_(std::move(options)), lease_(options_.lease) {
+  for (std::size_t i = 0; i < options_.units.size(); ++i) index_.emplace(options_.units[i], i);
+}
+
+RedisQueue::~RedisQueue() {
+  beat_ = {};
+  std::vector<std::size_t> left;
+  {
+    const std::lock_guard lock(mutex_);
+    for (const auto& [unit, held] : held_) left.push_back(unit);
+  }
+  for (const std::size_t unit : left) Return(unit);
+  const std::lock_guard lock(mutex_);
+  if (finish_) {
+    Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
+  }
+  Flush();
+}
+
+Result<void> RedisQueue::Connect() {
+  auto connection = ConnectToJob(options_.place);
+  if (!connection) return tl::unexpected(connection.error());
+  connection_ = *std::move(connection);
+  return {};
+}
+
+// Finds the job, or makes it. `is_emptied`: the stream is gone although the job is there.
+Result<void> RedisQueue::Enter(bool is_emptied) {
+  constexpr int kTries = 5;  // others may fill it at the same time
+  for (int i = 0; i < kTries; ++i) {
+    const auto job = ReadJob(*connection_, options_.place);
+    if (!job) return tl::unexpected(job.error());
+    const std::string incarnation = FieldOf(*job, "incarnation");
+    if (FieldOf(*job, "state") == "baking") {
+      if (auto same = CheckIdentity(*job); !same) return same;
+      if (!is_emptied || incarnation != incarnation_) {
+        incarnation_ = incarnation;
+        const std::string lease = FieldOf(*job, "lease_ms");
+        milliseconds::rep number = 0;
+        std::from_chars(lease.data(), lease.data() + lease.size(), number);
+        if (number > 0) lease_ = milliseconds(number);
+        return {};
+      }
+    }
+    const auto filled = Fill(incarnation);
+    if (!filled) return tl::unexpected(filled.error());
+    if (*filled) return {};
+  }
+  return MakeError(ErrorCode::kUnavailable, "Redis at {}: job {} is begun again and again by others; look who uses it",
+                   options_.place.address.Text(), options_.place.name);
+}
+
+Result<void> RedisQueue::CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const {
+  std::string differences;
+  for (const auto& [what, value] : options_.identity) {
+    const std::string theirs = FieldOf(job, what);
+    if (theirs == value) continue;
+    differences += fmt::format("{}{} \"{}\", not \"{}\"", differences.empty() ? "" : "; ", what, theirs, value);
+  }
+  if (differences.empty()) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "Redis at {}: job {} is another bake: {}; give the same arguments, another --job, or forget that "
+                   "job with 'terrace bake status --job {} --remove'",
+                   options_.place.address.Text(), options_.place.name, differences, options_.place.name);
+}
+
+// False: another worker did something meanwhile.
+Result<bool> RedisQueue::Fill(const std::string& incarnation) {
+  const std::string mine = RandomName();
+  std::vector<std::pair<std::string, std::string>> fields = options_.identity;
+  fields.emplace_back("incarnation", mine);
+  fields.emplace_back("state", "baking");
+  fields.emplace_back("lease_ms", Millis(options_.lease));
+  fields.emplace_back("units", std::to_string(options_.units.size()));
+  std::vector<std::string> arguments = {incarnation, std::to_string(fields.size())};
+  for (auto& [name, value] : fields) {
+    arguments.push_back(std::move(name));
+    arguments.push_back(std::move(value));
+  }
+  for (const std::size_t unit : options_.find_missing()) arguments.push_back(options_.units[unit]);
+  const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kFill, std::move(arguments)));
+  if (!reply) return tl::unexpected(reply.error());
+  if ((*reply)[0].text() != "ok") return false;
+  incarnation_ = mine;
+  lease_ = options_.lease;
+  return true;
+}
+
+Result<void> RedisQueue::Revive() {
+  const auto dead = ReadDead(*connection_, options_.place);
+  if (!dead) return tl::unexpected(dead.error());
+  if (dead->empty()) return {};
+  std::vector<std::string> arguments = {incarnation_};
+  for (const DeadUnit& unit : *dead) {
+    if (index_.contains(unit.unit)) arguments.push_back(unit.unit);
+  }
+  const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kRevive, std::move(arguments)));
+  if (!reply) return tl::unexpected(reply.error());
+  return {};
+}
+
+void RedisQueue::NoteAway(const Error& why) {
+  const Clock::time_point now = Clock::now();
+  connection_ = nullptr;
+  next_connect_ = now + kPauseWithoutRedis;
+  if (!away_since_) {
+    away_since_ = now;
+    if (options_.on_message) {
+      options_.on_message(fmt::format("{}; waiting for it up to {} s", why.message, options_.patience.count() / 1000));
+    }
+  }
+  if (now - *away_since_ < options_.patience || end_ != End::kNone) return;
+  end_ = End::kLost;
+  why_ = why;
+}
+
+void RedisQueue::NoteBack() {
+  if (!away_since_) return;
+  away_since_.reset();
+  if (options_.on_message) options_.on_message(fmt::format("Redis at {}: is back", options_.place.address.Text()));
+}
+
+Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
+  const auto fail = [&](const Error& why) {
+    NoteAway(why);
+    return tl::unexpected(why);
+  };
+  if (!connection_) {
+    if (Clock::now() < next_connect_) return MakeError(ErrorCode::kUnavailable, "Redis is away");
+    if (auto connected = Connect(); !connected) return fail(connected.error());
+  }
+  std::vector<redis::Command> commands(outbox_.begin(), outbox_.end());
+  commands.push_back(command);
+  auto replies = connection_->CallAll(commands);
+  if (!replies) return fail(replies.error());
+  // What Redis refuses now, because it is a replica, say, is sent again.
+  std::deque<redis::Command> left;
+  for (std::size_t i = 0; i + 1 < commands.size(); ++i) {
+    if ((*replies)[i].is_error()) left.push_back(std::move(commands[i]));
+  }
+  outbox_ = std::move(left);
+  redis::Reply last = std::move(replies->back());
+  if (!last.is_error() || last.text().find("NOGROUP") != std::string_view::npos) {
+    NoteBack();
+    return last;
+  }
+  return fail(connection_->Refusal(command.front(), last));
+}
+
+UnitQueue::Taken RedisQueue::Take() {
+  const std::lock_guard lock(mutex_);
+  constexpr int kTries = 100;  // units of others, and units that are in hand, are not counted
+  for (int i = 0; i < kTries; ++i) {
+    if (const auto taken = TakeOnce()) return *taken;
+  }
+  return {Taken::State::kWait};
+}
+
+// Nothing: ask again.
+std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
+  if (end_ != End::kNone) return Taken{Taken::State::kOver};
+  if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
+  const auto reply =
+      Exchange(ScriptCommand(options_.place, scripts::kTake, {incarnation_, options_.worker, Millis(lease_)}));
+  const auto wait = [&] {
+    next_take_ = Clock::now() + std::min(kPauseWithoutUnits, lease_ / 4);
+    return Taken{end_ == End::kNone ? Taken::State::kWait : Taken::State::kOver};
+  };
+  if (!reply) return wait();
+  const std::string_view what = (*reply)[0].text();
+  if (what == "unit") return Accept(*reply);
+  if (what == "incomplete") end_ = End::kIncomplete;
+  if (what == "finished") end_ = End::kFinished;
+  if (end_ != End::kNone) return Taken{Taken::State::kOver};
+  if (what == "wait") return wait();
+  // The job is gone, or its stream.
+  if (const auto entered = Enter(what != "gone"); !entered) {
+    if (entered.error().code == ErrorCode::kInvalidArgument) {
+      end_ = End::kLost;
+      why_ = entered.error();
+    } else {
+      NoteAway(entered.error());
+    }
+    return wait();
+  }
+  return std::nullopt;
+}
+
+std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply) {
+  const std::string name(reply[2].text());
+  const int deliveries = static_cast<int>(reply[3].integer());
+  const Held held{incarnation_, std::string(reply[1].text()), deliveries, Clock::now()};
+  const bool is_finish = name == scripts::kFinishUnit;
+  const auto found = index_.find(name);
+  if (!is_finish && found == index_.end()) {
+    Send(held, scripts::kBury, {name, options_.worker, "is no unit of this job", std::to_string(deliveries)});
+    return std::nullopt;
+  }
+  if (deliveries > kMaxAttempts) {
+    Send(held, scripts::kBury, {name, options_.worker, "", std::to_string(deliveries - 1)});
+    return std::nullopt;
+  }
+  if (is_finish) {
+    finish_ = held;
+    end_ = End::kFinish;
+    return Taken{Taken::State::kOver};
+  }
+  // A unit in hand comes again if the queue was filled anew, or if this process was stopped for longer than a lease.
+  if (held_.insert_or_assign(found->second, held).second) {
+    return Taken{Taken::State::kUnit, found->second, deliveries - 1};
+  }
+  return std::nullopt;
+}
+
+void RedisQueue::Send(const Held& held, const char* script, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {held.incarnation, held.id});
+  outbox_.push_back(ScriptCommand(options_.place, script, std::move(arguments)));
+}
+
+// The acknowledgement goes with the next command: the thread takes its next unit now.
+void RedisQueue::Done(std::size_t unit) {
+  const std::lock_guard lock(mutex_);
+  const auto held = held_.extract(unit);
+  if (held.empty()) return;
+  const double seconds = std::chrono::duration<double>(Clock::now() - held.mapped().since).count();
+  Send(held.mapped(), scripts::kDone, {options_.units[unit], options_.worker, fmt::format("{:.3f}", seconds)});
+}
+
+void RedisQueue::Return(std::size_t unit) {
+  const std::lock_guard lock(mutex_);
+  const auto held = held_.extract(unit);
+  if (held.empty()) return;
+  Send(held.mapped(), scripts::kGiveBack,
+       {options_.units[unit], options_.worker, "", std::to_string(held.mapped().deliveries - 1), Millis(lease_)});
+}
+
+bool RedisQueue::Fail(std::size_t unit, const Error& why) {
+  const std::lock_guard lock(mutex_);
+  const auto held = held_.extract(unit);
+  if (held.empty()) return true;
+  const int deliveries = held.mapped().deliveries;
+  const std::string message = why.message.empty() ? "failed" : why.message;
+  if (deliveries >= kMaxAttempts) {
+    Send(held.mapped(), scripts::kBury, {options_.units[unit], options_.worker, message, std::to_string(deliveries)});
+    return false;
+  }
+  Send(held.mapped(), scripts::kGiveBack,
+       {options_.units[unit], options_.worker, message, std::to_string(deliveries),
+        Millis(lease_ - kPauseAfterFailure * deliveries)});
+  return true;
+}
+
+void RedisQueue::Beat() {
+  if (held_.empty() && !finish_ && outbox_.empty()) return;
+  std::vector<std::string> arguments = {incarnation_, options_.worker};
+  for (const auto& [unit, held] : held_) arguments.push_back(held.id);
+  if (finish_) arguments.push_back(finish_->id);
+  (void)Exchange(ScriptCommand(options_.place, scripts::kBeat, std::move(arguments)));
+}
+
+void RedisQueue::Flush() {
+  if (!outbox_.empty()) (void)Exchange({"PING"});
+}
+
+RedisQueue::End RedisQueue::end() const {
+  const std::lock_guard lock(mutex_);
+  return end_;
+}
+
+Error RedisQueue::Why() const {
+  const std::lock_guard lock(mutex_);
+  return why_;
+}
+
+Result<std::vector<DeadUnit>> RedisQueue::Dead() {
+  const std::lock_guard lock(mutex_);
+  Flush();
+  if (!connection_) {
+    if (auto connected = Connect(); !connected) return tl::unexpected(connected.error());
+  }
+  return ReadDead(*connection_, options_.place);
+}
+
+void RedisQueue::Finished() {
+  const std::lock_guard lock(mutex_);
+  if (finish_) Send(*finish_, scripts::kFinished, {});
+  finish_.reset();
+  end_ = End::kFinished;
+  Flush();
+}
+
+void RedisQueue::AddMissing(const std::vector<std::size_t>& units) {
+  const std::lock_guard lock(mutex_);
+  std::vector<std::string> arguments;
+  for (const std::size_t unit : units) arguments.push_back(options_.units[unit]);
+  if (finish_) Send(*finish_, scripts::kAddMissing, std::move(arguments));
+  finish_.reset();
+  end_ = End::kNone;
+}
+
+}  // namespace terrace::bake

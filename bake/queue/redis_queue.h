@@ -1,0 +1,113 @@
+// The queue of a job that many bakers share, in Redis. docs/baking.md describes it for users.
+//
+// A duplicate worker writes the same bytes, so a lease only saves work. Redis may be lost at any time: what is baked
+// lies in the place, and the queue is filled again with what is missing there.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <unordered_map>
+#include <vector>
+
+#include "bake/queue/job.h"
+#include "bake/queue/unit_queue.h"
+
+namespace terrace::bake {
+
+struct RedisQueueOptions {
+  JobPlace place;
+  JobIdentity identity;
+  std::string worker;              // the name of this process among the workers of the job
+  std::vector<std::string> units;  // the names of the units of the plan, by index
+  // The indexes of the units that have no file with the right key. Called whenever the queue is filled.
+  std::function<std::vector<std::size_t>()> find_missing;
+  // Another worker inherits a unit whose worker was not heard of for so long. Counts when the queue is filled.
+  std::chrono::milliseconds lease{30'000};
+  std::chrono::milliseconds patience{600'000};  // how long a Redis that is away is waited for
+  // Told when Redis is away, and when it is back. May be empty. Called by any thread.
+  std::function<void(const std::string&)> on_message = {};
+};
+
+class RedisQueue : public UnitQueue {
+ public:
+  // Joins the job, or begins it: whoever comes first fills the queue. A job that ended with units that were given up
+  // tries them again. kInvalidArgument: the job bakes something else; the message says what differs. Errors of
+  // ConnectToJob.
+  static Result<std::unique_ptr<RedisQueue>> Join(RedisQueueOptions options);
+  // Gives back what was not done.
+  ~RedisQueue() override;
+
+  Taken Take() override;
+  void Done(std::size_t unit) override;
+  void Return(std::size_t unit) override;
+  bool Fail(std::size_t unit, const Error& why) override;
+
+  // Why Take said that it is over.
+  enum class End {
+    kNone,        // it did not
+    kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
+    kFinished,    // another worker has done that
+    kIncomplete,  // units were given up: Dead
+    kLost,        // Redis is away for too long, or the job is another one now: Why
+  };
+  End end() const;
+  Error Why() const;
+  // The units that were given up.
+  Result<std::vector<DeadUnit>> Dead();
+  // Of kFinish. The manifest is written.
+  void Finished();
+  // Units that are not there although they were done: the job goes on with them.
+  void AddMissing(const std::vector<std::size_t>& units);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Held {
+    std::string incarnation, id;
+    int deliveries = 1;
+    Clock::time_point since;
+  };
+
+  explicit RedisQueue(RedisQueueOptions options);
+  // All below: the mutex is held.
+  Result<void> Enter(bool is_emptied);
+  Result<void> CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const;
+  Result<bool> Fill(const std::string& incarnation);
+  Result<void> Revive();
+  Result<void> Connect();
+  // Sends what waits, and `command` after it. Notes when Redis is away.
+  Result<redis::Reply> Exchange(const redis::Command& command);
+  void NoteAway(const Error& why);
+  void NoteBack();
+  std::optional<Taken> TakeOnce();
+  std::optional<Taken> Accept(const redis::ReplyView& reply);
+  // Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
+  void Send(const Held& held, const char* script, std::vector<std::string> arguments);
+  void Beat();
+  void Flush();
+
+  const RedisQueueOptions options_;
+  std::unordered_map<std::string, std::size_t> index_;  // of units_
+
+  mutable std::mutex mutex_;
+  std::unique_ptr<redis::Connection> connection_;
+  std::string incarnation_;
+  std::chrono::milliseconds lease_;
+  std::map<std::size_t, Held> held_;
+  std::optional<Held> finish_;
+  std::deque<redis::Command> outbox_;  // to be sent before the next command
+  End end_ = End::kNone;
+  Error why_;
+  std::optional<Clock::time_point> away_since_;
+  Clock::time_point next_take_{}, next_connect_{};
+  std::jthread beat_;
+};
+
+}  // namespace terrace::bake

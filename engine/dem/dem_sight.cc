@@ -1,0 +1,66 @@
+// Lines of sight over a dataset: a ray is measured over the raster grids in order of precedence, over each where those
+// before it have no height.
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "engine/dem/dem_impl.h"
+#include "engine/dem/sight/grid_sight.h"
+
+namespace terrace::dem {
+namespace {
+
+// Rays between two checks of the stop token.
+constexpr std::size_t kStopPeriod = 64;
+
+// A box in degrees around the pieces of a ray.
+Box BoxAround(const std::vector<TrackPiece>& pieces) {
+  Box box{360, 90, -360, -90};
+  for (const TrackPiece& piece : pieces) {
+    const Quadratic::Range x = piece.longitude.Over(0, 1), y = piece.latitude.Over(0, 1);
+    box = {std::min(box.west, x.min), std::min(box.south, y.min), std::max(box.east, x.max),
+           std::max(box.north, y.max)};
+  }
+  return box;
+}
+
+}  // namespace
+
+Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> rays, const SightOptions& options,
+                                                      std::stop_token stop) const {
+  std::map<std::size_t, GridSight> sights;
+  const auto sight_of = [&](std::size_t grid) -> GridSight& {
+    return sights.try_emplace(grid, impl_->grids[grid]).first->second;
+  };
+  std::vector<SightAnswer> answers;
+  answers.reserve(rays.size());
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    if (i % kStopPeriod == 0 && stop.stop_requested()) {
+      return MakeError(ErrorCode::kCancelled, "looking along rays was stopped");
+    }
+    const std::vector<TrackPiece> pieces = PiecesOf(rays[i], options);
+    const std::vector<std::size_t> order =
+        impl_->grids.size() == 1 ? std::vector<std::size_t>{0} : impl_->GridsAt(BoxAround(pieces));
+    SightSearch search;
+    std::vector<RayPart> open = {{0, 1}};
+    const auto look = [&](std::size_t grid, SightSurface surface) -> Result<void> {
+      auto rest = sight_of(grid).Search(pieces, open, surface, search, stop);
+      if (!rest) return tl::unexpected(std::move(rest).error());
+      open = *std::move(rest);
+      return {};
+    };
+    if (order.size() == 1) {
+      if (const Result<void> done = look(order.front(), SightSurface::kAll); !done) return tl::unexpected(done.error());
+    } else {
+      for (const SightSurface surface : {SightSurface::kNotHoles, SightSurface::kAll}) {
+        for (auto grid = order.begin(); grid != order.end() && !open.empty(); ++grid) {
+          if (const Result<void> done = look(*grid, surface); !done) return tl::unexpected(done.error());
+        }
+      }
+    }
+    answers.push_back(search.Answer(!open.empty()));
+  }
+  return answers;
+}
+
+}  // namespace terrace::dem

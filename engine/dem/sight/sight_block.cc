@@ -1,0 +1,134 @@
+#include "engine/dem/sight/sight_block.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace terrace::dem {
+namespace {
+
+// Metres between positions at which undulations are read.
+constexpr double kUndulationStep = 240;
+
+}  // namespace
+
+SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
+    : window_(source.window), heights_(source.Samples()), owned_(source.Bridged()) {
+  for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
+  // A cell's samples are those of its corners; a raster of one column has cells without width.
+  const std::int64_t width = window().columns, height = window().rows;
+  Level level{(width + 1) / 2, (height + 1) / 2, {}};
+  level.cells.resize(static_cast<std::size_t>(level.columns * level.rows));
+  for (std::int64_t row = 0; row < level.rows; ++row) {
+    for (std::int64_t column = 0; column < level.columns; ++column) {
+      CellsBound& bound = level.cells[static_cast<std::size_t>(row * level.columns + column)];
+      for (std::int64_t y = 2 * row; y <= std::min(2 * row + 2, height - 1); ++y) {
+        for (std::int64_t x = 2 * column; x <= std::min(2 * column + 2, width - 1); ++x) {
+          const auto at = static_cast<std::size_t>(y * width + x);
+          bound.has_voids |= std::isnan(owned_[at]) || std::isnan(heights_[at]);
+          if (heights_[at] > bound.max) bound.max = heights_[at];
+        }
+      }
+    }
+  }
+  levels_.push_back(std::move(level));
+  while (levels_.back().columns > 1 || levels_.back().rows > 1) {
+    const Level& fine = levels_.back();
+    Level coarse{(fine.columns + 1) / 2, (fine.rows + 1) / 2, {}};
+    coarse.cells.resize(static_cast<std::size_t>(coarse.columns * coarse.rows));
+    for (std::int64_t row = 0; row < fine.rows; ++row) {
+      for (std::int64_t column = 0; column < fine.columns; ++column) {
+        coarse.cells[static_cast<std::size_t>(row / 2 * coarse.columns + column / 2)].Add(
+            fine.cells[static_cast<std::size_t>(row * fine.columns + column)]);
+      }
+    }
+    levels_.push_back(std::move(coarse));
+  }
+}
+
+CellsBound SightBlock::Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const {
+  west -= window().column, east -= window().column, north -= window().row, south -= window().row;
+  const std::int64_t size = std::max(east - west, south - north) + 1;
+  std::size_t level = 0;
+  while ((std::int64_t{2} << level) < size && level + 1 < levels_.size()) ++level;
+  const Level& of = levels_[level];
+  CellsBound bound;
+  const int shift = static_cast<int>(level) + 1;
+  for (std::int64_t row = north >> shift; row <= std::min(south >> shift, of.rows - 1); ++row) {
+    for (std::int64_t column = west >> shift; column <= std::min(east >> shift, of.columns - 1); ++column) {
+      bound.Add(of.cells[static_cast<std::size_t>(row * of.columns + column)]);
+    }
+  }
+  return bound;
+}
+
+SightBlocks::SightBlocks(const RasterGrid& grid) : grid_(grid), geoid_(grid.vertical().geoid) {
+  if (geoid_ == nullptr) return;
+  reader_ = std::make_unique<Geoid::Reader>(*geoid_);
+  is_fine_ = std::max(grid.spacing().east, grid.spacing().north) <= kUndulationStep;
+}
+
+// Linear between positions at most kUndulationStep apart.
+Result<std::vector<float>> SightBlocks::UndulationsOf(const GridWindow& window) const {
+  if (geoid_ == nullptr || !is_fine_) return std::vector<float>();
+  const double spacing_m = std::max(grid_.spacing().east, grid_.spacing().north);
+  const auto step = std::max<std::int64_t>(1, static_cast<std::int64_t>(kUndulationStep / spacing_m));
+  const std::int64_t columns = (window.columns + step - 2) / step + 1, rows = (window.rows + step - 2) / step + 1;
+  std::vector<Position> positions;
+  for (std::int64_t row = 0; row < rows; ++row) {
+    for (std::int64_t column = 0; column < columns; ++column) {
+      positions.push_back({static_cast<double>(window.column + column * step) + 0.5,
+                           static_cast<double>(window.row + row * step) + 0.5});
+    }
+  }
+  grid_.georeference().ToDegrees(positions);
+  std::vector<double> known;
+  known.reserve(positions.size());
+  if (const UndulationGrid* const grid = geoid_->grid()) {
+    std::vector<NodePlace> x, y;
+    for (const Position& degrees : positions) {
+      x.push_back(grid->AtColumn(grid->ColumnOf(degrees.x)));
+      y.push_back(grid->AtRow(grid->RowOf(degrees.y)));
+    }
+    const auto patch = UndulationPatch::Read(*grid, x, y);
+    if (!patch) return tl::unexpected(patch.error());
+    for (std::size_t i = 0; i < x.size(); ++i) known.push_back(patch->At(x[i], y[i]));
+  } else {
+    for (const Position& degrees : positions) known.push_back(reader_->At(degrees));
+  }
+  std::vector<float> undulations;
+  undulations.reserve(static_cast<std::size_t>(window.columns * window.rows));
+  const auto stride = static_cast<std::size_t>(columns);
+  for (std::int64_t row = 0; row < window.rows; ++row) {
+    for (std::int64_t column = 0; column < window.columns; ++column) {
+      const std::int64_t i = std::min(column / step, std::max<std::int64_t>(columns - 2, 0));
+      const std::int64_t j = std::min(row / step, std::max<std::int64_t>(rows - 2, 0));
+      const double x = static_cast<double>(column - i * step) / static_cast<double>(step);
+      const double y = static_cast<double>(row - j * step) / static_cast<double>(step);
+      const std::size_t at = static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i);
+      const std::size_t east = columns > 1 ? 1 : 0, south = rows > 1 ? stride : 0;
+      const double north = known[at] + x * (known[at + east] - known[at]);
+      const double below = known[at + south] + x * (known[at + south + east] - known[at + south]);
+      undulations.push_back(static_cast<float>(north + y * (below - north)));
+    }
+  }
+  return undulations;
+}
+
+Result<const SightBlock*> SightBlocks::At(std::int64_t column, std::int64_t row, const std::stop_token& stop) {
+  const std::int64_t block_column = (column + kPointBlockCells) / kPointBlockCells, block_row = row / kPointBlockCells;
+  const std::int64_t number = block_row << 32 | block_column;
+  if (number == last_) return last_block_;
+  auto& block = blocks_[number];
+  if (block == nullptr) {
+    Result<PointBlockPtr> read = grid_.FindPointBlock(block_column, block_row, stop);
+    if (!read) return tl::unexpected(std::move(read).error());
+    const Result<std::vector<float>> undulations = UndulationsOf((*read)->window);
+    if (!undulations) return tl::unexpected(undulations.error());
+    block = std::make_unique<const SightBlock>(**read, *undulations);
+  }
+  last_ = number;
+  return last_block_ = block.get();
+}
+
+}  // namespace terrace::dem

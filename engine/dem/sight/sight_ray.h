@@ -1,0 +1,46 @@
+// Lines of sight: plain values.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <optional>
+
+namespace terrace::dem {
+
+// A position above the ellipsoid.
+struct SightPoint {
+  double longitude = 0, latitude = 0;  // degrees
+  double height_m = 0;
+};
+
+// A straight line in space, or nearly straight where the air bends it.
+struct SightRay {
+  SightPoint from, to;
+};
+
+struct SightOptions {
+  // The share of the Earth's curvature that light in the air follows: 0 for straight lines, 0.13 for surveying.
+  double refraction = 0;
+};
+
+struct SightAnswer {
+  bool is_visible = true;  // no part of the ray is more than kSightTolerance below the surface
+  // The smallest vertical distance from the surface up to the ray, its ends included; negative if the ray passes below.
+  // NaN: there is no surface anywhere along the ray.
+  double clearance_m = std::numeric_limits<double>::quiet_NaN();
+  double clearance_at = 0;           // as a share of the ray's length
+  std::optional<double> blocked_at;  // the first place below the surface, as a share of the ray's length
+  bool has_gaps = false;             // parts of the ray are above places without a height
+};
+
+// Metres. A ray that touches the ground, as from a point that was read from the same surface, is not blocked.
+inline constexpr double kSightTolerance = 1e-3;
+// Longer rays are refused: points near the ground that are farther apart never see each other.
+inline constexpr double kMaxSightLength = 3e6;
+
+// Metres, along the chord.
+double LengthOf(const SightRay& ray);
+// The position at a share of the ray's length.
+SightPoint PointAt(const SightRay& ray, double share, const SightOptions& options);
+
+}  // namespace terrace::dem

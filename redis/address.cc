@@ -1,0 +1,102 @@
+#include "redis/address.h"
+
+#include <charconv>
+#include <optional>
+
+namespace terrace::redis {
+namespace {
+
+constexpr const char* kForm = "redis://[user[:password]@]HOST:PORT/DATABASE, or rediss:// for TLS";
+
+template <typename Number>
+std::optional<Number> NumberOf(std::string_view text, Number max) {
+  Number number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (text.empty() || error != std::errc() || end != text.data() + text.size() || number > max) return std::nullopt;
+  return number;
+}
+
+// Nothing: a percent sign without two hexadecimal digits.
+std::optional<std::string> Decoded(std::string_view text) {
+  std::string decoded;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '%') {
+      decoded += text[i];
+      continue;
+    }
+    unsigned code = 0;
+    const std::string_view digits = text.substr(i + 1, 2);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), code, 16);
+    if (digits.size() != 2 || error != std::errc() || end != digits.data() + 2) return std::nullopt;
+    decoded += static_cast<char>(code);
+    i += 2;
+  }
+  return decoded;
+}
+
+}  // namespace
+
+std::string Address::Text() const {
+  const bool is_ipv6 = host.find(':') != std::string::npos;
+  return fmt::format("{}://{}{}{}:{}/{}", is_tls ? "rediss" : "redis", is_ipv6 ? "[" : "", host, is_ipv6 ? "]" : "",
+                     port, database);
+}
+
+Result<Address> ParseAddress(std::string_view url) {
+  const auto wrong = [](std::string_view what) {
+    return MakeError(ErrorCode::kInvalidArgument, "the URL of Redis {}; it must be {}", what, kForm);
+  };
+  Address address;
+  if (url.starts_with("rediss://")) {
+    address.is_tls = true;
+    url.remove_prefix(9);
+  } else if (url.starts_with("redis://")) {
+    url.remove_prefix(8);
+  } else {
+    return wrong("does not begin with redis:// or rediss://");
+  }
+  // A password may contain "/" and "@" only as percent codes, but a stray "@" must not end in a message as a host.
+  const std::size_t slash = url.find('/', url.find('@') == std::string_view::npos ? 0 : url.rfind('@'));
+  const std::string_view path = slash == std::string_view::npos ? std::string_view() : url.substr(slash + 1);
+  std::string_view host = url.substr(0, slash);
+  if (const std::size_t at = host.rfind('@'); at != std::string_view::npos) {
+    const std::string_view who = host.substr(0, at);
+    host.remove_prefix(at + 1);
+    const std::size_t colon = who.find(':');
+    const auto user = Decoded(who.substr(0, colon));
+    const auto password = colon == std::string_view::npos ? std::string() : Decoded(who.substr(colon + 1));
+    if (!user || !password) return wrong("has a user or password with a percent sign that is no percent code");
+    address.user = *user;
+    address.password = *password;
+  }
+  std::string_view port;
+  bool has_port = false;
+  if (host.starts_with('[')) {
+    const std::size_t end = host.find(']');
+    const std::string_view rest = end == std::string_view::npos ? "x" : host.substr(end + 1);
+    if (!rest.empty() && rest[0] != ':') return wrong("has an IPv6 address that does not end with \"]\"");
+    has_port = !rest.empty();
+    port = has_port ? rest.substr(1) : rest;
+    host = host.substr(1, end - 1);
+  } else if (const std::size_t colon = host.find(':'); colon != std::string_view::npos) {
+    has_port = true;
+    port = host.substr(colon + 1);
+    host = host.substr(0, colon);
+  }
+  if (host.empty()) return wrong("has no host");
+  address.host = host;
+  if (has_port) {
+    const auto number = NumberOf<std::uint16_t>(port, 65535);
+    if (!number || *number == 0) return wrong("has a port that is no number from 1 to 65535");
+    address.port = *number;
+  }
+  if (!path.empty()) {
+    constexpr int kMaxDatabase = 1'000'000;
+    const auto number = NumberOf<int>(path, kMaxDatabase);
+    if (!number || *number < 0) return wrong("has a database that is no number");
+    address.database = *number;
+  }
+  return address;
+}
+
+}  // namespace terrace::redis

@@ -1,0 +1,189 @@
+#include "redis/connection.h"
+
+#include <hiredis/hiredis.h>
+
+#include <array>
+#include <cstdlib>
+#include <string_view>
+#include <utility>
+
+namespace terrace::redis {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// hiredis allocates an array of the size that the peer claims before any element is there.
+constexpr int kMaxElements = 1'000'000;
+
+void* CreateBoundedArray(const redisReadTask* task, int elements);
+
+// hiredis's functions with a bounded array.
+struct ReplyFunctions {
+  redisReplyObjectFunctions of_hiredis{}, bounded{};
+
+  ReplyFunctions() {
+    redisReader* const reader = ::redisReaderCreate();
+    if (reader != nullptr) of_hiredis = *reader->fn;
+    ::redisReaderFree(reader);
+    bounded = of_hiredis;
+    bounded.createArray = CreateBoundedArray;
+  }
+  static ReplyFunctions& Get() {
+    static ReplyFunctions functions;
+    return functions;
+  }
+};
+
+void* CreateBoundedArray(const redisReadTask* task, int elements) {
+  return elements > kMaxElements ? nullptr : ReplyFunctions::Get().of_hiredis.createArray(task, elements);
+}
+
+std::string Encoded(std::span<const Command> commands) {
+  std::string bytes;
+  for (const Command& command : commands) {
+    std::vector<const char*> data;
+    std::vector<std::size_t> sizes;
+    for (const std::string& part : command) {
+      data.push_back(part.data());
+      sizes.push_back(part.size());
+    }
+    char* text = nullptr;
+    const int size = ::redisFormatCommandArgv(&text, static_cast<int>(data.size()), data.data(), sizes.data());
+    if (size > 0) bytes.append(text, static_cast<std::size_t>(size));
+    std::free(text);
+  }
+  return bytes;
+}
+
+}  // namespace
+
+void Connection::FreeReader::operator()(redisReader* reader) const { ::redisReaderFree(reader); }
+
+Connection::Connection(Socket socket, const Address& address, const ConnectionOptions& options)
+    : socket_(std::move(socket)),
+      name_(address.Text()),
+      options_(options),
+      reader_(::redisReaderCreateWithFunctions(&ReplyFunctions::Get().bounded)) {}
+
+Connection::~Connection() = default;
+
+Result<std::unique_ptr<Connection>> Connection::Open(const Address& address, const ConnectionOptions& options) {
+  const Deadline deadline = Clock::now() + options.connect_timeout;
+  auto socket = Socket::Connect(address, options.ca_file, deadline);
+  if (!socket) return tl::unexpected(socket.error());
+  std::unique_ptr<Connection> connection(new Connection(*std::move(socket), address, options));
+  if (auto greeted = connection->Greet(address, deadline); !greeted) return tl::unexpected(greeted.error());
+  return connection;
+}
+
+Result<void> Connection::Greet(const Address& address, Deadline deadline) {
+  std::vector<Command> commands;
+  if (!address.user.empty()) {
+    commands.push_back({"AUTH", address.user, address.password});
+  } else if (!address.password.empty()) {
+    commands.push_back({"AUTH", address.password});
+  }
+  if (address.database != 0) commands.push_back({"SELECT", std::to_string(address.database)});
+  commands.push_back({"PING"});
+  const auto replies = CallAll(commands, deadline);
+  if (!replies) return tl::unexpected(replies.error());
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    if (!(*replies)[i].is_error()) continue;
+    Error error = Refusal(commands[i].front(), (*replies)[i]);
+    if (commands[i].front() != "PING") error.code = ErrorCode::kInvalidArgument;
+    return tl::unexpected(std::move(error));
+  }
+  if (replies->back().text() == "PONG") return {};
+  return MakeError(ErrorCode::kUnavailable, "Redis at {}: what answers there is no Redis; correct the URL", name_);
+}
+
+Result<std::vector<Reply>> Connection::CallAll(std::span<const Command> commands) {
+  return CallAll(commands, Clock::now() + options_.command_timeout);
+}
+
+Result<std::vector<Reply>> Connection::CallAll(std::span<const Command> commands, Deadline deadline) {
+  if (!is_open_ || !reader_) {
+    return MakeError(ErrorCode::kUnavailable, "Redis at {}: the connection is broken", name_);
+  }
+  is_open_ = false;  // unless every reply comes
+  if (auto written = socket_.Write(Encoded(commands), deadline); !written) return tl::unexpected(written.error());
+  std::vector<Reply> replies;
+  std::size_t bytes_left = options_.max_reply_bytes;
+  while (replies.size() < commands.size()) {
+    auto reply = ReadReply(deadline, bytes_left);
+    if (!reply) return tl::unexpected(reply.error());
+    replies.push_back(*std::move(reply));
+  }
+  is_open_ = true;
+  return replies;
+}
+
+Result<Reply> Connection::ReadReply(Deadline deadline, std::size_t& bytes_left) {
+  std::array<char, 16384> buffer;  // NOLINT: written before it is read
+  while (true) {
+    void* reply = nullptr;
+    if (::redisReaderGetReply(reader_.get(), &reply) != REDIS_OK) {
+      return MakeError(ErrorCode::kUnavailable, "Redis at {}: what answers there does not speak Redis's protocol ({})",
+                       name_, std::string_view(reader_->errstr));
+    }
+    if (reply != nullptr) return Reply(static_cast<redisReply*>(reply));
+    const auto size = socket_.Read(buffer, deadline);
+    if (!size) return tl::unexpected(size.error());
+    if (*size > bytes_left) {
+      return MakeError(ErrorCode::kUnavailable, "Redis at {}: a reply has more than {} bytes", name_,
+                       options_.max_reply_bytes);
+    }
+    bytes_left -= *size;
+    ::redisReaderFeed(reader_.get(), buffer.data(), *size);
+  }
+}
+
+Result<Reply> Connection::Call(const Command& command) {
+  auto replies = CallAll(std::span(&command, 1));
+  if (!replies) return tl::unexpected(replies.error());
+  if (replies->front().is_error()) return tl::unexpected(Refusal(command.front(), replies->front()));
+  return std::move(replies->front());
+}
+
+Error Connection::Refusal(const std::string& command, const ReplyView& error) const {
+  // The first word is the kind. The rest is text of the server, which may repeat arguments: only known kinds are
+  // explained, of others the first word is told.
+  const std::string_view text = error.text();
+  const std::string_view kind = text.substr(0, text.find(' '));
+  const auto starts = [&](std::string_view prefix) { return text.starts_with(prefix); };
+  const auto make = [&](ErrorCode code, std::string_view why) {
+    return Error{code, fmt::format("Redis at {}: {}", name_, why)};
+  };
+  if (kind == "WRONGPASS" || starts("ERR invalid password")) {
+    return make(ErrorCode::kInvalidArgument, "refuses the user or the password; correct them");
+  }
+  if (starts("ERR AUTH") || starts("ERR Client sent AUTH")) {
+    return make(ErrorCode::kInvalidArgument, "has no password, but one was given; leave it out");
+  }
+  if (kind == "NOAUTH") return make(ErrorCode::kInvalidArgument, "wants a password; give one");
+  if (kind == "NOPERM") {
+    return make(ErrorCode::kInvalidArgument, fmt::format("the user may not use {} there; extend its ACL", command));
+  }
+  if (command == "SELECT") return make(ErrorCode::kInvalidArgument, "has no such database; correct the URL");
+  if (kind == "OOM") {
+    return make(ErrorCode::kOverloaded,
+                "is full (maxmemory) and may not evict; raise maxmemory, or take another Redis");
+  }
+  if (kind == "READONLY") {
+    return make(ErrorCode::kUnavailable, "is a read-only replica; give the URL of the primary");
+  }
+  if (kind == "LOADING")
+    return make(ErrorCode::kUnavailable, "is reading its data after a start; it will be ready soon");
+  if (kind == "MISCONF") {
+    return make(ErrorCode::kUnavailable, "cannot save its data and refuses writes; look into its log");
+  }
+  if (starts("ERR unknown command")) {
+    return make(ErrorCode::kInvalidArgument, fmt::format("does not know {}; it is too old, or no Redis", command));
+  }
+  if (kind == "WRONGTYPE") {
+    return make(ErrorCode::kInvalidArgument, "the key belongs to something else; take another name or database");
+  }
+  return make(ErrorCode::kUnavailable, fmt::format("refuses {} ({})", command, kind));
+}
+
+}  // namespace terrace::redis

@@ -1,0 +1,72 @@
+// A connection to a Redis server: commands and checked replies, each with a deadline.
+//
+// hiredis writes the commands and parses the replies. The socket is our own: hiredis's time-outs count from the last
+// byte, so that a peer that sends a byte now and then would hold a caller for ever, and Debian's hiredis has no TLS.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "redis/address.h"
+#include "redis/reply.h"
+#include "redis/socket.h"
+
+struct redisReader;
+
+namespace terrace::redis {
+
+struct ConnectionOptions {
+  std::chrono::milliseconds connect_timeout{2000};  // including TLS and the password
+  std::chrono::milliseconds command_timeout{2000};  // of a Call or CallAll: from the first byte out to the last in
+  std::string ca_file = {};  // PEM; the certificates that may sign that of a rediss:// server; empty: the system's
+  std::size_t max_reply_bytes = std::size_t{64} << 20;  // of a Call or CallAll
+};
+
+// The name and the arguments; bytes, not text.
+using Command = std::vector<std::string>;
+
+// Used by one thread at a time. No message contains user, password or an argument of a command.
+class Connection {
+ public:
+  // Connects, authenticates, selects the database. kUnavailable: nobody answers there, or not as Redis does.
+  // kInvalidArgument: the password or the database is refused, or ca_file cannot be read.
+  static Result<std::unique_ptr<Connection>> Open(const Address& address, const ConnectionOptions& options);
+  Connection(const Connection&) = delete;
+  Connection& operator=(const Connection&) = delete;
+  ~Connection();
+
+  // One reply for each command, in one round trip; a command that Redis refuses has a reply of kind kError.
+  // kUnavailable: the connection broke, the deadline passed, or a reply was no reply of Redis. Whether the commands
+  // were carried out is unknown then, and every later call fails: open another connection.
+  Result<std::vector<Reply>> CallAll(std::span<const Command> commands);
+  // A reply that is no error. Errors: as CallAll, and Refusal of the error.
+  Result<Reply> Call(const Command& command);
+  // What to tell of an error reply to a command. kInvalidArgument: the password or the user's rights. kOverloaded:
+  // Redis is full. kUnavailable: it is loading, a read-only replica, or anything else.
+  Error Refusal(const std::string& command, const ReplyView& error) const;
+
+  bool is_open() const { return is_open_; }
+
+ private:
+  Connection(Socket socket, const Address& address, const ConnectionOptions& options);
+  Result<std::vector<Reply>> CallAll(std::span<const Command> commands, Deadline deadline);
+  Result<void> Greet(const Address& address, Deadline deadline);
+  Result<Reply> ReadReply(Deadline deadline, std::size_t& bytes_left);
+
+  struct FreeReader {
+    void operator()(redisReader* reader) const;
+  };
+
+  Socket socket_;
+  const std::string name_;
+  const ConnectionOptions options_;
+  std::unique_ptr<redisReader, FreeReader> reader_;
+  bool is_open_ = true;
+};
+
+}  // namespace terrace::redis

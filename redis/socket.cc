@@ -1,0 +1,204 @@
+#include "redis/socket.h"
+
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+#include <openssl/x509v3.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <climits>
+#include <system_error>
+#include <utility>
+
+namespace terrace::redis {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+std::string WhyOf(int error) { return std::generic_category().message(error); }
+
+// The oldest error of OpenSSL in this thread; empties its list.
+std::string TlsError() {
+  const unsigned long code = ::ERR_get_error();
+  ::ERR_clear_error();
+  const char* const reason = code == 0 ? nullptr : ::ERR_reason_error_string(code);
+  return reason == nullptr ? "the connection ended" : reason;
+}
+
+}  // namespace
+
+void Socket::FreeTls::operator()(ssl_ctx_st* context) const { ::SSL_CTX_free(context); }
+void Socket::FreeTls::operator()(ssl_st* tls) const { ::SSL_free(tls); }
+
+Socket::Socket(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+
+Socket::Socket(Socket&& other) noexcept
+    : fd_(std::exchange(other.fd_, -1)),
+      name_(std::move(other.name_)),
+      context_(std::move(other.context_)),
+      tls_(std::move(other.tls_)) {}
+
+Socket::~Socket() {
+  tls_ = nullptr;
+  if (fd_ >= 0) ::close(fd_);
+}
+
+tl::unexpected<Error> Socket::Failed(std::string_view why) const {
+  return MakeError(ErrorCode::kUnavailable, "Redis at {}: {}", name_, why);
+}
+
+Result<Socket> Socket::Connect(const Address& address, const std::string& ca_file, Deadline deadline) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const std::string name = address.Text();
+  const int unknown = ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
+  if (unknown != 0) {
+    return MakeError(ErrorCode::kUnavailable, "Redis at {}: the host is not known ({}); correct the URL", name,
+                     ::gai_strerror(unknown));
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
+  std::string why = "the host has no address";
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+    const int fd = ::socket(one->ai_family, one->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, one->ai_protocol);
+    if (fd < 0) {
+      why = WhyOf(errno);
+      continue;
+    }
+    Socket socket(fd, name);
+    const int on = 1;
+    ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    int error = ::connect(fd, one->ai_addr, one->ai_addrlen) == 0 ? 0 : errno;
+    if (error == EINPROGRESS) {
+      if (const auto waited = socket.WaitFor(POLLOUT, deadline); !waited) {
+        why = "does not answer";
+        continue;
+      }
+      socklen_t size = sizeof error;
+      ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size);
+    }
+    if (error != 0) {
+      why = WhyOf(error);
+      continue;
+    }
+    if (address.is_tls) {
+      if (auto started = socket.StartTls(address, ca_file, deadline); !started) return tl::unexpected(started.error());
+    }
+    return socket;
+  }
+  return MakeError(ErrorCode::kUnavailable, "Redis at {}: cannot be reached: {}; start it, or correct the URL", name,
+                   why);
+}
+
+Result<void> Socket::StartTls(const Address& address, const std::string& ca_file, Deadline deadline) {
+  ::ERR_clear_error();
+  context_.reset(::SSL_CTX_new(::TLS_client_method()));
+  if (!context_) return Failed(TlsError());
+  ::SSL_CTX_set_min_proto_version(context_.get(), TLS1_2_VERSION);
+  ::SSL_CTX_set_verify(context_.get(), SSL_VERIFY_PEER, nullptr);
+  const bool loaded = ca_file.empty() ? ::SSL_CTX_set_default_verify_paths(context_.get()) == 1
+                                      : ::SSL_CTX_load_verify_file(context_.get(), ca_file.c_str()) == 1;
+  if (!loaded) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: cannot be used as certificates for Redis ({}); it must be PEM",
+                     ca_file, TlsError());
+  }
+  tls_.reset(::SSL_new(context_.get()));
+  if (!tls_) return Failed(TlsError());
+  // A certificate names hosts or addresses; only names are sent in the greeting.
+  if (::X509_VERIFY_PARAM_set1_ip_asc(::SSL_get0_param(tls_.get()), address.host.c_str()) != 1) {
+    ::SSL_set1_host(tls_.get(), address.host.c_str());
+    ::SSL_set_tlsext_host_name(tls_.get(), address.host.c_str());
+  }
+  ::SSL_set_mode(tls_.get(), SSL_MODE_ENABLE_PARTIAL_WRITE | SSL_MODE_ACCEPT_MOVING_WRITE_BUFFER);
+  if (::SSL_set_fd(tls_.get(), fd_) != 1) return Failed(TlsError());
+  while (true) {
+    ::ERR_clear_error();
+    const int result = ::SSL_connect(tls_.get());
+    if (result == 1) return {};
+    const long verified = ::SSL_get_verify_result(tls_.get());
+    if (verified != X509_V_OK) {
+      return Failed(fmt::format("its certificate is not trusted: {}; name the certificate of its authority",
+                                ::X509_verify_cert_error_string(verified)));
+    }
+    if (auto waited = WaitForTls(result, deadline); !waited) {
+      return Failed(fmt::format("TLS could not be agreed on ({}); is it a TLS port?", waited.error().message));
+    }
+  }
+}
+
+Result<void> Socket::WaitFor(short events, Deadline deadline) const {
+  while (true) {
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    if (left <= 0) return Failed("did not reply in time; it is overloaded, stopped, or the network is slow");
+    pollfd wait{fd_, events, 0};
+    const int ready = ::poll(&wait, 1, static_cast<int>(std::min<long long>(left, INT_MAX)));
+    if (ready > 0) return {};
+    if (ready < 0 && errno != EINTR) return Failed(WhyOf(errno));
+  }
+}
+
+Result<void> Socket::WaitForTls(int result, Deadline deadline) const {
+  switch (::SSL_get_error(tls_.get(), result)) {
+    case SSL_ERROR_WANT_READ:
+      return WaitFor(POLLIN, deadline);
+    case SSL_ERROR_WANT_WRITE:
+      return WaitFor(POLLOUT, deadline);
+    case SSL_ERROR_ZERO_RETURN:
+      return Failed("closed the connection");
+    default:
+      return Failed(TlsError());
+  }
+}
+
+Result<void> Socket::Write(std::string_view bytes, Deadline deadline) {
+  while (!bytes.empty()) {
+    if (tls_) {
+      ::ERR_clear_error();
+      const int written =
+          ::SSL_write(tls_.get(), bytes.data(), static_cast<int>(std::min<std::size_t>(bytes.size(), INT_MAX)));
+      if (written > 0) {
+        bytes.remove_prefix(static_cast<std::size_t>(written));
+      } else if (auto waited = WaitForTls(written, deadline); !waited) {
+        return waited;
+      }
+      continue;
+    }
+    const ssize_t written = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+    if (written >= 0) {
+      bytes.remove_prefix(static_cast<std::size_t>(written));
+    } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
+      if (auto waited = WaitFor(POLLOUT, deadline); !waited) return waited;
+    } else if (errno != EINTR) {
+      return Failed(WhyOf(errno));
+    }
+  }
+  return {};
+}
+
+Result<std::size_t> Socket::Read(std::span<char> into, Deadline deadline) {
+  while (true) {
+    if (tls_) {
+      ::ERR_clear_error();
+      const int size = ::SSL_read(tls_.get(), into.data(), static_cast<int>(into.size()));
+      if (size > 0) return static_cast<std::size_t>(size);
+      if (auto waited = WaitForTls(size, deadline); !waited) return tl::unexpected(waited.error());
+      continue;
+    }
+    const ssize_t size = ::recv(fd_, into.data(), into.size(), 0);
+    if (size > 0) return static_cast<std::size_t>(size);
+    if (size == 0) return Failed("closed the connection");
+    if (errno == EAGAIN || errno == EWOULDBLOCK) {
+      if (auto waited = WaitFor(POLLIN, deadline); !waited) return tl::unexpected(waited.error());
+    } else if (errno != EINTR) {
+      return Failed(WhyOf(errno));
+    }
+  }
+}
+
+}  // namespace terrace::redis

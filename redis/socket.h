@@ -1,0 +1,56 @@
+// A TCP connection, with TLS or without, of which every operation has a deadline.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "redis/address.h"
+
+struct ssl_ctx_st;
+struct ssl_st;
+
+namespace terrace::redis {
+
+using Deadline = std::chrono::steady_clock::time_point;
+
+// Used by one thread at a time. With TLS the program must ignore SIGPIPE.
+class Socket {
+ public:
+  // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The host's name is looked
+  // up outside of the deadline, with the time-outs of the system's resolver. kUnavailable: nobody listens, the deadline
+  // passed, or the certificate does not fit; kInvalidArgument: the file.
+  static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline);
+  Socket(Socket&& other) noexcept;
+  Socket& operator=(Socket&&) = delete;
+  ~Socket();
+
+  // kUnavailable: the connection ended, or the deadline passed. The socket is of no use then.
+  Result<void> Write(std::string_view bytes, Deadline deadline);
+  // At least one byte.
+  Result<std::size_t> Read(std::span<char> into, Deadline deadline);
+
+ private:
+  Socket(int fd, std::string name);
+  Result<void> StartTls(const Address& address, const std::string& ca_file, Deadline deadline);
+  Result<void> WaitFor(short events, Deadline deadline) const;
+  // After an operation of TLS that returned `result`: waits until it can be repeated.
+  Result<void> WaitForTls(int result, Deadline deadline) const;
+  tl::unexpected<Error> Failed(std::string_view why) const;
+
+  struct FreeTls {
+    void operator()(ssl_ctx_st* context) const;
+    void operator()(ssl_st* tls) const;
+  };
+
+  int fd_ = -1;
+  std::string name_;  // the address for messages
+  std::unique_ptr<ssl_ctx_st, FreeTls> context_;
+  std::unique_ptr<ssl_st, FreeTls> tls_;
+};
+
+}  // namespace terrace::redis

@@ -1,0 +1,192 @@
+#include "server/cli/bake/bake_queue.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <iterator>
+#include <memory>
+#include <random>
+#include <utility>
+
+#include "archive/files/input_file.h"
+#include "bake/find_missing.h"
+#include "bake/queue/redis_queue.h"
+#include "server/cli/bake/bake_display.h"
+#include "server/cli/common/command.h"
+#include "tiler/encoder_version.h"
+
+namespace terrace::cli {
+namespace {
+
+constexpr const char* kPasswordVariable = "TERRACE_QUEUE_PASSWORD";
+
+int Fail(const Error& error) {
+  return cli::Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
+}
+
+Result<std::string> PasswordOf(const BakeArguments& arguments) {
+  if (arguments.queue_password_file.empty()) {
+    const char* const password = std::getenv(kPasswordVariable);
+    return std::string(password == nullptr ? "" : password);
+  }
+  constexpr std::uint64_t kMaxBytes = 4096;
+  auto text = archive::ReadFile(arguments.queue_password_file, kMaxBytes);
+  if (!text) {
+    return MakeError(ErrorCode::kInvalidArgument, "--queue-password-file: {}", text.error().message);
+  }
+  while (text->ends_with('\n') || text->ends_with('\r')) text->pop_back();
+  if (text->empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "--queue-password-file {}: is empty; it must hold the password",
+                     arguments.queue_password_file);
+  }
+  return text;
+}
+
+// "terrain+glb/7-12-34": units of other formats have the same names.
+std::string NameInQueue(const bake::UnitPlan::Of& of, const std::vector<bake::Target>& targets) {
+  std::string name;
+  for (const std::size_t target : of.targets) {
+    name += (name.empty() ? "" : "+") + archive::FolderOf(targets[target].manifest.kind.format);
+  }
+  return name + "/" + of.unit.name;
+}
+
+void PrintMessage(const std::string& message) { std::fprintf(stderr, "terrace: %s\n", message.c_str()); }
+
+Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
+  auto place = JobPlaceOf(bake.arguments);
+  if (!place) return tl::unexpected(place.error());
+  const auto place_id = bake::PlaceId(bake.place);
+  if (!place_id) return tl::unexpected(place_id.error());
+  const tiler::Dataset& dataset = bake.pipeline.datasets().front();
+  const archive::Manifest& manifest = bake.targets.front().manifest;
+  bake::RedisQueueOptions options;
+  options.place = *std::move(place);
+  for (const auto& [what, value] : bake.identity.fields) options.identity.emplace_back(what, value);
+  options.identity.emplace_back("program", manifest.product);
+  options.identity.emplace_back("encoders and libraries", manifest.encoder);
+  options.identity.emplace_back("sources (version)", tiler::VersionText(dataset.generation));
+  options.identity.emplace_back("place (bake-place.id)", *place_id);
+  options.worker = bake.worker;
+  for (const bake::UnitPlan::Of& of : bake.plan.units) options.units.push_back(NameInQueue(of, bake.targets));
+  options.find_missing = [&bake, &dataset] { return bake::FindMissing(dataset, bake.targets, bake.plan); };
+  options.lease = std::chrono::milliseconds(static_cast<std::int64_t>(bake.arguments.lease * 1000));
+  options.on_message = PrintMessage;
+  return bake::RedisQueue::Join(std::move(options));
+}
+
+// Checks all files, as --finish does. Returns an exit code, or nothing: the job goes on.
+std::optional<int> FinishJob(const QueuedBake& bake, bake::RedisQueue& queue) {
+  bake::BakeOptions options = bake.options;
+  options.only_verify = true;
+  options.on_unit = {};
+  bake::Counters counters;
+  const std::vector<bake::UnitReport> all = bake::Bake(bake.pipeline, bake.targets, bake.plan, options, counters);
+  if (bake.options.stop.stop_requested()) return kExitFailure;
+  std::vector<std::size_t> missing;
+  for (std::size_t i = 0; i < bake.plan.units.size(); ++i) {
+    const bake::UnitPlan::Of& of = bake.plan.units[i];
+    const bool is_there = std::ranges::all_of(of.targets, [&](std::size_t target) {
+      return std::ranges::any_of(all, [&](const bake::UnitReport& report) {
+        return report.target == target && report.entry.name == of.unit.name &&
+               report.outcome == bake::UnitOutcome::kKept;
+      });
+    });
+    if (!is_there) missing.push_back(i);
+  }
+  if (!missing.empty()) {
+    PrintMessage(
+        fmt::format("{} units were done but are not there, or are damaged; they are baked again", missing.size()));
+    queue.AddMissing(missing);
+    return std::nullopt;
+  }
+  if (const auto finished = bake.finish(all); !finished) return Fail(finished.error());
+  queue.Finished();
+  return kExitOk;
+}
+
+int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
+  const auto dead = queue.Dead();
+  if (!dead) return Fail(dead.error());
+  for (const bake::DeadUnit& unit : *dead) {
+    PrintMessage(fmt::format("unit {} failed: {} (handed out {} times, last to {})", unit.unit, unit.why,
+                             unit.deliveries, unit.worker));
+  }
+  PrintMessage(
+      fmt::format("job {} is incomplete: {} of {} units failed, the others are done, and there is no manifest; "
+                  "run the same command again to go on",
+                  bake.arguments.job, dead->size(), bake.plan.units.size()));
+  return kExitFailure;
+}
+
+}  // namespace
+
+Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments) {
+  bake::JobPlace place;
+  if (auto checked = bake::CheckJobName(arguments.job); !checked) return tl::unexpected(checked.error());
+  auto address = redis::ParseAddress(arguments.queue);
+  if (!address) return MakeError(ErrorCode::kInvalidArgument, "--queue: {}", address.error().message);
+  auto password = PasswordOf(arguments);
+  if (!password) return tl::unexpected(password.error());
+  place.address = *std::move(address);
+  if (!password->empty()) place.address.password = *std::move(password);
+  place.ca_file = arguments.queue_ca;
+  place.name = arguments.job;
+  return place;
+}
+
+std::string WorkerName() {
+  std::array<char, 256> host{};
+  if (::gethostname(host.data(), host.size() - 1) != 0) host = {'h', 'o', 's', 't'};
+  std::string name = host.data();
+  std::ranges::replace_if(
+      name, [](char c) { return c == '/' || c == ' '; }, '_');
+  return fmt::format("{}-{}-{:04x}", name, ::getpid(), std::random_device()() & 0xffffU);
+}
+
+bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets) {
+  std::vector<archive::Manifest> manifests;
+  std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
+  if (!bake::LeaveFinished(place, manifests)) return false;
+  PrintMessage(fmt::format("{}: is complete already; --finish instead of --queue checks every file", place));
+  return true;
+}
+
+int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<bake::UnitReport>& reports) {
+  const auto queue = Join(bake);
+  if (!queue) {
+    if (IsFinished(bake.place, bake.targets)) return kExitOk;
+    bake::LeaveEmpty(bake.place, bake::LockOfWorker(bake.worker, bake.arguments.job));
+    return Fail(queue.error());
+  }
+  while (true) {
+    std::vector<bake::UnitReport> taken;
+    {
+      const BakeDisplay display(bake.pipeline.datasets().front().name, bake.plan.tiles, bake.plan.files, counters);
+      taken = bake::Bake(bake.pipeline, bake.targets, bake.plan, **queue, bake.options, counters);
+    }
+    std::ranges::move(taken, std::back_inserter(reports));
+    if (bake.options.stop.stop_requested()) {
+      PrintMessage("stopped: other workers have its units now; run the same command again to go on");
+      return kExitFailure;
+    }
+    switch ((*queue)->end()) {
+      case bake::RedisQueue::End::kFinish:
+        if (const auto code = FinishJob(bake, **queue)) return *code;
+        break;
+      case bake::RedisQueue::End::kFinished:
+        return kExitOk;
+      case bake::RedisQueue::End::kIncomplete:
+        return ListDead(bake, **queue);
+      default:
+        return Fail((*queue)->Why());
+    }
+  }
+}
+
+}  // namespace terrace::cli

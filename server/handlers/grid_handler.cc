@@ -1,0 +1,189 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "server/api/caching.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
+#include "server/http/http_error.h"
+#include "server/query/grid_query.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::server {
+namespace {
+
+// Nodes that are read at once.
+constexpr std::int64_t kBatch = 65536;
+constexpr int kLargest = 65535;  // of 16 bits
+
+struct MadeGrid {
+  std::string bytes;  // in the reply's coding
+  std::string description;
+  tiler::StageTimes times;
+};
+
+// How integers of 16 bits mean heights: offset + scale * integer.
+struct Steps {
+  double offset = 0, scale = 0;
+  std::size_t voids = 0;
+
+  static Steps Of(const std::vector<float>& heights, const std::optional<dem::HeightRange>& range) {
+    double min = std::numeric_limits<double>::infinity(), max = -min;
+    Steps steps;
+    for (const float height : heights) {
+      if (std::isnan(height)) ++steps.voids;
+      if (height < min) min = height;
+      if (height > max) max = height;
+    }
+    if (range) min = range->min, max = range->max;
+    if (min > max) return steps;
+    steps.offset = min;
+    steps.scale = (max - min) / kLargest;
+    return steps;
+  }
+  // Voids are the lowest height, and heights outside the range its ends.
+  std::uint16_t Of(float height) const {
+    if (std::isnan(height) || scale == 0) return 0;
+    return static_cast<std::uint16_t>(std::clamp(std::floor((height - offset) / scale + 0.5), 0.0, double{kLargest}));
+  }
+};
+
+Result<std::vector<float>> ReadNodes(const tiler::TilePipeline& pipeline, std::uint32_t dataset, const GridQuery& query,
+                                     const dem::OutputGrid& grid, const std::stop_token& stop) {
+  std::vector<float> heights;
+  heights.reserve(dem::Area(grid.columns, grid.rows));
+  const std::int64_t strip = std::max<std::int64_t>(1, kBatch / grid.columns);
+  for (std::int64_t row = 0; row < grid.rows; row += strip) {
+    const auto points = dem::PositionsOf(grid, row, std::min(strip, grid.rows - row), stop);
+    if (!points) return tl::unexpected(points.error());
+    const Result<tiler::PointHeights> read =
+        query.drawn ? pipeline.ReadDrawnPoints(dataset, *query.drawn, *points, /*normals=*/false, stop)
+                    : pipeline.ReadPoints(dataset, *points, query.datum, stop);
+    if (!read) return tl::unexpected(read.error());
+    heights.insert(heights.end(), read->heights.begin(), read->heights.end());
+  }
+  return heights;
+}
+
+// The Terrain-Grid header.
+std::string Describe(const dem::OutputGrid& grid, const Steps& steps) {
+  return fmt::format(
+      "width={}, height={}, crs=\"EPSG:{}\", west={}, south={}, east={}, north={}, offset={}, scale={}, voids={}",
+      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, grid.east, grid.north, steps.offset, steps.scale,
+      steps.voids);
+}
+
+// Unreal Engine's landscapes: an integer is 1/128 cm at a scale of 1, and 32768 is height 0.
+std::string GridJson(const dem::OutputGrid& grid, const Steps& steps) {
+  constexpr double kUnrealSteps = 100 * 128;
+  return fmt::format(
+      "{{\"width\":{},\"height\":{},\"crs\":\"EPSG:{}\",\"bbox\":[{},{},{},{}],\"spacing\":[{},{}],\"offset\":{},"
+      "\"scale\":{},\"voids\":{},\"unreal\":{{\"scale_z\":{},\"zero_m\":{}}}}}",
+      grid.columns, grid.rows, grid.epsg, grid.west, grid.south, grid.east, grid.north, grid.step_x(), grid.step_y(),
+      steps.offset, steps.scale, steps.voids, steps.scale * kUnrealSteps, steps.offset + 32768 * steps.scale);
+}
+
+Result<std::string> Encode(const GridQuery& query, const dem::OutputGrid& grid, const std::vector<float>& heights,
+                           const Steps& steps) {
+  if (query.format == GridFormat::kJson) return GridJson(grid, steps);
+  if (query.format == GridFormat::kGeoTiff) return dem::WriteGeoTiff(grid, heights);
+  if (query.format == GridFormat::kF32) {
+    return std::string(reinterpret_cast<const char*>(heights.data()), heights.size() * sizeof(float));
+  }
+  std::vector<std::uint16_t> values;
+  values.reserve(heights.size());
+  for (const float height : heights) values.push_back(steps.Of(height));
+  if (query.format == GridFormat::kPng16) return dem::WritePng16(grid, values);
+  return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(std::uint16_t));
+}
+
+std::string_view ContentTypeOf(GridFormat format) {
+  switch (format) {
+    case GridFormat::kGeoTiff:
+      return "image/tiff; application=geotiff";
+    case GridFormat::kPng16:
+      return "image/png";
+    case GridFormat::kJson:
+      return "application/json";
+    case GridFormat::kF32:
+    case GridFormat::kR16:
+      break;
+  }
+  return "application/octet-stream";
+}
+
+asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& context, std::uint32_t dataset,
+                                   std::shared_ptr<const GridQuery> query, tiler::Coding coding, Response response) {
+  const DatasetView& view = from.catalog->datasets[dataset];
+  Work<MadeGrid> work = [catalog = from.catalog, dataset, query, coding, most = from.max_mesh_samples,
+                         asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
+    MadeGrid made;
+    made.times.queue = tiler::MicrosecondsSince(asked);
+    auto begun = TileService::Clock::now();
+    const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
+    if (!grid) return tl::unexpected(grid.error());
+    const Result<std::vector<float>> heights = ReadNodes(*catalog->pipeline, dataset, *query, *grid, stop);
+    if (!heights) return tl::unexpected(heights.error());
+    made.times.read = tiler::MicrosecondsSince(begun);
+    begun = TileService::Clock::now();
+    const Steps steps = Steps::Of(*heights, query->range);
+    Result<std::string> bytes = Encode(*query, *grid, *heights, steps);
+    if (!bytes) return tl::unexpected(std::move(bytes).error());
+    made.times.encode = tiler::MicrosecondsSince(begun);
+    made.bytes = tiler::Compress(*std::move(bytes), coding, stop);
+    made.description = Describe(*grid, steps);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");
+    return made;
+  };
+  const auto deadline = from.Deadline();
+  Result<MadeGrid> made =
+      co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
+  if (is_absent || (!made && made.error().code == ErrorCode::kInvalidArgument)) {
+    co_return ClientErrorResponse(made.error(), context.request->id);
+  }
+  if (!made) co_return co_await BackendFailure(made.error(), context.request->id);
+  response.headers.emplace_back("Terrain-Grid", std::move(made->description));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
+  response.body = std::make_shared<const std::string>(std::move(made->bytes));
+  co_return response;
+}
+
+}  // namespace
+
+Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
+  const Request& request = *context.request;
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  Result<GridQuery> query = ParseGrid(context.route.query);
+  if (!query) return ClientErrorResponse(query.error(), request.id);
+  const DatasetView& view = from.catalog->datasets[*dataset];
+  if (query->datum == dem::HeightDatum::kOrthometric && !view.has_datum) {
+    const Error unknown{
+        ErrorCode::kInvalidArgument,
+        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
+    return ClientErrorResponse(unknown, request.id);
+  }
+  const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
+  const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
+  Response response;
+  response.content_type = ContentTypeOf(query->format);
+  response.content_encoding = tiler::NameOf(coding);
+  if (!is_image) response.vary = "Accept-Encoding";
+  // The version does not say which grid makes orthometric heights of ellipsoidal ones.
+  const bool is_versioned = query->datum == dem::HeightDatum::kEllipsoid;
+  response.cache_control =
+      is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;
+  response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
+  if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
+  auto shared = std::make_shared<const GridQuery>(*std::move(query));
+  return MakeGrid(from, context, *dataset, std::move(shared), coding, std::move(response));
+}
+
+}  // namespace terrace::server

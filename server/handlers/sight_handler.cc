@@ -1,0 +1,203 @@
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "server/api/caching.h"
+#include "server/api/tile_formats.h"
+#include "server/handlers/handlers.h"
+#include "server/http/http_error.h"
+#include "server/query/sight_query.h"
+#include "tiler/strong_etag.h"
+
+namespace terrace::server {
+namespace {
+
+// From this number of rays on, looking along them is long work, which never occupies all workers.
+constexpr std::size_t kFewRays = 16;
+// A query of at most this many bytes has one ray and is parsed in microseconds.
+constexpr std::size_t kQuickRays = 512;
+// Rays written between two checks of the stop token.
+constexpr std::size_t kRayStopPeriod = 1024;
+
+struct MadeSight {
+  std::string bytes;  // in the reply's coding
+  tiler::StageTimes times;
+};
+
+// Replaces heights above the surface by heights above the ellipsoid.
+Result<void> RaiseFromGround(const tiler::TilePipeline& pipeline, std::uint32_t dataset, SightQuery& query,
+                             const std::stop_token& stop) {
+  std::vector<dem::GeoPosition> ends;
+  for (const dem::SightRay& ray : query.rays) {
+    ends.push_back({ray.from.longitude, ray.from.latitude});
+    ends.push_back({ray.to.longitude, ray.to.latitude});
+  }
+  const Result<tiler::PointHeights> ground =
+      query.drawn ? pipeline.ReadDrawnPoints(dataset, *query.drawn, ends, /*normals=*/false, stop)
+                  : pipeline.ReadPoints(dataset, ends, dem::HeightDatum::kEllipsoid, stop);
+  if (!ground) return tl::unexpected(ground.error());
+  for (std::size_t i = 0; i < ends.size(); ++i) {
+    const float height_m = ground->heights[i];
+    if (std::isnan(height_m)) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "heights=ground: ray {}: the dataset has no height where it {}; use heights=ellipsoid",
+                       i / 2 + 1, i % 2 == 0 ? "begins" : "ends");
+    }
+    (i % 2 == 0 ? query.rays[i / 2].from : query.rays[i / 2].to).height_m += height_m;
+  }
+  return {};
+}
+
+std::string SightBytes(const SightQuery& query, const std::vector<dem::SightAnswer>& answers) {
+  std::string bytes;
+  bytes.reserve(answers.size() * 2 * sizeof(float));
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const dem::SightAnswer& answer = answers[i];
+    const double blocked_m = answer.blocked_at ? *answer.blocked_at * dem::LengthOf(query.rays[i])
+                                               : std::numeric_limits<double>::quiet_NaN();
+    for (const double number : {answer.clearance_m, blocked_m}) {
+      const auto value = static_cast<float>(number);
+      bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+  }
+  return bytes;
+}
+
+// {"lat","lng","height","distance"} of a place on a ray.
+void AppendPlace(std::string& json, const char* name, const dem::SightRay& ray, double share, double length_m,
+                 const dem::SightOptions& options) {
+  const dem::SightPoint place = dem::PointAt(ray, share, options);
+  fmt::format_to(std::back_inserter(json),
+                 ",\"{}\":{{\"lat\":{:.9f},\"lng\":{:.9f},\"height\":{:.3f},\"distance\":{:.3f}}}", name,
+                 place.latitude, place.longitude, place.height_m, share * length_m);
+}
+
+// What a client should be told beside the numbers; empty: nothing.
+const char* RemarkOn(const dem::SightAnswer& answer, double length_m) {
+  if (std::isnan(answer.clearance_m)) return "the dataset has no height along the ray";
+  if (answer.blocked_at && *answer.blocked_at <= 0) return "the ray begins below the surface";
+  if (length_m == 0) return "the ray has no length";
+  if (answer.has_gaps) return "the dataset has no height under parts of the ray";
+  return "";
+}
+
+std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswer>& answers,
+                      const std::stop_token& stop) {
+  std::string json = "{\"results\":[";
+  const auto out = std::back_inserter(json);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    if (i % kRayStopPeriod == 0 && stop.stop_requested()) return {};
+    const dem::SightAnswer& answer = answers[i];
+    const double length_m = dem::LengthOf(query.rays[i]);
+    if (i > 0) json += ',';
+    const bool is_known = !std::isnan(answer.clearance_m);
+    fmt::format_to(out, "{{\"visible\":{},\"length\":{:.3f},\"clearance\":", answer.is_visible, length_m);
+    if (is_known) {
+      fmt::format_to(out, "{:.3f}", answer.clearance_m);
+      AppendPlace(json, "lowest", query.rays[i], answer.clearance_at, length_m, query.options);
+    } else {
+      json += "null";
+    }
+    if (answer.blocked_at) AppendPlace(json, "blocked", query.rays[i], *answer.blocked_at, length_m, query.options);
+    if (answer.has_gaps) json += ",\"gaps\":true";
+    if (const char* const remark = RemarkOn(answer, length_m); *remark != '\0') {
+      fmt::format_to(out, ",\"remark\":\"{}\"", remark);
+    }
+    json += '}';
+  }
+  return json + "],\"status\":\"OK\"}";
+}
+
+// Parses on a worker, unless the input is small.
+asio::awaitable<Result<SightQuery>> ParseRaysOnWorker(const Handlers& from, const RequestContext& context,
+                                                      TileService::Clock::time_point deadline) {
+  const Request& request = *context.request;
+  const std::string& query = context.route.query;
+  const bool is_post = request.method == Method::kPost;
+  if (!is_post && query.size() <= kQuickRays) {
+    const HeightsInput input{query, {}, {}};
+    co_return ParseSight(input, from.max_locations);
+  }
+  const std::string_view type = is_post ? request.fields->content_type : std::string_view();
+  Work<SightQuery> parse = [query, type = std::string(type), body = request.body,
+                            most = from.max_locations](const std::stop_token& stop) {
+    return ParseSight({query, type, body}, most, stop);
+  };
+  co_return co_await from.tiles.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
+}
+
+asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& context, std::uint32_t dataset) {
+  const Request& request = *context.request;
+  const DatasetView& view = from.catalog->datasets[dataset];
+  const auto deadline = from.Deadline();
+  Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
+  if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
+    co_return co_await BackendFailure(parsed.error(), request.id);
+  }
+  if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
+  const bool is_binary = parsed->is_binary;
+  const tiler::Coding coding = is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
+  Response response;
+  response.content_type = is_binary ? "application/octet-stream" : "application/json";
+  response.content_encoding = tiler::NameOf(coding);
+  if (!is_binary) response.vary = "Accept-Encoding";
+  response.cache_control = "no-store";
+  if (request.method != Method::kPost) {
+    response.cache_control = CacheControlOf(context.route.query, view, from.cache_control);
+    response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
+    if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+  }
+  const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
+  auto query = std::make_shared<SightQuery>(*std::move(parsed));
+  Work<MadeSight> work = [catalog = from.catalog, dataset, coding, query,
+                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeSight> {
+    MadeSight made;
+    made.times.queue = tiler::MicrosecondsSince(asked);
+    const auto begun = TileService::Clock::now();
+    const tiler::TilePipeline& pipeline = *catalog->pipeline;
+    if (query->from_ground) {
+      const Result<void> raised = RaiseFromGround(pipeline, dataset, *query, stop);
+      if (!raised) return tl::unexpected(raised.error());
+    }
+    const auto answers = pipeline.LookAlong(dataset, query->drawn, query->rays, query->options, stop);
+    if (!answers) return tl::unexpected(answers.error());
+    made.times.read = tiler::MicrosecondsSince(begun);
+    made.bytes = query->is_binary ? SightBytes(*query, *answers) : SightJson(*query, *answers, stop);
+    made.bytes = tiler::Compress(std::move(made.bytes), coding, stop);
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
+    return made;
+  };
+  const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
+  Result<MadeSight> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
+  if (is_absent || (!made && made.error().code == ErrorCode::kInvalidArgument)) {
+    co_return ClientErrorResponse(made.error(), request.id);
+  }
+  if (!made) co_return co_await BackendFailure(made.error(), request.id);
+  response.body = std::make_shared<const std::string>(std::move(made->bytes));
+  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
+  co_return response;
+}
+
+}  // namespace
+
+Answer AnswerSight(const Handlers& from, const RequestContext& context) {
+  const Request& request = *context.request;
+  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
+    return ProblemResponse(415,
+                           "the body's Content-Type must be application/json, application/x-www-form-urlencoded or "
+                           "application/octet-stream",
+                           request.id);
+  }
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
+  return LookAlong(from, context, *dataset);
+}
+
+}  // namespace terrace::server

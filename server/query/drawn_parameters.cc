@@ -1,0 +1,84 @@
+#include "server/query/drawn_parameters.h"
+
+#include <utility>
+
+#include "engine/geo/tile_key.h"
+#include "server/http/text.h"
+
+namespace terrace::server {
+namespace {
+
+Result<void> SetLevel(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
+  if (!texts.level) return {};
+  const auto level = PlainDecimal(*texts.level, /*max_digits=*/2);
+  if (!level || *level > geo::kMaxLevel) {
+    return MakeError(ErrorCode::kInvalidArgument, "level must be a whole number from 0 to {}", geo::kMaxLevel);
+  }
+  drawn.level = static_cast<int>(*level);
+  return {};
+}
+
+Result<void> SetRequested(const DrawnTexts& texts, tiler::RequestedError& requested) {
+  for (const auto& [name, text, of] : {std::tuple("error", &texts.error, &requested.error_m),
+                                       std::tuple("fraction", &texts.fraction, &requested.fraction)}) {
+    if (!*text) continue;
+    *of = PositiveNumber(**text);
+    if (!*of) return MakeError(ErrorCode::kInvalidArgument, "{} must be a finite number above 0", name);
+  }
+  if (requested.error_m && requested.fraction) {
+    return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
+  }
+  if (!texts.at_least) return {};
+  if (*texts.at_least != "0" && *texts.at_least != "1") {
+    return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
+  }
+  requested.at_least = *texts.at_least == "1";
+  if (!requested.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
+  return {};
+}
+
+Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
+  if (texts.format && *texts.format != "terrain" && *texts.format != "glb") {
+    return MakeError(ErrorCode::kInvalidArgument, "format must be terrain or glb");
+  }
+  if (texts.format && *texts.format == "glb") drawn.format = tiler::TileFormat::kGlb;
+  if (!texts.compression) return {};
+  if (drawn.format != tiler::TileFormat::kGlb) {
+    return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
+  }
+  constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
+      {"draco", proto::GlbCompression::kDraco},
+      {"none", proto::GlbCompression::kNone},
+      {"quantized", proto::GlbCompression::kQuantized},
+      {"meshopt", proto::GlbCompression::kMeshopt}};
+  for (const auto& [name, compression] : kNames) {
+    if (*texts.compression != name) continue;
+    drawn.compression = compression;
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
+}
+
+}  // namespace
+
+Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts) {
+  const std::string surface = texts.surface.value_or("source");
+  if (surface != "source" && surface != "served") {
+    return MakeError(ErrorCode::kInvalidArgument, "surface must be source or served");
+  }
+  if (surface == "source") {
+    const bool is_plain =
+        !texts.level && !texts.error && !texts.fraction && !texts.at_least && !texts.format && !texts.compression;
+    if (is_plain) return std::optional<tiler::DrawnSurface>();
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "level, error, fraction, atleast, format and compression need surface=served");
+  }
+  tiler::DrawnSurface drawn;
+  for (const Result<void>& set :
+       {SetLevel(texts, drawn), SetRequested(texts, drawn.requested), SetFormat(texts, drawn)}) {
+    if (!set) return tl::unexpected(set.error());
+  }
+  return std::optional(drawn);
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,154 @@
+#include "server/query/grid_query.h"
+
+#include <algorithm>
+#include <array>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "server/http/text.h"
+#include "server/query/drawn_parameters.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr const char* kGridNames[] = {"bbox",  "width",   "height", "spacing", "crs",      "format", "datum",
+                                      "range", "surface", "level",  "error",   "fraction", "atleast"};
+enum GridName {
+  kGridBbox,
+  kGridWidth,
+  kGridHeight,
+  kGridSpacing,
+  kGridCrs,
+  kGridFormat,
+  kGridDatum,
+  kGridRange,
+  kGridSurface,
+  kGridLevel,
+  kGridError,
+  kGridFraction,
+  kGridAtLeast,
+  kGridNameCount
+};
+static_assert(std::size(kGridNames) == kGridNameCount);
+using GridTexts = std::array<std::optional<std::string>, kGridNameCount>;
+
+tl::unexpected<Error> InvalidGrid(std::string message) {
+  return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
+}
+
+// Finite numbers with commas between them; nothing if the text is anything else.
+template <std::size_t kCount>
+std::optional<std::array<double, kCount>> GridNumbersOf(std::string_view text) {
+  std::array<double, kCount> numbers{};
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const std::size_t comma = i + 1 == kCount ? text.size() : text.find(',');
+    const auto number = comma == std::string_view::npos ? std::nullopt : FiniteNumber(text.substr(0, comma));
+    if (!number) return std::nullopt;
+    numbers[i] = *number;
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  return numbers;
+}
+
+Result<GridTexts> GridTextsOf(std::string_view query) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  GridTexts texts;
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    const auto known = std::find(std::begin(kGridNames), std::end(kGridNames), name);
+    if (known == std::end(kGridNames)) {
+      return InvalidGrid(
+          "unknown parameter; known are bbox, width, height, spacing, crs, format, datum, range, surface, and with "
+          "surface=served level, error, fraction, atleast");
+    }
+    auto& text = texts[static_cast<std::size_t>(known - std::begin(kGridNames))];
+    if (text) return InvalidGrid(fmt::format("{} is given more than once", *known));
+    text = value;
+  }
+  return texts;
+}
+
+Result<void> SetSize(const GridTexts& texts, dem::GridRequest& grid) {
+  if (texts[kGridSpacing]) {
+    if (texts[kGridWidth] || texts[kGridHeight]) return InvalidGrid("spacing excludes width and height");
+    grid.spacing = PositiveNumber(*texts[kGridSpacing]);
+    return grid.spacing ? Result<void>() : InvalidGrid("spacing must be a finite number above 0, in units of the crs");
+  }
+  if (!texts[kGridWidth] || !texts[kGridHeight]) return InvalidGrid("width and height, or spacing, are needed");
+  for (const auto& [name, of] : {std::pair(kGridWidth, &grid.columns), std::pair(kGridHeight, &grid.rows)}) {
+    *of = PlainDecimal(*texts[name], /*max_digits=*/15);
+    if (!*of) return InvalidGrid(fmt::format("{} must be a whole number from 2", kGridNames[name]));
+  }
+  return {};
+}
+
+Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& grid) {
+  if (!text) return {};
+  std::string_view code = *text;
+  const bool is_epsg = code.size() > 5 && EqualsIgnoringCase(code.substr(0, 5), "EPSG:");
+  const auto number = is_epsg ? PlainDecimal(code.substr(5), /*max_digits=*/6) : std::nullopt;
+  if (!number) return InvalidGrid("crs must be EPSG: and a number, such as EPSG:32611");
+  grid.epsg = static_cast<int>(*number);
+  return {};
+}
+
+Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& format) {
+  constexpr std::pair<std::string_view, GridFormat> kFormats[] = {{"f32", GridFormat::kF32},
+                                                                  {"r16", GridFormat::kR16},
+                                                                  {"geotiff", GridFormat::kGeoTiff},
+                                                                  {"png16", GridFormat::kPng16},
+                                                                  {"json", GridFormat::kJson}};
+  if (!text) return {};
+  for (const auto& [name, value] : kFormats) {
+    if (*text != name) continue;
+    format = value;
+    return {};
+  }
+  return InvalidGrid("format must be f32, r16, geotiff, png16 or json");
+}
+
+Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
+  if (!text) return {};
+  const auto numbers = GridNumbersOf<2>(*text);
+  if (!numbers || (*numbers)[0] >= (*numbers)[1])
+    return InvalidGrid("range must be two numbers of metres, the lower first");
+  if (query.format == GridFormat::kF32 || query.format == GridFormat::kGeoTiff) {
+    return InvalidGrid("range needs format=r16 or png16");
+  }
+  query.range = dem::HeightRange{(*numbers)[0], (*numbers)[1]};
+  return {};
+}
+
+}  // namespace
+
+Result<GridQuery> ParseGrid(std::string_view text) {
+  const Result<GridTexts> parsed = GridTextsOf(text);
+  if (!parsed) return tl::unexpected(parsed.error());
+  const GridTexts& texts = *parsed;
+  GridQuery query;
+  const auto box = texts[kGridBbox] ? GridNumbersOf<4>(*texts[kGridBbox]) : std::nullopt;
+  if (!box) return InvalidGrid("bbox=west,south,east,north is needed: four numbers in units of the crs");
+  query.grid.west = (*box)[0], query.grid.south = (*box)[1], query.grid.east = (*box)[2], query.grid.north = (*box)[3];
+  for (const Result<void>& set :
+       {SetSize(texts, query.grid), SetCrs(texts[kGridCrs], query.grid),
+        SetGridFormat(texts[kGridFormat], query.format), SetRange(texts[kGridRange], query)}) {
+    if (!set) return tl::unexpected(set.error());
+  }
+  if (texts[kGridDatum] && *texts[kGridDatum] != "ellipsoid" && *texts[kGridDatum] != "orthometric") {
+    return InvalidGrid("datum must be ellipsoid or orthometric");
+  }
+  if (texts[kGridDatum] && *texts[kGridDatum] == "orthometric") query.datum = dem::HeightDatum::kOrthometric;
+  Result<std::optional<tiler::DrawnSurface>> drawn =
+      ParseDrawn({texts[kGridSurface], texts[kGridLevel], texts[kGridError], texts[kGridFraction], texts[kGridAtLeast],
+                  std::nullopt, std::nullopt});
+  if (!drawn) return tl::unexpected(drawn.error());
+  query.drawn = *std::move(drawn);
+  if (query.drawn && query.datum != dem::HeightDatum::kEllipsoid) {
+    return InvalidGrid("surface=served has ellipsoidal heights alone, as tiles have");
+  }
+  return query;
+}
+
+}  // namespace terrace::server

@@ -1,0 +1,30 @@
+// A parsed request for a grid of heights. Pure.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "engine/dem/export/output_grid.h"
+#include "tiler/surface/drawn_points.h"
+
+namespace terrace::server {
+
+enum class GridFormat : std::uint8_t { kF32, kR16, kGeoTiff, kPng16, kJson };
+
+struct GridQuery {
+  dem::GridRequest grid;
+  GridFormat format = GridFormat::kF32;
+  dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
+  std::optional<dem::HeightRange> range;     // of the integers of kR16 and kPng16; nothing: that of the heights
+  std::optional<tiler::DrawnSurface> drawn;  // nothing: the surface of the sources
+};
+
+// `bbox=west,south,east,north` in units of `crs=EPSG:CODE` (4326), `width=N&height=N` or `spacing=S`, `format`,
+// `datum`, `range=MIN,MAX`, and the parameters of surfaces except `format` and `compression` (drawn_parameters.h); `v`
+// may be repeated. kInvalidArgument: the message is for the client.
+Result<GridQuery> ParseGrid(std::string_view query);
+
+}  // namespace terrace::server

@@ -1,0 +1,131 @@
+"""What the tests of many bakers share: sources, an archive of a single process, a redis-server, workers."""
+import filecmp
+import json
+import os
+import pathlib
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
+from redis_process import Redis  # noqa: E402
+from srtm import write_hgt  # noqa: E402
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+IS_LONG = "--long" in sys.argv
+sys.argv = [argument for argument in sys.argv if argument != "--long"]
+CELLS = ("N46E006", "N46E007", "N46E012", "N30E012")
+LEASE = 1.5  # seconds; the heartbeat is a third
+
+
+def files_of(place):
+    return sorted(path.relative_to(place).as_posix() for path in pathlib.Path(place).rglob("*") if path.is_file())
+
+
+@unittest.skipUnless(shutil.which("redis-server"), "redis-server is not installed")
+class QueueCase(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.scratch = pathlib.Path(scratch.name)
+        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
+        cls.environment.pop("TERRACE_QUEUE_PASSWORD", None)
+        cls.config = cls.make_sources("dems")
+        cls.reference = cls.scratch / "reference"
+        begun = time.monotonic()
+        done = subprocess.run([BINARY, "bake", "--config", cls.config, "--levels", "0-11", "--out", cls.reference, "--threads", "1"],
+                              env=cls.environment, text=True, stderr=subprocess.PIPE)
+        assert done.returncode == 0, done.stderr
+        cls.seconds = time.monotonic() - begun
+        cls.units = [unit["name"] for unit in json.loads((cls.reference / "manifest.json").read_text())["units"]]
+
+    @classmethod
+    def make_sources(cls, folder):
+        (cls.scratch / folder).mkdir()
+        for cell in CELLS:
+            write_hgt(cls.scratch / folder / f"{cell}.hgt")
+        config = cls.scratch / folder / "terrace.json"
+        config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
+        return config
+
+    def setUp(self):
+        self.redis = self.start_redis("redis")
+        self.job = "test-job"
+
+    def start_redis(self, name, *options):
+        redis = Redis(self.scratch / f"{self.id().rpartition('.')[2]}-{name}", *options)
+        self.addCleanup(redis.kill)
+        return redis
+
+    def place(self, name="out"):
+        place = self.scratch / f"{self.id().rpartition('.')[2]}-{name}"
+        self.addCleanup(shutil.rmtree, place, ignore_errors=True)
+        return place
+
+    def command(self, place, *arguments, url=None, config=None, levels="0-11", lease=LEASE):
+        return [str(part) for part in (
+            BINARY, "bake", "--config", config or self.config, "--levels", levels, "--out", place, "--queue", url or self.redis.url,
+            "--job", self.job, "--lease", lease, "--json", "--threads", 1, *arguments)]
+
+    def start(self, place, *arguments, before=(), environment=None, limit=None, **options):
+        process = subprocess.Popen(
+            [*before, *self.command(place, *arguments, **options)], env={**self.environment, **(environment or {})}, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))))
+
+        def end():
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        self.addCleanup(end)
+        return process
+
+    def joined(self, place, count, **options):
+        """Workers that have all joined the job, each with a unit or about to take one."""
+        workers = []
+        for _ in range(count):
+            worker = self.start(place, lease=20, **options)
+            workers.append(worker)
+            until = time.monotonic() + 60
+            while f"-{worker.pid}-" not in str(self.redis("XINFO", "CONSUMERS", self.key("units"), "bakers")):
+                self.assertLess(time.monotonic(), until)
+                time.sleep(0.005)
+            worker.send_signal(signal.SIGSTOP)
+        for worker in workers:
+            worker.send_signal(signal.SIGCONT)
+        return workers
+
+    def end(self, process, code=0):
+        out, errors = process.communicate(timeout=120)
+        self.assertEqual(process.returncode, code, errors)
+        return out, errors
+
+    def run_bake(self, place, *arguments, code=0, **options):
+        return self.end(self.start(place, *arguments, **options), code)
+
+    def status(self, *arguments, code=0):
+        done = subprocess.run([BINARY, "bake", "status", "--queue", self.redis.url, "--job", self.job, *arguments], text=True,
+                              env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=60)
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done.stdout
+
+    def key(self, what):
+        return f"terrace:{{{self.job}}}:{what}"
+
+    def expect_equal(self, place, reference=None):
+        reference = reference or self.reference
+        names = files_of(reference)
+        self.assertEqual(files_of(place), names)
+        _, different, unreadable = filecmp.cmpfiles(reference, place, names, shallow=False)
+        self.assertEqual((different, unreadable), ([], []))
+
+    def baked(self, *outputs, outcomes=("baked",)):
+        """The units of the lines of --json, sorted, each as often as it was baked."""
+        lines = [json.loads(line) for output in outputs for line in output.splitlines()]
+        return sorted(line["unit"] for line in lines if "unit" in line and line["outcome"] in outcomes)

@@ -1,0 +1,250 @@
+// Lines of sight against a march along each ray in steps of a tenth of a pixel.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <limits>
+#include <random>
+
+#include "engine/geo/ellipsoid.h"
+#include "tests/engine/dem/dem_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+struct Marched {
+  bool is_blocked = false;
+  double clearance_m = std::numeric_limits<double>::infinity();
+  double lowest_at = 0;
+  double blocked_at = 2;  // share of the first step below the ground
+};
+
+// Reads the ground under `steps` + 1 places of each ray.
+std::vector<Marched> March(const DemSource& source, const std::vector<SightRay>& rays, double step_m,
+                           const SightOptions& options) {
+  std::vector<Marched> marched;
+  for (const SightRay& ray : rays) {
+    const int steps = std::max(1, static_cast<int>(std::ceil(LengthOf(ray) / step_m)));
+    std::vector<GeoPosition> places;
+    std::vector<double> heights_m;
+    for (int i = 0; i <= steps; ++i) {
+      const SightPoint at = PointAt(ray, static_cast<double>(i) / steps, options);
+      places.push_back({at.longitude, at.latitude});
+      heights_m.push_back(at.height_m);
+    }
+    const auto ground = source.ReadPoints(places);
+    EXPECT_TRUE(ground);
+    Marched& one = marched.emplace_back();
+    for (int i = 0; i <= steps; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const double clearance_m = heights_m[k] - (*ground)[k];
+      if (std::isnan(clearance_m)) continue;
+      if (clearance_m < one.clearance_m) one.lowest_at = static_cast<double>(i) / steps;
+      one.clearance_m = std::min(one.clearance_m, clearance_m);
+      if (clearance_m < -kSightTolerance) one.blocked_at = std::min(one.blocked_at, static_cast<double>(i) / steps);
+    }
+    one.is_blocked = one.blocked_at <= 1;
+  }
+  return marched;
+}
+
+struct Region {
+  double west, south, east, north;
+  double reach_degrees;  // of rays
+  double step_m;         // a tenth of a pixel
+};
+
+// Rays that begin and end some metres above the ground, some of them below it.
+std::vector<SightRay> RaysIn(const DemSource& source, const Region& area, std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * std::uniform_real_distribution<double>()(random);
+  };
+  std::vector<GeoPosition> ends;
+  for (std::size_t i = 0; i < count; ++i) {
+    ends.push_back({between(area.west, area.east), between(area.south, area.north)});
+    ends.push_back({std::clamp(ends.back().longitude + between(-1, 1) * area.reach_degrees, area.west, area.east),
+                    std::clamp(ends.back().latitude + between(-1, 1) * area.reach_degrees, area.south, area.north)});
+  }
+  const auto ground = source.ReadPoints(ends);
+  EXPECT_TRUE(ground);
+  std::vector<SightRay> rays;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto end = [&](std::size_t k) {
+      const double base = std::isnan((*ground)[k]) ? 0 : (*ground)[k];
+      return SightPoint{ends[k].longitude, ends[k].latitude, base + between(-2, 120)};
+    };
+    rays.push_back({end(2 * i), end(2 * i + 1)});
+  }
+  return rays;
+}
+
+// TERRACE_LONG_TESTS=1 takes ten times as many rays.
+std::size_t Rays(std::size_t count) {
+  const char* const is_long = std::getenv("TERRACE_LONG_TESTS");
+  return is_long != nullptr && *is_long == '1' ? 10 * count : count;
+}
+
+void ExpectAsMarched(const DemSource& source, const Region& area, std::size_t count, const SightOptions& options = {}) {
+  const std::vector<SightRay> rays = RaysIn(source, area, count, 7);
+  const auto answers = source.LookAlong(rays, options);
+  ASSERT_TRUE(answers) << answers.error().message;
+  const std::vector<Marched> marched = March(source, rays, area.step_m, options);
+  std::size_t blocked = 0, close = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const SightAnswer& answer = (*answers)[i];
+    const double length_m = LengthOf(rays[i]);
+    blocked += answer.is_visible ? 0 : 1;
+    EXPECT_EQ(std::isnan(answer.clearance_m), std::isinf(marched[i].clearance_m)) << i;
+    if (std::isnan(answer.clearance_m)) continue;
+    // The march may miss the lowest place by half a step; the ground is at most as steep as this.
+    constexpr double kSteepest = 3;
+    EXPECT_LE(answer.clearance_m, marched[i].clearance_m + 2e-3) << i;
+    EXPECT_GE(answer.clearance_m, marched[i].clearance_m - kSteepest * area.step_m - 2e-3) << i;
+    if (std::abs(answer.clearance_m) < 0.01) {
+      ++close;
+      continue;
+    }
+    // A ray that passes below the ground between two steps alone.
+    const bool is_between = !answer.is_visible && answer.clearance_m > -kSteepest * area.step_m;
+    if (!is_between) {
+      EXPECT_EQ(answer.is_visible, !marched[i].is_blocked) << i << " by " << answer.clearance_m;
+    }
+    if (answer.is_visible || !marched[i].is_blocked) continue;
+    ASSERT_TRUE(answer.blocked_at);
+    EXPECT_LE(*answer.blocked_at * length_m, marched[i].blocked_at * length_m + 1e-3) << i;
+  }
+  std::printf("%zu rays, %zu blocked, %zu within 1 cm\n", count, blocked, close);
+  EXPECT_GT(blocked, count / 10);
+  EXPECT_LT(blocked, count - count / 10);
+  EXPECT_LT(close, count / 50);
+}
+
+RasterSpec Hills() {
+  RasterSpec spec{.width = 700, .height = 600, .geo_transform = {10, .001, 0, 46, 0, -.001}, .nodata = -9999};
+  spec.value = [](int col, int row) {
+    const bool is_void = col > 100 && col < 220 && row > 100 && row < 240;
+    return is_void ? -9999.0 : 800 + 300 * std::sin(col / 9.0) * std::cos(row / 7.0) + (col * 7 + row * 13) % 31;
+  };
+  return spec;
+}
+
+TEST(Sight, IsThatOfAMarchOverHillsAndAHole) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Hills()));
+  ASSERT_TRUE(source);
+  ExpectAsMarched(*source, {10.02, 45.42, 10.68, 45.98, .06, 8}, Rays(600));
+}
+
+TEST(Sight, IsThatOfAMarchOverRealMountains) {
+  TERRACE_REQUIRE_DATA(path, "srtm3_N46E008_swiss_alps.tif");
+  DemOptions options;
+  options.source.vertical = "egm96";
+  const auto source = OpenOrFail(path, options);
+  ASSERT_TRUE(source);
+  ExpectAsMarched(*source, {8.05, 46.05, 8.95, 46.95, .06, 7}, Rays(1000), {.refraction = 0.13});
+}
+
+TEST(Sight, IsThatOfAMarchOverAProjectedRaster) {
+  TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
+  const auto source = OpenOrFail(path);
+  ASSERT_TRUE(source);
+  ExpectAsMarched(*source, {-118.35, 34.25, -118.05, 34.36, .03, 3}, Rays(800));
+}
+
+TEST(Sight, IsThatOfAMarchOverAMosaic) {
+  const TempDir dir;
+  RasterSpec fine = Hills();
+  RasterSpec coarse{.width = 60, .height = 60, .geo_transform = {9.9, .02, 0, 46.2, 0, -.02}, .nodata = -9999};
+  coarse.value = [](int col, int row) { return 900 + 100 * std::sin(col / 2.0) + 80 * std::cos(row / 3.0); };
+  const auto source = OpenOrFail({{.path = WriteRaster(dir, fine, "fine.tif"), .rank = 0},
+                                  {.path = WriteRaster(dir, coarse, "coarse.tif"), .rank = 1}});
+  ASSERT_TRUE(source);
+  // Where sources meet, the ground jumps by hundreds of metres: the march finds the edge within a step.
+  const std::vector<SightRay> rays = RaysIn(*source, {9.95, 45.3, 10.8, 46.1, .06, 8}, 300, 3);
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  const std::vector<Marched> marched = March(*source, rays, 8, {});
+  std::size_t blocked = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    blocked += marched[i].is_blocked ? 1 : 0;
+    EXPECT_LE((*answers)[i].clearance_m, marched[i].clearance_m + 2e-3)
+        << i << " from " << rays[i].from.longitude << ' ' << rays[i].from.latitude << " to " << rays[i].to.longitude
+        << ' ' << rays[i].to.latitude << " marched lowest at " << marched[i].lowest_at;
+    const bool is_visible = (*answers)[i].is_visible;
+    EXPECT_FALSE(marched[i].is_blocked && is_visible) << i;
+    EXPECT_FALSE(marched[i].clearance_m > 30 && !is_visible) << i;
+    EXPECT_FALSE((*answers)[i].has_gaps);
+  }
+  EXPECT_GT(blocked, 30u);
+}
+
+TEST(Sight, FollowsTheEarthsCurvature) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, FlatSquare(0, 2, 200, .01, 0)));
+  ASSERT_TRUE(source);
+  // Half way, a ray of 2a lies a^2 / 2R below its ends: 100 km sag by 196 m.
+  const double half_m = 50'000, radius_m = 6'378'000, sag_m = half_m * half_m / (2 * radius_m);
+  const double degrees = half_m / geo::MetresPerDegreeEast(0.5);
+  const auto clearance = [&](double height_m, double refraction) {
+    const std::vector<SightRay> ray = {{{1 - degrees, 0.5, height_m}, {1 + degrees, 0.5, height_m}}};
+    return source->LookAlong(ray, {refraction})->front();
+  };
+  EXPECT_NEAR(clearance(300, 0).clearance_m, 300 - sag_m, 1);
+  EXPECT_TRUE(clearance(300, 0).is_visible);
+  EXPECT_FALSE(clearance(190, 0).is_visible);
+  EXPECT_NEAR(clearance(190, 0.13).clearance_m, 190 - 0.87 * sag_m, 1);
+  EXPECT_TRUE(clearance(190, 0.13).is_visible) << "the air bends the ray over the horizon";
+  // The first place below the ground: where 190 m are less than what the Earth has curved.
+  const double at = 0.5 - 0.5 * std::sqrt(1 - 190 / sag_m);
+  EXPECT_NEAR(*clearance(190, 0).blocked_at, at, 2e-3);
+}
+
+TEST(Sight, AnswersRaysWithoutLengthBelowTheGroundAndBesideTheData) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, FlatSquare(0, 2, 200, .01, 100)));
+  ASSERT_TRUE(source);
+  const std::vector<SightRay> rays = {
+      {{1, 1, 150}, {1, 1, 150}},       // no length
+      {{1, 1, 90}, {1, 1, 90}},         // no length, below the ground
+      {{1, 1, 90}, {1.1, 1, 200}},      // begins below
+      {{1, 1, 200}, {1.1, 1, 90}},      // ends below
+      {{1, 1, 100}, {1, 1, 5000}},      // straight up from the ground
+      {{40, 1, 100}, {40.1, 1, 100}},   // beside the data
+      {{-0.1, 1, 200}, {0.1, 1, 200}},  // partly
+      {{1, 1, 1e6}, {1.5, 1.5, 1e6}},   // in orbit
+  };
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  EXPECT_NEAR((*answers)[0].clearance_m, 50, 1e-3);
+  EXPECT_TRUE((*answers)[0].is_visible);
+  EXPECT_NEAR((*answers)[1].clearance_m, -10, 1e-3);
+  EXPECT_FALSE((*answers)[1].is_visible);
+  EXPECT_EQ((*answers)[2].blocked_at, 0);
+  EXPECT_FALSE((*answers)[3].is_visible);
+  EXPECT_NEAR(*(*answers)[3].blocked_at, (100.0 - 1) / 110, 3e-3) << "1 m of them by the curvature";
+  EXPECT_TRUE((*answers)[4].is_visible) << "on the ground";
+  EXPECT_TRUE(std::isnan((*answers)[5].clearance_m));
+  EXPECT_TRUE((*answers)[5].has_gaps);
+  EXPECT_TRUE((*answers)[6].has_gaps);
+  EXPECT_NEAR((*answers)[6].clearance_m, 100, 50);
+  EXPECT_TRUE((*answers)[7].is_visible);
+  EXPECT_GT((*answers)[7].clearance_m, 9.9e5);
+}
+
+TEST(Sight, CrossesTheAntimeridianOfARasterAroundTheEarth) {
+  const TempDir dir;
+  RasterSpec spec{.width = 360, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}};
+  spec.value = [](int col, int) { return col == 0 || col == 359 ? 2000.0 : 0.0; };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  const std::vector<SightRay> rays = {{{178, 0.5, 1000}, {-178, 0.5, 1000}}, {{178, 0.5, 9000}, {-178, 0.5, 9000}}};
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  EXPECT_FALSE((*answers)[0].is_visible);
+  // 222 km sag by 3.9 km.
+  EXPECT_NEAR((*answers)[1].clearance_m, 9000 - 2000 - 3863, 60);
+}
+
+}  // namespace
+}  // namespace terrace::dem

@@ -1,0 +1,41 @@
+"""Runs the examples of heights as numbers: numbers_test.py BINARY_HEIGHTS TERRACE SOURCE_DIR.
+
+The scripts that draw need matplotlib; without it they are skipped.
+"""
+import importlib.util
+import pathlib
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+
+client, terrace, source = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
+
+
+def run(*command):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, (command, done.stdout, done.stderr)
+    return done.stdout
+
+
+server = subprocess.Popen([terrace, "serve", "--config", source / "config/samples/samples.json", "--listen", "127.0.0.1:0"],
+                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+try:
+    port = re.search(r":(\d+)", server.stdout.readline()).group(1)
+    dataset = f"http://127.0.0.1:{port}/jacksboro"
+    in_cpp = run(client, "127.0.0.1", port, "/jacksboro/heights").split()
+    in_python = run(sys.executable, source / "examples/binary_heights.py", dataset, "-84.2,36.3", "-84.1,36.4")
+    assert in_cpp == re.findall(r"([0-9.]+) m", in_python) == ["375.000", "379.000"], (in_cpp, in_python)
+    if importlib.util.find_spec("matplotlib"):
+        with tempfile.TemporaryDirectory() as folder:
+            picture = pathlib.Path(folder) / "picture.png"
+            for script, *arguments in (("drive.py", "36.25,-84.35", "36.3,-84.3"), ("view_map.py", "36.3,-84.25", "10", "0.05", "41")):
+                run(sys.executable, source / "examples" / script, dataset, picture, *arguments)
+                assert picture.read_bytes().startswith(b"\x89PNG"), script
+                picture.unlink()
+    else:
+        print("SKIPPED in part: drive.py and view_map.py need matplotlib")
+finally:
+    server.send_signal(signal.SIGTERM)
+    server.wait(timeout=60)

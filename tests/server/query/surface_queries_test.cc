@@ -1,0 +1,235 @@
+// Requests for heights as numbers, surfaces, grids and lines of sight.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "engine/core/bytes.h"
+#include "server/query/grid_query.h"
+#include "server/query/heights_query.h"
+#include "server/query/sight_query.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr const char* kBinary = "application/octet-stream";
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInfinity = std::numeric_limits<double>::infinity();
+
+std::string BytesOf(const std::vector<double>& numbers) {
+  ByteWriter writer;
+  for (const double number : numbers) writer.Put(number);
+  return writer.Take();
+}
+
+template <typename T>
+void ExpectSays(const Result<T>& parsed, const char* says) {
+  ASSERT_FALSE(parsed) << says;
+  EXPECT_EQ(parsed.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(parsed.error().message.find(says), std::string::npos) << parsed.error().message;
+}
+
+TEST(BinaryHeights, ReadsLongitudeBeforeLatitude) {
+  const std::string body = BytesOf({8.25, 46.5, -180, -90, 180, 90});
+  const auto query = ParseHeights({"normals=1", kBinary, body}, 3);
+  ASSERT_TRUE(query) << query.error().message;
+  EXPECT_TRUE(query->is_binary);
+  EXPECT_TRUE(query->wants_normals);
+  ASSERT_EQ(query->points.size(), 3u);
+  EXPECT_EQ(query->points[0].longitude, 8.25);
+  EXPECT_EQ(query->points[0].latitude, 46.5);
+  EXPECT_EQ(query->points[2].latitude, 90);
+}
+
+TEST(BinaryHeights, SaysWhatIsWrong) {
+  const auto parse = [](const std::string& body, const char* query = "") {
+    return ParseHeights({query, kBinary, body}, 2);
+  };
+  const std::string point = BytesOf({8, 46});
+  ExpectSays(parse(""), "0 bytes, which is no multiple of 16");
+  ExpectSays(parse(point + "x"), "17 bytes, which is no multiple of 16");
+  ExpectSays(parse(point.substr(1)), "15 bytes");
+  ExpectSays(parse(point + point + point), "more than 2 points");
+  ExpectSays(parse(point + BytesOf({kNaN, 0})), "byte 16: point 2: the longitude must be");
+  ExpectSays(parse(point + BytesOf({0, kNaN})), "byte 24: point 2: the latitude must be");
+  ExpectSays(parse(BytesOf({kInfinity, 0})), "the longitude must be");
+  ExpectSays(parse(BytesOf({0, -kInfinity})), "the latitude must be");
+  ExpectSays(parse(BytesOf({46.5, 98.25})), "the longitude comes first");
+  ExpectSays(parse(point, "locations=1,2"), "exclude a body of points");
+  ExpectSays(parse(point, "certify=deepest"), "certify needs a reply in JSON");
+  ExpectSays(parse(point, "normals=yes"), "normals must be 0 or 1");
+}
+
+TEST(DrawnSurface, ReadsTheParametersOfTiles) {
+  const auto query = ParseHeights(
+      {"locations=1,2&surface=served&level=12&error=5&atleast=1&format=glb&compression=meshopt", {}, {}}, 9);
+  ASSERT_TRUE(query) << query.error().message;
+  ASSERT_TRUE(query->drawn);
+  EXPECT_EQ(query->drawn->level, 12);
+  EXPECT_EQ(query->drawn->requested.error_m, 5);
+  EXPECT_TRUE(query->drawn->requested.at_least);
+  EXPECT_EQ(query->drawn->format, tiler::TileFormat::kGlb);
+  EXPECT_EQ(query->drawn->compression, proto::GlbCompression::kMeshopt);
+  EXPECT_FALSE(ParseHeights({"locations=1,2&surface=source", {}, {}}, 9)->drawn);
+}
+
+TEST(DrawnSurface, SaysWhatIsWrong) {
+  const struct {
+    const char* query;
+    const char* says;
+  } cases[] = {
+      {"surface=mesh", "surface must be source or served"},
+      {"level=3", "need surface=served"},
+      {"error=3", "need surface=served"},
+      {"surface=source&format=glb", "need surface=served"},
+      {"surface=served&level=25", "level must be"},
+      {"surface=served&level=-1", "level must be"},
+      {"surface=served&level=", "level must be"},
+      {"surface=served&error=0", "error must be"},
+      {"surface=served&error=nan", "error must be"},
+      {"surface=served&fraction=-1", "fraction must be"},
+      {"surface=served&error=1&fraction=1", "exclude each other"},
+      {"surface=served&atleast=1", "atleast needs error"},
+      {"surface=served&error=1&atleast=2", "atleast must be"},
+      {"surface=served&format=obj", "format must be terrain or glb"},
+      {"surface=served&compression=draco", "compression needs format=glb"},
+      {"surface=served&format=glb&compression=zip", "compression must be"},
+      {"surface=served&certify=deepest", "certify is for heights of the sources"},
+      {"surface=served&datum=orthometric", "ellipsoidal heights alone"},
+  };
+  for (const auto& [query, says] : cases) {
+    ExpectSays(ParseHeights({std::string("locations=1,2&") + query, {}, {}}, 9), says);
+  }
+}
+
+TEST(GridQuery, ReadsSizesFormatsAndRanges) {
+  const auto query =
+      ParseGrid("bbox=400000,3790000,401000,3791000&crs=EPSG:32611&width=505&height=505&format=r16&range=0,512&v=1");
+  ASSERT_TRUE(query) << query.error().message;
+  EXPECT_EQ(query->grid.epsg, 32611);
+  EXPECT_EQ(query->grid.columns, 505);
+  EXPECT_EQ(query->grid.north, 3791000);
+  EXPECT_EQ(query->format, GridFormat::kR16);
+  EXPECT_EQ(query->range->max, 512);
+  EXPECT_EQ(ParseGrid("bbox=0,0,1,1&spacing=0.25")->grid.spacing, 0.25);
+}
+
+TEST(GridQuery, SaysWhatIsWrong) {
+  const struct {
+    const char* query;
+    const char* says;
+  } cases[] = {
+      {"width=2&height=2", "bbox=west,south,east,north is needed"},
+      {"bbox=0,0,1&width=2&height=2", "bbox=west,south,east,north is needed"},
+      {"bbox=0,0,1,nan&width=2&height=2", "bbox=west,south,east,north is needed"},
+      {"bbox=0,0,1,1", "width and height, or spacing"},
+      {"bbox=0,0,1,1&width=2", "width and height, or spacing"},
+      {"bbox=0,0,1,1&width=2&height=x", "height must be"},
+      {"bbox=0,0,1,1&width=2&height=2&spacing=1", "excludes"},
+      {"bbox=0,0,1,1&spacing=0", "spacing must be"},
+      {"bbox=0,0,1,1&spacing=inf", "spacing must be"},
+      {"bbox=0,0,1,1&spacing=1&crs=UTM11", "crs must be"},
+      {"bbox=0,0,1,1&spacing=1&crs=EPSG:", "crs must be"},
+      {"bbox=0,0,1,1&spacing=1&format=tiff", "format must be"},
+      {"bbox=0,0,1,1&spacing=1&range=5,5&format=r16", "range must be"},
+      {"bbox=0,0,1,1&spacing=1&range=0,5", "range needs format"},
+      {"bbox=0,0,1,1&spacing=1&datum=mean", "datum must be"},
+      {"bbox=0,0,1,1&spacing=1&size=3", "unknown parameter"},
+      {"bbox=0,0,1,1&spacing=1&spacing=1", "more than once"},
+  };
+  for (const auto& [query, says] : cases) ExpectSays(ParseGrid(query), says);
+}
+
+TEST(GridPlan, NamesLimitsAndReferenceSystems) {
+  dem::GridRequest request{.west = 7, .south = 46, .east = 8, .north = 47, .columns = 3, .rows = 5};
+  const auto plan = dem::PlanOutputGrid(request, 100);
+  ASSERT_TRUE(plan) << plan.error().message;
+  const auto positions = dem::PositionsOf(*plan, 0, 5, {});
+  ASSERT_TRUE(positions);
+  EXPECT_EQ(positions->front().latitude, 47);
+  EXPECT_EQ(positions->front().longitude, 7);
+  EXPECT_EQ((*positions)[1].longitude, 7.5);
+  EXPECT_EQ(positions->back().latitude, 46);
+  EXPECT_EQ(positions->back().longitude, 8);
+  ExpectSays(dem::PlanOutputGrid(request, 14), "3 x 5 nodes, more than max_mesh_samples of this server (14)");
+  request.columns = 0;
+  ExpectSays(dem::PlanOutputGrid(request, 100), "width: a grid has at least 2 nodes");
+  request.columns = 1'000'000'000;
+  request.rows = 1'000'000'000;
+  ExpectSays(dem::PlanOutputGrid(request, 100), "1000000000 x 1000000000 nodes");
+  request.columns = request.rows = {};
+  request.spacing = 1e-300;
+  ExpectSays(dem::PlanOutputGrid(request, 100), "more than max_mesh_samples");
+  request.spacing = 5;
+  ExpectSays(dem::PlanOutputGrid(request, 100), "spacing: a grid has at least 2 nodes");
+  request.spacing = 0.3;
+  EXPECT_EQ(dem::PlanOutputGrid(request, 100)->columns, 4);
+  EXPECT_NEAR(dem::PlanOutputGrid(request, 100)->south, 46.1, 1e-9);
+  request.epsg = 99999;
+  ExpectSays(dem::PlanOutputGrid(request, 100), "PROJ knows no EPSG:99999");
+  request.epsg = 5773;  // EGM96 heights
+  ExpectSays(dem::PlanOutputGrid(request, 100), "has no easting and northing");
+  request.epsg = 4978;  // geocentric
+  ExpectSays(dem::PlanOutputGrid(request, 100), "has no easting and northing");
+  // Half a million kilometres east of zone 11.
+  const auto far = dem::PlanOutputGrid({32611, 5e8, 0, 6e8, 1e6, 10, 10, {}}, 100);
+  ASSERT_TRUE(far) << far.error().message;
+  ExpectSays(dem::PositionsOf(*far, 0, 10, {}), "EPSG:32611 has no place on Earth for column 0, row 0");
+}
+
+TEST(SightQuery, ReadsOneRayAndMany) {
+  const auto one = ParseSight({"from=46,7,1000&to=46.1,7.1,1200.5&refraction=0.13&heights=ground", {}, {}}, 9);
+  ASSERT_TRUE(one) << one.error().message;
+  ASSERT_EQ(one->rays.size(), 1u);
+  EXPECT_EQ(one->rays[0].from.latitude, 46);
+  EXPECT_EQ(one->rays[0].to.height_m, 1200.5);
+  EXPECT_EQ(one->options.refraction, 0.13);
+  EXPECT_TRUE(one->from_ground);
+  const auto many = ParseSight({{}, "application/json", R"({"rays": "46,7,10,46.1,7,20|1,2,3,1,2,4"})"}, 9);
+  ASSERT_TRUE(many) << many.error().message;
+  ASSERT_EQ(many->rays.size(), 2u);
+  EXPECT_EQ(many->rays[1].to.height_m, 4);
+  const std::string body = BytesOf({7, 46, 10, 7.5, 46.5, 20});
+  const auto binary = ParseSight({"surface=served", kBinary, body}, 9);
+  ASSERT_TRUE(binary) << binary.error().message;
+  EXPECT_TRUE(binary->is_binary);
+  EXPECT_TRUE(binary->drawn);
+  EXPECT_EQ(binary->rays[0].to.longitude, 7.5);
+}
+
+TEST(SightQuery, SaysWhatIsWrong) {
+  const struct {
+    const char* query;
+    const char* says;
+  } cases[] = {
+      {"", "either from and to"},
+      {"from=46,7,1", "either from and to"},
+      {"from=46,7&to=46,7,1", "from is not"},
+      {"from=46,7,1&to=46,7,x", "to is not"},
+      {"from=46,7,1&to=46,7,nan", "to is not"},
+      {"from=91,7,1&to=46,7,1", "from: the latitude must be"},
+      {"from=46,7,1&to=46,181,1", "to: the longitude must be"},
+      {"from=46,7,-20000&to=46,7,1", "from: the height must be"},
+      {"from=46,7,1&to=-46,-173,1", "km long, the most is 3000 km"},
+      {"from=46,7,1&to=46,7,2&rays=1,2,3,4,5,6", "either from and to"},
+      {"rays=1,2,3,4,5", "rays: item 1 is not"},
+      {"rays=1,2,3,1,2,3|", "rays: item 2 is not"},
+      {"rays=1,2,3,1,2,3|1,2,3,1,2,3|1,2,3,1,2,3", "more than 2"},
+      {"from=1,2,3&to=1,2,4&refraction=x", "refraction must be"},
+      {"from=1,2,3&to=1,2,4&heights=sea", "heights must be"},
+      {"from=1,2,3&to=1,2,4&from=1,2,3", "from is given more than once"},
+      {"from=1,2,3&to=1,2,4&level=3", "need surface=served"},
+      {"frm=1,2,3", "unknown parameter"},
+  };
+  for (const auto& [query, says] : cases) ExpectSays(ParseSight({query, {}, {}}, 2), says);
+  const std::string ray = BytesOf({7, 46, 10, 7.5, 46.5, 20});
+  ExpectSays(ParseSight({{}, kBinary, ray.substr(8)}, 2), "40 bytes, which is no multiple of 48");
+  ExpectSays(ParseSight({{}, kBinary, ray + ray + ray}, 2), "more than 2 rays");
+  ExpectSays(ParseSight({{}, kBinary, ray + BytesOf({7, kNaN, 10, 7.5, 46.5, 20})}, 2),
+             "byte 48: ray 2: from: the latitude");
+  ExpectSays(ParseSight({{}, kBinary, BytesOf({7, 46, 10, 7.5, 46.5, kInfinity})}, 2), "ray 1: to: the height");
+}
+
+}  // namespace
+}  // namespace terrace::server

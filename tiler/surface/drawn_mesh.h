@@ -1,0 +1,80 @@
+// The surface that a client draws for one tile: flat triangles in space, and heights and normals of the surface along
+// plumb lines.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "engine/dem/dem_types.h"
+#include "engine/geo/ellipsoid.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::tiler {
+
+// A tile as a client decodes it, without skirts.
+struct DrawnTriangles {
+  std::vector<geo::Vec3> positions;           // ECEF metres
+  std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
+  std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
+};
+
+struct DrawnPoint {
+  double height_m = 0;  // above the ellipsoid, along the plumb line
+  geo::Vec3 normal;     // of the triangle: unit, ECEF, upwards
+};
+
+// Immutable and thread-safe.
+class DrawnMesh {
+ public:
+  DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
+
+  // Where the plumb line through a position meets the mesh; nothing if it passes beside it. The edge of a tile is a
+  // parallel, and the triangles end at chords of it: in the north a tile reaches beyond its northern edge and not to
+  // all of its southern one. Where it meets several triangles, the one that it meets farthest inside counts.
+  std::optional<DrawnPoint> At(const dem::GeoPosition& point) const;
+  // The same on the plane of the nearest triangle, also beside the mesh.
+  DrawnPoint Nearest(const dem::GeoPosition& point) const;
+
+  // A part of the tile, and the triangles that may lie over it.
+  struct Bucket {
+    double west, south, east, north;  // degrees
+    std::span<const std::uint32_t> triangles;
+  };
+  Bucket BucketAt(const dem::GeoPosition& point) const;
+
+  // Where a plumb line meets the plane of a triangle; nothing if the triangle is seen on edge.
+  struct Crossing {
+    std::array<double, 3> inside;  // barycentric coordinates
+    double height_m;               // above the ellipsoid
+  };
+  std::optional<Crossing> CrossingOf(std::uint32_t triangle, const dem::GeoPosition& point) const;
+
+  const geo::TileKey& key() const { return key_; }
+  std::size_t bytes() const;
+
+ private:
+  struct Meeting;
+  struct PlumbLine;
+  void FillBuckets(const std::vector<std::array<double, 2>>& places);
+  std::array<double, 2> PlaceOf(const dem::GeoPosition& point) const;
+  PlumbLine LineAt(const dem::GeoPosition& point) const;
+  std::optional<Crossing> Cross(const PlumbLine& line, std::uint32_t triangle) const;
+  void Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& best) const;
+  DrawnPoint PointOf(const Meeting& met) const;
+
+  geo::TileKey key_;
+  geo::Vec3 origin_;
+  std::vector<geo::Vec3> positions_;  // from the origin
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  int side_ = 1;                              // buckets along an edge
+  std::vector<std::uint32_t> bucket_starts_;  // side * side + 1
+  std::vector<std::uint32_t> bucket_triangles_;
+};
+
+inline std::size_t BytesOf(const DrawnMesh& mesh) { return mesh.bytes(); }
+
+}  // namespace terrace::tiler

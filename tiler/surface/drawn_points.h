@@ -1,0 +1,50 @@
+// Heights as drawn: of the mesh that a client decodes at some level and error.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "proto/gltf/glb_tile.h"
+#include "tiler/encoders.h"
+#include "tiler/requested_error.h"
+#include "tiler/surface/drawn_mesh.h"
+
+namespace terrace::tiler {
+
+struct PointHeights;  // tile_pipeline.h
+
+// The surface to read. The error and the rest are those of a tile's URL.
+struct DrawnSurface {
+  std::optional<int> level;  // nothing: of the first level whose default error is at most the requested one, or of the
+                             // deepest
+  RequestedError requested;
+  TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb
+  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+};
+
+// Points of one request may lie in this many tiles, because each of them may have to be made.
+inline constexpr std::size_t kMaxDrawnTiles = 64;
+
+// Level of the surface. kInvalidArgument: the dataset has no such level.
+Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction);
+
+// The mesh of an available tile.
+using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
+
+// Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
+// available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between
+// two tiles to the eastern and the northern one. `normals`: adds normals. kInvalidArgument: too many tiles.
+Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, std::span<const dem::GeoPosition> points,
+                                     bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
+
+// The tile of a level that contains a point.
+geo::TileKey TileAt(const dem::GeoPosition& point, int level);
+
+}  // namespace terrace::tiler

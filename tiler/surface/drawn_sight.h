@@ -1,0 +1,27 @@
+// Lines of sight over the meshes that clients decode.
+#pragma once
+
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+#include "tiler/surface/drawn_points.h"
+
+namespace terrace::tiler {
+
+// Samples of the finest source that the rays of one request may cross together.
+inline constexpr double kMaxSamplesAlong = 2e8;
+
+// kInvalidArgument, with a message for the client: the rays cross more.
+Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem::SightRay> rays);
+
+// As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:
+// the rays cross more than kMaxDrawnTiles tiles. Other errors: those of `mesh_of`.
+Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const dem::DemSource& source, int level,
+                                                     std::span<const dem::SightRay> rays,
+                                                     const dem::SightOptions& options, const MeshOfTile& mesh_of,
+                                                     const std::stop_token& stop);
+
+}  // namespace terrace::tiler

@@ -1,0 +1,21 @@
+// Normals of the sources' surface at points.
+#pragma once
+
+#include <array>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_source.h"
+
+namespace terrace::tiler {
+
+// Unit vectors east, north, up, one for each point, of heights above the ellipsoid. Central differences over the
+// spacing of the finest source, half of it on each side. Where one side has no height, over the other side; where both
+// have none, or the point has none, NaN. Errors: those of ReadPoints.
+Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& source,
+                                                        std::span<const dem::GeoPosition> points,
+                                                        const std::stop_token& stop);
+
+}  // namespace terrace::tiler
