@@ -292,9 +292,10 @@ std::string WrongTogether(const BakeArguments& arguments) {
                : "give DEMs, or a configuration with --config, not both";
   }
   if (given(arguments.into_cache)) {
-    if (given(arguments.out) || given(arguments.update) || arguments.finish || arguments.form != kChunks ||
-        arguments.no_gzip) {
-      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --finish and --no-gzip";
+    if (given(arguments.out) || given(arguments.update) || given(arguments.queue) || arguments.finish ||
+        arguments.form != kChunks || arguments.no_gzip) {
+      return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --queue, --finish and "
+             "--no-gzip";
     }
     return {};
   }
