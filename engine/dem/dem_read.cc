@@ -328,11 +328,11 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
       if (!filled.empty()) filled[i] = 1;
     }
   };
-  if (impl_->grids.size() == 1) {
+  if (grids.size() == 1) {
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
     std::ranges::fill(marks, std::uint8_t{0});
-    const auto read = impl_->grids.front().FillPoints(points, datum, {heights, {}, smooth}, marks, stop);
+    const auto read = grids.front().FillPoints(points, datum, {heights, {}, smooth}, marks, stop);
     if (!read) return tl::unexpected(read.error());
     take_smooth();
     return heights;

@@ -39,6 +39,13 @@ Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> 
       return MakeError(ErrorCode::kCancelled, "looking along rays was stopped");
     }
     const std::vector<TrackPiece> pieces = PiecesOf(rays[i], options);
+    if (impl_->edits != nullptr && !impl_->edits->Find(BoxAround(pieces)).empty()) {
+      return MakeError(
+          ErrorCode::kInvalidArgument,
+          "ray {}: the dataset's edits change the ground below it, which lines of sight over the sources do "
+          "not see; ask for surface=served",
+          i);
+    }
     const std::vector<std::size_t> order =
         impl_->grids.size() == 1 ? std::vector<std::size_t>{0} : impl_->GridsAt(BoxAround(pieces));
     SightSearch search;

@@ -77,7 +77,7 @@ class DemSource {
 
   // Looks along rays over the surface of ReadPoints, without its rounding; one answer for each ray. Heights of rays are
   // above the ellipsoid. Precondition: finite positions on Earth, rays no longer than kMaxSightLength. Errors: those of
-  // ReadPoints.
+  // ReadPoints; kInvalidArgument: a ray passes above edits, which this surface does not have.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

@@ -122,6 +122,20 @@ TEST_F(TerrainEdits, HolesHaveNoHeight) {
   EXPECT_FALSE(std::isnan(At(*source, 10.3, 50.2)));
 }
 
+TEST_F(TerrainEdits, AreNeverLeftOutOfALineOfSight) {
+  const auto source = Open(Middle(R"({"op":"flatten","height":5000})"));
+  ASSERT_NE(source, nullptr);
+  const auto look = [&](double from, double to) {
+    return source->LookAlong(std::array{SightRay{{from, 50.2, 1000}, {to, 50.2, 1000}}}, {});
+  };
+  const auto above_edit = look(10.1, 10.3), beside = look(10.3, 10.35);
+  ASSERT_FALSE(above_edit.has_value());
+  EXPECT_EQ(above_edit.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_TRUE(above_edit.error().message.find("surface=served") != std::string::npos) << above_edit.error().message;
+  ASSERT_TRUE(beside.has_value());
+  EXPECT_TRUE(beside->front().is_visible);
+}
+
 TEST_F(TerrainEdits, ReplaceTakesTheHeightsOfAnotherFile) {
   RasterSpec other = FlatSquare(10.1, 50.3, 200, 0.001, 42);
   WriteRaster(dir_, other, "other.tif");
