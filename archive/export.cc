@@ -1,8 +1,11 @@
 #include "archive/export.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -59,14 +62,29 @@ class PartialFolder {
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const std::string& partial() const { return partial_; }
+  // The files were written without fsync, one by one it would take as long as the bake. All of them reach the disk
+  // before the folder has its name, and the name before the caller removes what the folder was made from.
   Result<void> Finish() {
+    if (Result<void> synced = Sync(partial_, ::syncfs); !synced) return synced;
     std::error_code error;
     std::filesystem::rename(partial_, path_, error);
     if (error) return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", path_, error.message());
-    return {};
+    const std::string parent = std::filesystem::path(path_).parent_path();
+    return Sync(parent.empty() ? "." : parent, ::fsync);
   }
 
  private:
+  static Result<void> Sync(const std::string& folder, int (*sync)(int)) {
+    const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool is_synced = descriptor >= 0 && sync(descriptor) == 0;
+    const int reason = errno;
+    if (descriptor >= 0) ::close(descriptor);
+    // Some file systems do not allow fsync of folders, and need it not.
+    if (is_synced || (sync == ::fsync && reason == EINVAL)) return {};
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", folder,
+                     std::generic_category().message(reason));
+  }
+
   const std::string path_, partial_;
   std::error_code ignored_;
 };

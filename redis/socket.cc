@@ -65,7 +65,12 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
   }
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
   std::string why = "the host has no address";
-  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+  int left = 0;
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) ++left;
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next, --left) {
+    // An address that does not answer leaves time for the others.
+    const Deadline now = std::chrono::steady_clock::now();
+    const Deadline share = now + (deadline - now) / left;
     const int fd = ::socket(one->ai_family, one->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, one->ai_protocol);
     if (fd < 0) {
       why = WhyOf(errno);
@@ -76,7 +81,7 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
     ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     int error = ::connect(fd, one->ai_addr, one->ai_addrlen) == 0 ? 0 : errno;
     if (error == EINPROGRESS) {
-      if (const auto waited = socket.WaitFor(POLLOUT, deadline); !waited) {
+      if (const auto waited = socket.WaitFor(POLLOUT, share); !waited) {
         why = "does not answer";
         continue;
       }

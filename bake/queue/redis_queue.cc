@@ -250,7 +250,8 @@ std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply
     Send(held, scripts::kBury, {name, options_.worker, "is no unit of this job", std::to_string(deliveries)});
     return std::nullopt;
   }
-  if (deliveries > kMaxAttempts) {
+  // Not a unit in hand: this process was stopped, or Redis was away, for longer than a lease.
+  if (deliveries > kMaxAttempts && (is_finish || !held_.contains(found->second))) {
     Send(held, scripts::kBury, {name, options_.worker, "", std::to_string(deliveries - 1)});
     return std::nullopt;
   }

@@ -282,7 +282,8 @@ MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
   if (impl_->edits == nullptr) return {};
   const geo::Lattice& lattice = impl_->LatticeOf(key.level);
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells + 1, lattice.cells + 1};
-  const auto which = impl_->EditsAt(lattice, window);
+  // With the halo: a line beside the edge passes nodes of the edge, and both neighbours must find it.
+  const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
   if (which.empty()) return {};
   return impl_->edits->DemandsOf(lattice, window, which);
 }

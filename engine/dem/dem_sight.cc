@@ -2,6 +2,7 @@
 // before it have no height.
 #include <algorithm>
 #include <map>
+#include <span>
 #include <utility>
 
 #include "engine/dem/dem_impl.h"
@@ -13,8 +14,8 @@ namespace {
 // Rays between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 64;
 
-// A box in degrees around the pieces of a ray.
-Box BoxAround(const std::vector<TrackPiece>& pieces) {
+// A box in degrees around pieces of a ray.
+Box BoxAround(std::span<const TrackPiece> pieces) {
   Box box{360, 90, -360, -90};
   for (const TrackPiece& piece : pieces) {
     const Quadratic::Range x = piece.longitude.Over(0, 1), y = piece.latitude.Over(0, 1);
@@ -22,6 +23,17 @@ Box BoxAround(const std::vector<TrackPiece>& pieces) {
            std::max(box.north, y.max)};
   }
   return box;
+}
+
+// Whether an edit changes the ground near a ray.
+bool IsEdited(const EditSet& edits, std::span<const TrackPiece> pieces) {
+  for (const TrackPiece& piece : pieces) {
+    for (const std::size_t which : edits.Find(BoxAround({&piece, 1}))) {
+      const Edit& edit = edits.edits()[which];
+      if (edit.changes_heights() || edit.op == EditOp::kHole) return true;
+    }
+  }
+  return false;
 }
 
 }  // namespace
@@ -39,7 +51,7 @@ Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> 
       return MakeError(ErrorCode::kCancelled, "looking along rays was stopped");
     }
     const std::vector<TrackPiece> pieces = PiecesOf(rays[i], options);
-    if (impl_->edits != nullptr && !impl_->edits->Find(BoxAround(pieces)).empty()) {
+    if (impl_->edits != nullptr && IsEdited(*impl_->edits, pieces)) {
       return MakeError(
           ErrorCode::kInvalidArgument,
           "ray {}: the dataset's edits change the ground below it, which lines of sight over the sources do "

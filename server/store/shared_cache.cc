@@ -41,7 +41,10 @@ class SharedCache final : public tiler::TileStore {
         tier_(std::move(options)) {}
 
   const char* name() const override { return "shared"; }
-  void Abandon() override { tier_.Abandon(); }
+  void Abandon() override {
+    is_abandoned_ = true;
+    tier_.Abandon();
+  }
 
   tiler::StoreStats stats() const override {
     tiler::StoreStats stats = tier_.stats();
@@ -93,6 +96,10 @@ class SharedCache final : public tiler::TileStore {
     if (!leased.empty()) tier_.Release(leased);  // after the value
   }
 
+  void GiveUp(const tiler::CacheKey& key) override {
+    if (lease_.count() > 0) tier_.Release(Prefix() + tiler::RecordKey(key));
+  }
+
   // Of the value in addition to the tile's bytes.
   static constexpr std::size_t kRecordBytes = 512;
 
@@ -120,7 +127,7 @@ class SharedCache final : public tiler::TileStore {
         if (tile) tier_.Release(record_key);
         return tile;
       }
-      if (std::chrono::steady_clock::now() + pause >= end) return std::nullopt;
+      if (is_abandoned_ || std::chrono::steady_clock::now() + pause >= end) return std::nullopt;
       std::this_thread::sleep_for(pause);
       pause = std::min(2 * pause, milliseconds(20));
       if (std::optional<tiler::EncodedTile> tile = Read(record_key)) return tile;
@@ -132,6 +139,7 @@ class SharedCache final : public tiler::TileStore {
   const milliseconds lease_;
   LookUpGate gate_;
   std::atomic<std::uint64_t> not_asked_{0};
+  std::atomic<bool> is_abandoned_{false};
   SharedTier tier_;
 };
 

@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "tiler/store/tile_record.h"
@@ -16,6 +18,8 @@ constexpr milliseconds kWriteTimeout{1'000}, kLastWrites{500};
 constexpr milliseconds kReportAgain{60'000};
 constexpr std::size_t kBatchBytes = std::size_t{1} << 20, kBatchValues = 64;
 constexpr std::size_t kChecksumBytes = 8;
+constexpr std::size_t kScanReplyBytes = std::size_t{64} << 20;  // names of keys: COUNT of SCAN is only a hint
+constexpr std::array<std::string_view, 3> kRefusesWrites = {"OOM", "READONLY", "MISCONF"};
 
 bool IsTimeout(const Error& error) { return error.message.find("in time") != std::string::npos; }
 
@@ -53,12 +57,12 @@ void SharedTier::Abandon() {
   queued_bytes_ = 0;
 }
 
-Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout) const {
+Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout, std::size_t max_reply_bytes) const {
   redis::ConnectionOptions options;
   options.connect_timeout = kWriteTimeout;
   options.command_timeout = command_timeout;
   options.ca_file = options_.ca_file;
-  options.max_reply_bytes = options_.max_value_bytes + 4096;
+  options.max_reply_bytes = max_reply_bytes;
   return redis::Connection::Open(options_.address, options);
 }
 
@@ -119,6 +123,13 @@ std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
     return std::nullopt;
   }
   redis::Reply reply = std::move(replies->front());
+  // A lease that Redis does not write: it is full, a copy, or cannot save. Values can still be read.
+  if (reply.is_error() &&
+      std::ranges::any_of(kRefusesWrites, [&](std::string_view why) { return reply.text().starts_with(why); })) {
+    RefuseWrites(connection->Refusal(command.front(), reply).message);
+    GiveBack(std::move(connection), epoch);
+    return std::nullopt;
+  }
   // Something of another type at the key is a value that is wrong. After any other refusal Redis is of no use.
   if (reply.is_error() && !reply.text().starts_with("WRONGTYPE")) {
     SwitchOff(connection->Refusal(command.front(), reply).message, /*is_timeout=*/false);
@@ -182,7 +193,8 @@ Result<std::size_t> SharedTier::Erase(const std::string& prefix,
                                       const std::stop_token& stop) {
   std::size_t erased = 0;
   {
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return !is_writing_; });  // a batch on its way would be written after the scan
     std::erase_if(queue_, [&](const Job& job) {
       if (!job.value || !job.key.starts_with(prefix) || !is_chosen(job.key)) return false;
       queued_bytes_ -= job.charge;
@@ -190,7 +202,7 @@ Result<std::size_t> SharedTier::Erase(const std::string& prefix,
       return true;
     });
   }
-  const Result<ConnectionPtr> connection = Open(kWriteTimeout);
+  const Result<ConnectionPtr> connection = Open(kWriteTimeout, kScanReplyBytes);
   if (!connection) return tl::unexpected(connection.error());
   std::string cursor = "0";
   do {
@@ -221,7 +233,7 @@ void SharedTier::Run() {
       if (end == Clock::time_point::max()) end = Clock::now() + kLastWrites;
       if (!on_ || queue_.empty() || write_at_ >= end || Clock::now() >= end) break;
     }
-    const bool connects = open_ < options_.readers && Clock::now() >= retry_at_;
+    const bool connects = !stop_ && open_ < options_.readers && Clock::now() >= retry_at_;
     const bool writes = on_ && !queue_.empty() && Clock::now() >= write_at_;
     if (!connects && !writes) {
       Clock::time_point next = Clock::now() + kReportAgain;
@@ -230,10 +242,12 @@ void SharedTier::Run() {
       changed_.wait_until(lock, std::min(next, end));
       continue;
     }
+    is_writing_ = writes;
     lock.unlock();
     if (connects) Connect();
     if (writes) Write();
     lock.lock();
+    if (std::exchange(is_writing_, false)) changed_.notify_all();
   }
   dropped_ += queue_.size();
 }
@@ -245,7 +259,7 @@ void SharedTier::Connect() {
     const std::lock_guard lock(mutex_);
     epoch = epoch_;
   }
-  Result<ConnectionPtr> connection = Open(options_.timeout);
+  Result<ConnectionPtr> connection = Open(options_.timeout, MaxReply());
   Result<redis::Reply> pong = connection ? (*connection)->Call({"PING"}) : tl::unexpected(connection.error());
   const std::lock_guard lock(mutex_);
   if (!pong) {
@@ -257,8 +271,11 @@ void SharedTier::Connect() {
   if (!on_) {
     on_ = true;
     writer_ = nullptr;  // of the time before
-    spdlog::info("shared cache: {} answers", options_.address.Text());
-    reported_.clear();
+    const auto now = Clock::now();
+    if (answered_at_ == Clock::time_point{} || now - answered_at_ >= kReportAgain) {
+      spdlog::info("shared cache: {} answers", options_.address.Text());
+      answered_at_ = now;
+    }
   }
   ++open_;
   idle_.push_back(*std::move(connection));
@@ -285,7 +302,7 @@ void SharedTier::Write() {
   const auto values =
       static_cast<std::uint64_t>(std::ranges::count_if(jobs, [](const Job& job) { return !!job.value; }));
   if (!writer_ || !writer_->is_open()) {
-    Result<ConnectionPtr> opened = Open(kWriteTimeout);
+    Result<ConnectionPtr> opened = Open(kWriteTimeout, MaxReply());
     if (!opened) {
       dropped_ += values;
       return SwitchOff(opened.error().message, IsTimeout(opened.error()));

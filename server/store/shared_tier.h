@@ -82,7 +82,8 @@ class SharedTier {
     std::size_t charge = 0;
   };
 
-  Result<ConnectionPtr> Open(std::chrono::milliseconds command_timeout) const;
+  Result<ConnectionPtr> Open(std::chrono::milliseconds command_timeout, std::size_t max_reply_bytes) const;
+  std::size_t MaxReply() const { return options_.max_value_bytes + 4096; }
   // A command that a caller waits for. Nothing: the store is or was just switched off.
   std::optional<redis::Reply> Ask(const redis::Command& command);
   ConnectionPtr Borrow(std::uint64_t& epoch);
@@ -108,8 +109,9 @@ class SharedTier {
   std::list<Job> queue_;
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;
+  bool is_writing_ = false;  // the store's thread has a batch
   std::string reported_;  // the last reason in the log, and when
-  Clock::time_point reported_at_;
+  Clock::time_point reported_at_, answered_at_;  // when the log said so
 
   ConnectionPtr writer_;  // of the store's thread
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0}, damaged_{0}, written_{0}, dropped_{0};

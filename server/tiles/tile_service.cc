@@ -107,6 +107,7 @@ Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const t
     cache_.Insert(key, *tile);
     for (const auto& store : stores_) store->Insert(key, *tile);
   } else {
+    for (const auto& store : stores_) store->GiveUp(key);
     tile = tl::unexpected(std::move(built.error()));
   }
   if (observer_) observer_(catalog.datasets[request.dataset], tile);
@@ -144,14 +145,14 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
                                    [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_of); });
 }
 
-// Memory last: what is found in a slower tier meanwhile goes there.
+// The slowest tier first and memory last: what is found in a tier meanwhile goes into those above it.
 Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection, const std::stop_token& stop) {
   Erased erased;
   Result<void> done;
-  for (const auto& store : stores_) {
-    Result<std::size_t> of_store = store->Erase(selection, stop);
+  for (auto store = stores_.rbegin(); store != stores_.rend(); ++store) {
+    Result<std::size_t> of_store = (*store)->Erase(selection, stop);
     if (of_store) {
-      erased.stores.emplace_back(store->name(), *of_store);
+      erased.stores.emplace_back((*store)->name(), *of_store);
     } else {
       done = tl::unexpected(std::move(of_store.error()));
     }

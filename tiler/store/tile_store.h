@@ -82,6 +82,9 @@ class Store : public StoreBase {
 
   // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
+
+  // The value that Find did not find is not inserted: its build failed or was cancelled.
+  virtual void GiveUp(const Key&) {}
 };
 
 using TileStore = Store<CacheKey, EncodedTile>;

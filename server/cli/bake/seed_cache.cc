@@ -26,12 +26,19 @@ using tiler::CacheKey;
 
 // What one seeding knows of its cache.
 struct Seed {
+  explicit Seed(const tiler::Dataset& seeded) : dataset(seeded) {}
+
+  const tiler::Dataset& dataset;
   std::shared_ptr<tiler::TileStore> store;
   std::size_t capacity_bytes = 0;
   std::atomic<std::uint64_t> bytes{0};  // in the cache, about
   std::stop_source stop;                // also: the cache is full
 
   // The cache deletes its oldest records when it is full, and a file of them at a time.
+  // As the server asks for the tile.
+  CacheKey KeyOf(const tiler::TileRequest& request) const {
+    return {request, dataset.cache_generation(), tiler::TileEdits(*dataset.source, request)};
+  }
   bool is_full() const { return bytes >= capacity_bytes - capacity_bytes / 8; }
 };
 
@@ -51,8 +58,7 @@ class SeedWriter final : public archive::TileWriter {
     seed_.bytes += tile.bytes.size() + kRecordOverheadBytes;
     ++summary_.tiles;
     summary_.bytes += tile.bytes.size();
-    seed_.store->Insert(CacheKey{bake::RequestOf(manifest_, key), manifest_.dataset.generation},
-                        std::make_shared<const tiler::EncodedTile>(tile));
+    seed_.store->Insert(seed_.KeyOf(bake::RequestOf(manifest_, key)), std::make_shared<const tiler::EncodedTile>(tile));
     return {};
   }
 
@@ -123,7 +129,7 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
     return cli::Fail(fmt::format("--into-cache: {}; a server must not run meanwhile", cache.error().message),
                      kExitUsage);
   }
-  Seed seed;
+  Seed seed(pipeline.datasets().front());
   seed.store = cache->tiles;
   seed.capacity_bytes = limits.tile_bytes;
   seed.bytes = seed.store->stats().bytes;
@@ -134,8 +140,8 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
     target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::TileWriter>> {
       return std::make_unique<SeedWriter>(seed, manifest);
     };
-    target.has = [&seed, generation = target.manifest.dataset.generation](const tiler::TileRequest& request) {
-      return seed.store->Find({request, generation}).has_value();
+    target.has = [&seed](const tiler::TileRequest& request) {
+      return seed.store->Find(seed.KeyOf(request)).has_value();
     };
   }
   const std::stop_callback stop(signals.token(), [&seed] { seed.stop.request_stop(); });
