@@ -26,13 +26,19 @@ class SeedCache(unittest.TestCase):
         cls.addClassCleanup(scratch.cleanup)
         cls.scratch = pathlib.Path(scratch.name)
         write_hgt(cls.scratch / "N46E007.hgt")
+        # Keys of tiles that an edit touches differ from those of the others.
+        ring = [[7.4, 46.4], [7.5, 46.4], [7.5, 46.5], [7.4, 46.5], [7.4, 46.4]]
+        feature = {"type": "Feature", "properties": {"terrain": {"op": "offset", "metres": 100}},
+                   "geometry": {"type": "Polygon", "coordinates": [ring]}}
+        (cls.scratch / "edits.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
 
     def config(self, name, **disk_cache):
         """A configuration with a disk cache in the folder `name`, and that folder."""
         cache = self.scratch / self.id().rpartition(".")[2] / name
         path = cache.with_suffix(".json")
         path.parent.mkdir(exist_ok=True)
-        dataset = {"name": "cell", "sources": [str(self.scratch / "N46E007.hgt")], "vertical": "ellipsoid"}
+        dataset = {"name": "cell", "sources": [str(self.scratch / "N46E007.hgt")], "vertical": "ellipsoid",
+                   "edits": [str(self.scratch / "edits.geojson")]}
         config = {"datasets": [dataset], "cache_dir": str(self.scratch / "statistics")}
         if disk_cache is not None:
             config["disk_cache"] = {"directory": str(cache), **disk_cache}
@@ -127,7 +133,9 @@ class SeedCache(unittest.TestCase):
         config, cache = self.config("cache", tile_bytes=16 << 20)
         noise = self.scratch / "N10E010.hgt"  # of which tiles are large
         noise.write_bytes(bytes(byte & 7 if i % 2 == 0 else byte for i, byte in enumerate(random.Random(28).randbytes(2 * 1201 * 1201))))
-        config.write_text(config.read_text().replace("N46E007", noise.stem))
+        changed = json.loads(config.read_text().replace("N46E007", noise.stem))
+        del changed["datasets"][0]["edits"]  # they are elsewhere
+        config.write_text(json.dumps(changed))
         full = self.seed(config, cache, "--error", "1", levels=11)
         self.assertEqual(full.returncode, 1, full.stderr)
         self.assertIn("raise disk_cache.tile_bytes", full.stderr)

@@ -46,6 +46,13 @@ std::string Line() {
   return fmt::format(R"({{"type":"LineString","coordinates":[{},{},{}]}})", Position(-0.015, -0.003, 280),
                      Position(0.001, 0.002, 300), Position(0.014, 0.0005, 320));
 }
+// 0.3 cells of levels 11 and 12 beside the edges that meet in the middle: the nearest nodes are those of the edges, and
+// the tiles on the other side contain no part of the line.
+std::string BesideEdges() {
+  constexpr double kEast = 1090 * 180.0 / 2048 - 180 + 0.0001, kNorth = 1437 * 180.0 / 2048 - 90 + 0.00005;
+  return fmt::format(R"({{"type":"LineString","coordinates":[[{0:.8f},{1:.8f}],[{0:.8f},{2:.8f}],[{3:.8f},{2:.8f}]]}})",
+                     kEast, kNorth - 0.03, kNorth, kEast + 0.03);
+}
 std::string Feature(const std::string& terrain, const std::string& geometry) {
   return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{}}},"geometry":{}}})", terrain, geometry);
 }
@@ -61,6 +68,7 @@ const std::map<std::string, std::string>& Kinds() {
       {"precision", Feature(R"({"op":"precision","error_m":1,"blend_m":300})", Polygon())},
       {"factor", Feature(R"({"op":"precision","factor":0.1,"width_m":200,"blend_m":300})", Line())},
       {"breakline", Feature(R"({"op":"breakline"})", Line())},
+      {"line beside edges", Feature(R"({"op":"breakline"})", BesideEdges())},
       {"hole", Feature(R"({"op":"hole"})", Polygon())}};
   return kinds;
 }
