@@ -128,6 +128,7 @@ Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_tok
   for (const tin::SamplePosition& vertex : meshed->tin.vertices)
     drawn.places.push_back({vertex.x / cells, vertex.y / cells});
   drawn.positions = std::move(meshed->positions);
+  drawn.in_hole = TrianglesInHoles(*input.dataset.source, input.request.key, meshed->tin);
   drawn.triangles = std::move(meshed->tin.triangles);
   return drawn;
 }

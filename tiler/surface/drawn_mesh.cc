@@ -28,20 +28,24 @@ struct DrawnMesh::Meeting {
 };
 
 DrawnMesh::DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles)
-    : key_(key), positions_(std::move(triangles.positions)), triangles_(std::move(triangles.triangles)) {
+    : key_(key),
+      positions_(std::move(triangles.positions)),
+      triangles_(std::move(triangles.triangles)),
+      in_hole_(std::move(triangles.in_hole)) {
   if (!positions_.empty()) origin_ = positions_.front();
   for (geo::Vec3& position : positions_) position = position - origin_;
   FillBuckets(triangles.places);
 }
 
 std::size_t DrawnMesh::bytes() const {
-  return positions_.size() * sizeof(positions_[0]) + triangles_.size() * sizeof(triangles_[0]) +
+  return positions_.size() * sizeof(positions_[0]) + triangles_.size() * sizeof(triangles_[0]) + in_hole_.size() +
          (bucket_starts_.size() + bucket_triangles_.size()) * sizeof(std::uint32_t);
 }
 
 // Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are no straight lines in
-// degrees, so boxes grow by the distance of a chord from the straight line. Where that is not enough, At searches all
-// triangles.
+// degrees, so boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds
+// nothing. Boxes of triangles of shallow levels and near the poles cover many buckets; then buckets are larger, so that
+// their memory stays proportional to that of the triangles.
 void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   constexpr int kMaxSide = 256;
   side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(triangles_.size()))), 1, kMaxSide);
@@ -60,6 +64,15 @@ void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
     const double grown = 1e-6 + std::min(1.0, width * side * (width + height * slope) / 4);
     return Buckets{bucket(west - grown), bucket(south - grown), bucket(east + grown), bucket(north + grown)};
   };
+  const auto entries = [&] {
+    std::size_t count = 0;
+    for (const std::array<std::uint32_t, 3>& triangle : triangles_) {
+      const Buckets at = buckets_of(triangle);
+      count += static_cast<std::size_t>(at.east - at.west + 1) * static_cast<std::size_t>(at.north - at.south + 1);
+    }
+    return count;
+  };
+  while (side_ > 1 && entries() > 16 * triangles_.size() + 4096) side_ /= 2;
   const auto for_buckets = [&](const auto& visit) {
     for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
       const Buckets at = buckets_of(triangles_[t]);
@@ -137,20 +150,24 @@ void DrawnMesh::Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& bes
 }
 
 DrawnPoint DrawnMesh::PointOf(const Meeting& met) const {
+  const bool is_beside = met.inside < -kSlack;
+  if (IsInHole(met.triangle)) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    return {kNone, {kNone, kNone, kNone}, is_beside};
+  }
   const auto& [a, b, c] = triangles_[met.triangle];
-  return {met.height_m, geo::Normalized(geo::Cross(positions_[b] - positions_[a], positions_[c] - positions_[a]))};
+  return {met.height_m, geo::Normalized(geo::Cross(positions_[b] - positions_[a], positions_[c] - positions_[a])),
+          is_beside};
 }
 
-std::optional<DrawnPoint> DrawnMesh::At(const dem::GeoPosition& point) const {
+std::optional<DrawnPoint> DrawnMesh::AtBucket(const dem::GeoPosition& point) const {
   const PlumbLine line = LineAt(point);
   Meeting best;
   for (const std::uint32_t triangle : BucketAt(point).triangles) Meet(line, triangle, best);
-  for (std::uint32_t t = 0; t < triangles_.size() && best.inside < -kSlack; ++t) Meet(line, t, best);
   return best.inside < -kSlack ? std::nullopt : std::optional(PointOf(best));
 }
 
 DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
-  if (const std::optional<DrawnPoint> met = At(point)) return *met;
   const PlumbLine line = LineAt(point);
   Meeting best;
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) Meet(line, t, best);

@@ -20,11 +20,13 @@ struct DrawnTriangles {
   std::vector<geo::Vec3> positions;           // ECEF metres
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
+  std::vector<std::uint8_t> in_hole;  // whether clients do not draw a triangle, for each triangle; empty: they draw all
 };
 
 struct DrawnPoint {
-  double height_m = 0;  // above the ellipsoid, along the plumb line
-  geo::Vec3 normal;     // of the triangle: unit, ECEF, upwards
+  double height_m = 0;     // above the ellipsoid, along the plumb line; NaN in a hole
+  geo::Vec3 normal;        // of the triangle: unit, ECEF, upwards; NaN in a hole
+  bool is_beside = false;  // the plumb line meets no triangle
 };
 
 // Immutable and thread-safe.
@@ -32,11 +34,13 @@ class DrawnMesh {
  public:
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
-  // Where the plumb line through a position meets the mesh; nothing if it passes beside it. The edge of a tile is a
-  // parallel, and the triangles end at chords of it: in the north a tile reaches beyond its northern edge and not to
-  // all of its southern one. Where it meets several triangles, the one that it meets farthest inside counts.
-  std::optional<DrawnPoint> At(const dem::GeoPosition& point) const;
-  // The same on the plane of the nearest triangle, also beside the mesh.
+  // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
+  // is rare except near the tile's edge. Where it meets several triangles, the one that it meets farthest inside
+  // counts.
+  std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
+  // The same among all triangles, in time proportional to their number; beside the mesh on the plane of the nearest
+  // triangle. The edge of a tile is a parallel, and the triangles end at chords of it: in the north a tile reaches
+  // beyond its northern edge and not to all of its southern one.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.
@@ -52,6 +56,8 @@ class DrawnMesh {
     double height_m;               // above the ellipsoid
   };
   std::optional<Crossing> CrossingOf(std::uint32_t triangle, const dem::GeoPosition& point) const;
+
+  bool IsInHole(std::uint32_t triangle) const { return !in_hole_.empty() && in_hole_[triangle] != 0; }
 
   const geo::TileKey& key() const { return key_; }
   std::size_t bytes() const;
@@ -70,6 +76,7 @@ class DrawnMesh {
   geo::Vec3 origin_;
   std::vector<geo::Vec3> positions_;  // from the origin
   std::vector<std::array<std::uint32_t, 3>> triangles_;
+  std::vector<std::uint8_t> in_hole_;         // as in DrawnTriangles
   int side_ = 1;                              // buckets along an edge
   std::vector<std::uint32_t> bucket_starts_;  // side * side + 1
   std::vector<std::uint32_t> bucket_triangles_;

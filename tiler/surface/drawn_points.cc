@@ -104,16 +104,21 @@ Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, st
     if (i % kStopPeriod == 0 && stop.stop_requested()) return Stopped();
     const std::uint32_t own = read.tile_of_point[i];
     if (const Result<void> ready = made(own); !ready) return tl::unexpected(ready.error());
-    std::optional<DrawnPoint> drawn = meshes[own]->At(points[i]);
-    if (const auto key = drawn ? std::nullopt : NeighbourOf(source, read.tiles[own], points[i])) {
-      // One more than the limit is no fault of the client's points.
-      const bool is_room = numbers.contains(*key) || read.tiles.size() < kMaxDrawnTiles;
-      const Result<std::uint32_t> other = is_room ? number_of(*key) : Result<std::uint32_t>(own);
-      if (const Result<void> ready = made(*other); !ready) return tl::unexpected(ready.error());
-      drawn = meshes[*other]->At(points[i]);
-      if (drawn) read.tile_of_point[i] = *other;
+    std::optional<DrawnPoint> drawn = meshes[own]->AtBucket(points[i]);
+    if (!drawn) {
+      // All triangles are examined.
+      if (stop.stop_requested()) return Stopped();
+      drawn = meshes[own]->Nearest(points[i]);
     }
-    if (!drawn) drawn = meshes[own]->Nearest(points[i]);
+    const auto key = drawn->is_beside ? NeighbourOf(source, read.tiles[own], points[i]) : std::nullopt;
+    // One more than the limit is no fault of the client's points.
+    if (key && (numbers.contains(*key) || read.tiles.size() < kMaxDrawnTiles)) {
+      const Result<std::uint32_t> other = number_of(*key);
+      if (const Result<void> ready = made(*other); !ready) return tl::unexpected(ready.error());
+      std::optional<DrawnPoint> beyond = meshes[*other]->AtBucket(points[i]);
+      if (!beyond) beyond = meshes[*other]->Nearest(points[i]);
+      if (!beyond->is_beside) drawn = beyond, read.tile_of_point[i] = *other;
+    }
     read.heights[i] = static_cast<float>(drawn->height_m);
     if (normals) read.normals[i] = EastNorthUp(drawn->normal, points[i]);
   }

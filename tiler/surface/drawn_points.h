@@ -40,7 +40,8 @@ using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const 
 
 // Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
 // available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between
-// two tiles to the eastern and the northern one. `normals`: adds normals. kInvalidArgument: too many tiles.
+// two tiles to the eastern and the northern one. In holes heights and normals are NaN. `normals`: adds normals.
+// kInvalidArgument: too many tiles.
 Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
 

@@ -59,8 +59,11 @@ class Clearances {
       return;
     }
   }
+  // A part of the ray is above a hole.
+  void AddGap() { has_gaps_ = true; }
   dem::SightAnswer Answer() const {
     dem::SightAnswer answer;
+    answer.has_gaps = has_gaps_;
     if (std::isinf(least_)) return answer;
     answer.clearance_m = least_, answer.clearance_at = at_;
     answer.is_visible = std::isinf(blocked_at_);
@@ -71,6 +74,7 @@ class Clearances {
  private:
   double least_ = std::numeric_limits<double>::infinity(), at_ = 0;
   double blocked_at_ = std::numeric_limits<double>::infinity();
+  bool has_gaps_ = false;
 };
 
 class Walk {
@@ -163,6 +167,10 @@ class Walk {
       }
       if (from > to) continue;
       is_met |= from <= 0.5 && to >= 0.5;
+      if (mesh.IsInHole(triangle)) {
+        clearances.AddGap();
+        continue;
+      }
       const Along over{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
                        points[2].height_m - last->height_m};
       clearances.Add(over, from, to, start, length);
@@ -170,6 +178,7 @@ class Walk {
     if (is_met) return;
     // Beside the tile's edge, within the distance of a chord from its parallel.
     const double clearance_m = points[1].height_m - mesh.Nearest(position(1)).height_m;
+    if (std::isnan(clearance_m)) return clearances.AddGap();
     clearances.Add({clearance_m, clearance_m, clearance_m}, 0, 1, start, length);
   }
 

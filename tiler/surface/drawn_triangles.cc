@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/tile_pipeline.h"
 
@@ -25,6 +26,7 @@ Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std
     drawn.places.push_back({u, v});
   }
   drawn.triangles = std::move(meshed->tile.triangles);
+  drawn.in_hole = TrianglesInHoles(*input.dataset.source, key, meshed->mesh);
   return drawn;
 }
 

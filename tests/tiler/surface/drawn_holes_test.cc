@@ -1,0 +1,119 @@
+// Heights, normals and lines of sight of the drawn surface where clients draw nothing.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <utility>
+#include <vector>
+
+#include "engine/geo/ellipsoid.h"
+#include "tests/support/scratch_directory.h"
+#include "tests/support/source_dir.h"
+#include "tiler/surface/drawn_mesh.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::tiler {
+namespace {
+
+// In the middle of config/samples/jacksboro.tif.
+constexpr double kLongitude = -84.1985, kLatitude = 36.2992;
+constexpr int kLevel = 12;  // tiles of 0.044 degrees
+
+// A dataset with a square hole of two times `reach` degrees; 0: without a hole.
+TilePipeline OpenWithHole(double reach) {
+  const test_support::ScratchDirectory dir;
+  dem::DemOptions options;
+  if (reach > 0) {
+    const std::string path = dir.path() / "hole.geojson";
+    const double west = kLongitude - reach, east = kLongitude + reach;
+    const double south = kLatitude - reach, north = kLatitude + reach;
+    std::ofstream(path) << fmt::format(
+        R"({{"type":"FeatureCollection","features":[{{"type":"Feature","properties":{{"terrain":{{"op":"hole"}}}},
+        "geometry":{{"type":"Polygon","coordinates":[[[{0},{1}],[{2},{1}],[{2},{3}],[{0},{3}],[{0},{1}]]]}}}}]}})",
+        west, south, east, north);
+    options.edits = {path};
+  }
+  auto source = dem::DemSource::Open((test_support::SourceDir() / "config/samples/jacksboro.tif").string(), options);
+  EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
+  Dataset dataset;
+  dataset.name = "holed";
+  dataset.source = *std::move(source);
+  dataset.generation = dataset.source->fingerprint();
+  dataset.unedited_generation = dataset.source->unedited_fingerprint();
+  std::vector<Dataset> datasets;
+  datasets.push_back(std::move(dataset));
+  return TilePipeline(std::move(datasets));
+}
+
+DrawnSurface SurfaceOf(TileFormat format) { return {kLevel, {}, format, proto::GlbCompression::kDraco}; }
+
+constexpr std::array kFormats = {TileFormat::kQuantizedMesh, TileFormat::kGlb};
+
+TEST(DrawnHoles, HaveNeitherHeightsNorNormals) {
+  const TilePipeline plain = OpenWithHole(0), holed = OpenWithHole(0.012), wide = OpenWithHole(0.1);
+  const double inside = 0.009, outside = 0.015;
+  const std::array points = {
+      dem::GeoPosition{kLongitude, kLatitude}, dem::GeoPosition{kLongitude - inside, kLatitude + inside},
+      dem::GeoPosition{kLongitude + outside, kLatitude}, dem::GeoPosition{kLongitude, kLatitude - outside}};
+  for (const TileFormat format : kFormats) {
+    const auto whole = plain.ReadDrawnPoints(0, SurfaceOf(format), points, /*normals=*/true, {});
+    const auto cut = holed.ReadDrawnPoints(0, SurfaceOf(format), points, /*normals=*/true, {});
+    const auto none = wide.ReadDrawnPoints(0, SurfaceOf(format), points, /*normals=*/true, {});
+    ASSERT_TRUE(whole && cut && none);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const bool in_hole = i < 2;
+      EXPECT_FALSE(std::isnan(whole->heights[i])) << i;
+      EXPECT_EQ(std::isnan(cut->heights[i]), in_hole) << i;
+      // Within the errors of both.
+      EXPECT_TRUE(in_hole || std::abs(cut->heights[i] - whole->heights[i]) < 40) << i;
+      // Tiles that are wholly in the hole.
+      EXPECT_TRUE(std::isnan(none->heights[i])) << i;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(std::isnan(cut->normals[i][axis]), in_hole) << i;
+        EXPECT_TRUE(std::isnan(none->normals[i][axis])) << i;
+      }
+    }
+  }
+}
+
+TEST(DrawnHoles, BlockNoRay) {
+  const TilePipeline plain = OpenWithHole(0), holed = OpenWithHole(0.012), wide = OpenWithHole(0.1);
+  // Straight down through the hole, and below the ground from hole to ground.
+  const std::array rays = {dem::SightRay{{kLongitude - 0.002, kLatitude, 2000}, {kLongitude + 0.002, kLatitude, -2000}},
+                           dem::SightRay{{kLongitude, kLatitude, -100}, {kLongitude + 0.018, kLatitude, -100}}};
+  for (const TileFormat format : kFormats) {
+    const auto whole = plain.LookAlong(0, SurfaceOf(format), rays, {}, {});
+    const auto cut = holed.LookAlong(0, SurfaceOf(format), rays, {}, {});
+    const auto none = wide.LookAlong(0, SurfaceOf(format), rays, {}, {});
+    ASSERT_TRUE(whole && cut && none) << (cut ? "" : cut.error().message);
+    for (std::size_t i = 0; i < rays.size(); ++i) {
+      EXPECT_FALSE((*whole)[i].is_visible || (*whole)[i].has_gaps) << i;
+      EXPECT_TRUE((*cut)[i].has_gaps && (*none)[i].has_gaps) << i;
+      EXPECT_TRUE((*none)[i].is_visible && std::isnan((*none)[i].clearance_m)) << i;
+    }
+    EXPECT_TRUE((*cut)[0].is_visible && std::isnan((*cut)[0].clearance_m));
+    ASSERT_TRUE((*cut)[1].blocked_at.has_value());
+    EXPECT_NEAR(*(*cut)[1].blocked_at, 0.012 / 0.018, 0.06);  // the outline follows the lattice
+  }
+}
+
+// Triangles of a whole hemisphere, each of which lies in every bucket.
+TEST(DrawnMesh, KeepsBucketsSmall) {
+  DrawnTriangles drawn;
+  constexpr std::uint32_t kTriangles = 20000;
+  const auto add = [&](double u, double v) {
+    drawn.positions.push_back(geo::ToEcef(-180 + 180 * u, -90 + 180 * v, 0));
+    drawn.places.push_back({u, v});
+  };
+  for (std::uint32_t t = 0; t < kTriangles; ++t) {
+    add(0, 0.1), add(1, 0.1), add(0.5, 0.9);
+    drawn.triangles.push_back({3 * t, 3 * t + 1, 3 * t + 2});
+  }
+  const DrawnMesh mesh({0, 0, 0}, std::move(drawn));
+  EXPECT_LT(mesh.bytes(), kTriangles * 200u);
+}
+
+}  // namespace
+}  // namespace terrace::tiler
