@@ -64,11 +64,6 @@ std::optional<double> FlatHeightOf(FlatHeight kind, std::vector<float> heights) 
   return static_cast<double>(heights[heights.size() / 2]);
 }
 
-std::uint64_t MemoKey(const geo::TileKey& key) {
-  return static_cast<std::uint64_t>(key.level) << 58 ^ static_cast<std::uint64_t>(key.x) << 29 ^
-         static_cast<std::uint64_t>(key.y);
-}
-
 }  // namespace
 
 // Faults are collected: of files, of features, and of features and the sources together.
@@ -158,7 +153,10 @@ Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWi
                                          std::span<const std::size_t> which, std::span<float> heights,
                                          const std::stop_token& stop, double* error_m) const {
   // Of a replacement: heights before other edits, so that its voids show what is below.
-  const auto replaced = [&](const Edit& edit) -> Result<ReplacedHeights> {
+  // Features that share a source share them.
+  std::map<std::size_t, ReplacedHeights> known;
+  const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
+    if (const auto found = known.find(edit.replacement); found != known.end()) return &found->second;
     const Impl& other = *replacements[edit.replacement]->impl_;
     std::vector<PartTrace> traces;
     auto read = other.ReadGrids(node_grid, window, HeightDatum::kEllipsoid, edit.source, stop,
@@ -176,9 +174,9 @@ Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWi
         result.error_m = *bound;
       }
     }
-    return result;
+    return &known.emplace(edit.replacement, std::move(result)).first->second;
   };
-  return edits->Apply(node_grid, window, which, heights, replaced, error_m);
+  return edits->Apply(node_grid, window, which, heights, replaced, stop, error_m);
 }
 
 template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
@@ -222,7 +220,9 @@ Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, He
                                          std::span<float> heights, const std::stop_token& stop) const {
   std::vector<std::size_t> edited;
   std::vector<std::vector<std::size_t>> which;
+  const auto is_stopped = [&](std::size_t point) { return point % 64 == 0 && stop.stop_requested(); };
   for (std::size_t i = 0; i < points.size(); ++i) {
+    if (is_stopped(i)) return MakeError(ErrorCode::kCancelled, "stopped");
     const double x = std::remainder(points[i].longitude, 360.0), y = points[i].latitude;
     if (auto found = edits->Find({x, y, x, y}); !found.empty()) {
       edited.push_back(i);
@@ -248,11 +248,14 @@ Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, He
       others[edit.replacement] = *std::move(read);
     }
   }
+  EditRows rows;
   for (std::size_t k = 0; k < at.size(); ++k) {
+    if (is_stopped(k)) return MakeError(ErrorCode::kCancelled, "stopped");
     float& height = heights[edited[k]];
     const double before = static_cast<double>(above.empty() ? height : above[k]);
     const double after = edits->ApplyAt(
-        at[k], which[k], before, [&](const Edit& edit) { return static_cast<double>((*others[edit.replacement])[k]); });
+        at[k], which[k], before, [&](const Edit& edit) { return static_cast<double>((*others[edit.replacement])[k]); },
+        rows);
     if (above.empty()) {
       height = static_cast<float>(after);
     } else if (!(after == before)) {
@@ -297,11 +300,28 @@ std::uint64_t DemSource::EditsOf(const geo::TileKey& key) const {
 
 std::uint64_t DemSource::EditsOfMercator(int depth, const NodeWindow& window) const {
   if (impl_->edits == nullptr) return 0;
-  const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window);
-  if (which.empty()) return 0;
+  const geo::MercatorGrid grid{depth};
+  if (!impl_->edits->Any(BoxOf(grid, window))) return 0;
+  const Impl::HashKey memo_key = {depth, window.column, window.row, window.columns, window.rows};
+  if (const auto known = impl_->KnownHash(memo_key)) return *known;
   ContentHasher hasher;
-  for (const std::size_t number : which) hasher.Add(impl_->edits->edits()[number].hash);
-  return hasher.Hash().low | 1;
+  for (const std::size_t number : impl_->EditsAt(grid, window)) hasher.Add(impl_->edits->edits()[number].hash);
+  const std::uint64_t hash = hasher.Hash().low | 1;
+  impl_->KeepHash(memo_key, hash);
+  return hash;
+}
+
+std::optional<std::uint64_t> DemSource::Impl::KnownHash(const HashKey& key) const {
+  const std::lock_guard lock(hashes_mutex);
+  const auto known = hashes.find(key);
+  return known != hashes.end() ? std::optional(known->second) : std::nullopt;
+}
+
+void DemSource::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
+  constexpr std::size_t kMost = std::size_t{1} << 18;
+  const std::lock_guard lock(hashes_mutex);
+  if (hashes.size() >= kMost) hashes.clear();
+  hashes.emplace(key, hash);
 }
 
 // The edits that reach the tile's samples or their halo, and the ranges of neighbours that edits have changed, on which
@@ -319,12 +339,10 @@ std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
   around.rows = static_cast<int>(last - first);
   Box box = BoxOf(lattice, around);
   box.Grow(1e-8, 1e-8);  // contains the boxes of all nine tiles, whose corners are rounded in other ways
-  const bool is_alone = edits->Find(box).empty();
+  const bool is_alone = !edits->Any(box);
   if (is_alone && !(is_polar && is_range_edited)) return 0;
-  {
-    const std::lock_guard lock(hashes_mutex);
-    if (const auto known = hashes.find(MemoKey(key)); known != hashes.end()) return known->second;
-  }
+  const HashKey memo_key = {key.level, key.x, key.y, 0, 0};
+  if (const auto known = KnownHash(memo_key)) return *known;
   ContentHasher hasher;
   bool is_touched = false;
   for (const std::size_t number : EditsAt(lattice, WindowOfTile(lattice, key))) {
@@ -351,10 +369,7 @@ std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
     hasher.Add(info.heights.max);
   }
   const std::uint64_t hash = is_touched ? hasher.Hash().low | 1 : 0;
-  constexpr std::size_t kMost = std::size_t{1} << 18;
-  const std::lock_guard lock(hashes_mutex);
-  if (hashes.size() >= kMost) hashes.clear();
-  hashes.emplace(MemoKey(key), hash);
+  KeepHash(memo_key, hash);
   return hash;
 }
 

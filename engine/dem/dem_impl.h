@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -88,7 +89,17 @@ class DemSource::Impl {
   HeightRange unedited_heights;  // of `info`
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  mutable std::unordered_map<std::uint64_t, std::uint64_t> hashes;
+  using HashKey = std::array<std::int64_t, 5>;  // level, column, row; of Mercator windows also columns, rows; else 0
+  struct HashOfKey {
+    std::size_t operator()(const HashKey& key) const {
+      std::uint64_t hash = 0;
+      for (const std::int64_t value : key) hash = (hash ^ static_cast<std::uint64_t>(value)) * 0x9e3779b97f4a7c15;
+      return hash ^ hash >> 32;
+    }
+  };
+  mutable std::unordered_map<HashKey, std::uint64_t, HashOfKey> hashes;
+  std::optional<std::uint64_t> KnownHash(const HashKey& key) const;
+  void KeepHash(const HashKey& key, std::uint64_t hash) const;
 };
 
 // A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.

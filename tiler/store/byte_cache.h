@@ -101,15 +101,26 @@ class ByteCache {
     }
   }
 
-  // Removes the entries whose keys `is_chosen` accepts. Returns how many values they had.
+  // Removes the entries whose keys `is_chosen` accepts. Returns how many values they had. No lock is held while it
+  // chooses, which may take long; entries that come meanwhile may stay.
   template <typename Predicate>
   std::size_t EraseIf(const Predicate& is_chosen) {
     std::size_t erased = 0;
     for (const auto& shard : shards_) {
+      std::vector<Key> chosen;
+      {
+        const std::lock_guard lock(shard->mutex);
+        chosen.reserve(shard->index.size());
+        for (const auto& [key, place] : shard->index) chosen.push_back(key);
+      }
+      std::erase_if(chosen, [&](const Key& key) { return !is_chosen(key); });
       std::list<Entry> gone;
       const std::lock_guard lock(shard->mutex);
       const std::size_t before = shard->live();
-      shard->RemoveIf(is_chosen, gone);
+      for (const Key& key : chosen) {
+        if (const auto found = shard->index.find(key); found != shard->index.end()) shard->Remove(found->second, gone);
+      }
+      shard->TrimGhosts(gone);
       erased += before - shard->live();
     }
     return erased;

@@ -56,4 +56,9 @@ std::vector<std::size_t> BoxIndex::Find(const Box& box) const {
   return found;
 }
 
+bool BoxIndex::Any(const Box& box) const {
+  return tree_ != nullptr &&
+         tree_->tree.qbegin(boost::geometry::index::intersects(RectangleOf(box))) != tree_->tree.qend();
+}
+
 }  // namespace terrace::dem

@@ -30,6 +30,9 @@ class BoxIndex {
   // Returns the values of the entries that intersect or touch the box, ascending, without duplicates.
   std::vector<std::size_t> Find(const Box& box) const;
 
+  // Whether Find would return any. Ends at the first.
+  bool Any(const Box& box) const;
+
   // Removes an entry. Precondition: the index was made with it.
   void Remove(const Entry& entry);
 

@@ -77,6 +77,15 @@ struct Edit {
   double low_m = 0, high_m = 0;  // of the target heights
   double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;
+  // Edges by bands of equal height in y, so that a row scans few of them: of band b, which begins at
+  // `bands_from` + b / `bands_per_m`, `band_edges` [`band_begins`[b], `band_begins`[b + 1]), in order of rings and
+  // edges: those within reach of the band.
+  struct EdgeNumber {
+    std::uint32_t ring, edge;
+  };
+  double bands_from = 0, bands_per_m = 0;
+  std::vector<std::size_t> band_begins;
+  std::vector<EdgeNumber> band_edges;
   ContentHash hash;
 
   double reach_m() const { return half_width_m + blend_m; }

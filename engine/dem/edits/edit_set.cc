@@ -27,6 +27,18 @@ BoxIndex IndexOfEdits(const std::vector<Edit>& edits) {
   return BoxIndex(entries);
 }
 
+// The last box of a thread without edits.
+struct EmptyBox {
+  std::uint64_t set = 0;
+  Box box;
+
+  bool Contains(std::uint64_t number, const Box& degrees) const {
+    return set == number && degrees.west >= box.west && degrees.east <= box.east && degrees.south >= box.south &&
+           degrees.north <= box.north;
+  }
+};
+thread_local EmptyBox last_empty;
+
 // The edited height. `target`: NaN where a replacement has none.
 double Edited(EditOp op, double height, double target, double share) {
   switch (op) {
@@ -49,24 +61,23 @@ EditSet::EditSet(std::vector<Edit> edits) : edits_(std::move(edits)), index_(Ind
 }
 
 std::vector<std::size_t> EditSet::Find(const Box& degrees) const {
-  struct Empty {
-    std::uint64_t set = 0;
-    Box box;
-  };
-  thread_local Empty last;
-  const auto& [west, south, east, north] = last.box;
-  if (last.set == number_ && degrees.west >= west && degrees.east <= east && degrees.south >= south &&
-      degrees.north <= north) {
-    return {};
-  }
+  if (last_empty.Contains(number_, degrees)) return {};
   std::vector<std::size_t> found = index_.Find(degrees);
-  if (found.empty()) last = {number_, degrees};
+  if (found.empty()) last_empty = {number_, degrees};
   return found;
+}
+
+bool EditSet::Any(const Box& degrees) const {
+  if (last_empty.Contains(number_, degrees)) return false;
+  if (index_.Any(degrees)) return true;
+  last_empty = {number_, degrees};
+  return false;
 }
 
 template <typename NodeGrid>
 Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                            std::span<float> heights, const ReadReplacement& replaced, double* error_m) const {
+                            std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
+                            double* error_m) const {
   if (which.empty()) return {};
   const WindowAxes axes(grid, window);
   const auto stride = static_cast<std::size_t>(window.columns);
@@ -76,17 +87,18 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
     if (!edit.changes_heights()) continue;
-    ReplacedHeights other;
+    const ReplacedHeights* other = nullptr;
     if (edit.op == EditOp::kReplace) {
       auto read = replaced(edit);
       if (!read) return tl::unexpected(std::move(read).error());
-      other = *std::move(read);
+      other = *read;
     }
     for (const auto& part : axes.PartsOf(edit.reach)) {
       const int columns = part.last_column - part.first_column + 1;
       std::vector<EditedNode> nodes;
       if (errors) nodes.resize(Area(columns, part.last_row - part.first_row + 1));
       for (int j = part.first_row; j <= part.last_row; ++j) {
+        if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
         const double y = edit.plane.Y(axes.latitude(j));
         const EditRow row(edit, y);
         for (int i = part.first_column; i <= part.last_column; ++i) {
@@ -98,7 +110,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           if (edit.op == EditOp::kOffset) {
             target = edit.offset_m;
           } else if (edit.op == EditOp::kReplace) {
-            target = static_cast<double>(other.heights[at]);
+            target = static_cast<double>(other->heights[at]);
           } else if (share > 0) {
             target = TargetAt(edit, {x, y}, place);
           }
@@ -111,7 +123,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
       if (errors) {
         const double diagonal = std::hypot(axes.step() * edit.plane.east_m, axes.step() * edit.plane.north_m);
         errors->Add(edit, {part.first_column, part.first_row, columns, part.last_row - part.first_row + 1}, nodes,
-                    diagonal, other.error_m);
+                    diagonal, other != nullptr ? other->error_m : 0);
       }
     }
   }
@@ -121,17 +133,23 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
 }
 
 template Result<void> EditSet::Apply(const geo::Lattice&, const NodeWindow&, std::span<const std::size_t>,
-                                     std::span<float>, const ReadReplacement&, double*) const;
+                                     std::span<float>, const ReadReplacement&, const std::stop_token&, double*) const;
 template Result<void> EditSet::Apply(const geo::MercatorGrid&, const NodeWindow&, std::span<const std::size_t>,
-                                     std::span<float>, const ReadReplacement&, double*) const;
+                                     std::span<float>, const ReadReplacement&, const std::stop_token&, double*) const;
 
 double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
-                        const std::function<double(const Edit&)>& replaced) const {
+                        const std::function<double(const Edit&)>& replaced, EditRows& rows) const {
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
     if (!edit.changes_heights() && edit.op != EditOp::kHole) continue;
     const PlanPoint point{edit.plane.X(position.longitude), edit.plane.Y(position.latitude)};
-    const EditPlace place = EditRow(edit, point.y).At(point.x);
+    auto row = rows.find(index);
+    if (row != rows.end() && row->second.y() != point.y) {
+      rows.erase(row);
+      row = rows.end();
+    }
+    if (row == rows.end()) row = rows.emplace(index, EditRow(edit, point.y)).first;
+    const EditPlace place = row->second.At(point.x);
     const double share = edit.ShareAt(place.distance_m);
     if (share <= 0) continue;
     if (edit.op == EditOp::kHole) {
@@ -165,20 +183,35 @@ HeightRange EditSet::Extended(HeightRange range, std::span<const std::size_t> wh
   return {std::floor(range.min * 1024) / 1024, std::ceil(range.max * 1024) / 1024};
 }
 
-void ForNodesAlong(const geo::Lattice& lattice, const EditPlane& plane, PlanPoint a, PlanPoint b,
-                   const std::function<void(std::int64_t, std::int64_t)>& visit) {
+void ForNodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const EditPlane& plane, PlanPoint a,
+                   PlanPoint b, const std::function<void(std::int64_t, std::int64_t)>& visit) {
   const double step = lattice.StepDegrees();
   const auto column = [&](PlanPoint p) { return (plane.longitude + p.x / plane.east_m + 180) / step; };
   const auto row = [&](PlanPoint p) { return (plane.latitude + p.y / plane.north_m + 90) / step; };
   double x0 = column(a), y0 = row(a), x1 = column(b), y1 = row(b);
+  // The window with one node more on each side, which nearest nodes of clipped lines do not leave.
+  const auto south = static_cast<double>(window.row - 1), north = static_cast<double>(window.row + window.rows);
+  if (std::max(y0, y1) < south || std::min(y0, y1) > north) return;
+  const auto west = static_cast<double>(window.column - 1), east = static_cast<double>(window.column + window.columns);
+  const auto around = static_cast<double>(lattice.columns());
+  const auto first_turn = static_cast<std::int64_t>(std::ceil((std::min(x0, x1) - east) / around));
+  const auto last_turn = static_cast<std::int64_t>(std::floor((std::max(x0, x1) - west) / around));
+  if (first_turn > last_turn) return;
   const auto nearest = [](double value) { return static_cast<std::int64_t>(std::floor(value + 0.5)); };
   const bool is_steep = std::abs(y1 - y0) > std::abs(x1 - x0);
   if (is_steep) std::swap(x0, y0), std::swap(x1, y1);
   if (x0 > x1) std::swap(x0, x1), std::swap(y0, y1);
-  for (std::int64_t k = nearest(x0); k <= nearest(x1); ++k) {
-    const double t = x1 > x0 ? std::clamp((static_cast<double>(k) - x0) / (x1 - x0), 0.0, 1.0) : 0;
-    const std::int64_t across = nearest(y0 + t * (y1 - y0));
-    is_steep ? visit(across, k) : visit(k, across);
+  const auto visit_between = [&](std::int64_t first, std::int64_t last) {
+    for (std::int64_t k = std::max(nearest(x0), first); k <= std::min(nearest(x1), last); ++k) {
+      const double t = x1 > x0 ? std::clamp((static_cast<double>(k) - x0) / (x1 - x0), 0.0, 1.0) : 0;
+      const std::int64_t across = nearest(y0 + t * (y1 - y0));
+      is_steep ? visit(across, k) : visit(k, across);
+    }
+  };
+  if (is_steep) return visit_between(window.row - 1, window.row + window.rows);
+  for (std::int64_t turn = first_turn; turn <= last_turn; ++turn) {
+    const std::int64_t column_from = window.column + turn * lattice.columns();
+    visit_between(column_from - 1, column_from + window.columns);
   }
 }
 
@@ -199,11 +232,12 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
       if (demands.forced.empty()) demands.forced.assign(nodes, 0);
       for (const auto& ring : edit.rings) {
         for (std::size_t e = 0; e + (edit.is_area ? 0 : 1) < ring.size(); ++e) {
-          ForNodesAlong(lattice, edit.plane, ring[e], ring[(e + 1) % ring.size()], [&](std::int64_t c, std::int64_t r) {
-            const std::int64_t i = FloorMod(c - window.column, lattice.columns()), j = r - window.row;
-            if (i < window.columns && j >= 0 && j < window.rows)
-              demands.forced[static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i)] = 1;
-          });
+          ForNodesAlong(lattice, window, edit.plane, ring[e], ring[(e + 1) % ring.size()],
+                        [&](std::int64_t c, std::int64_t r) {
+                          const std::int64_t i = FloorMod(c - window.column, lattice.columns()), j = r - window.row;
+                          if (i < window.columns && j >= 0 && j < window.rows)
+                            demands.forced[static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i)] = 1;
+                        });
         }
       }
       if (edit.op == EditOp::kBreakline) continue;

@@ -10,12 +10,15 @@
 #include <functional>
 #include <memory>
 #include <span>
+#include <stop_token>
+#include <unordered_map>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/common/box_index.h"
 #include "engine/dem/dem_types.h"
 #include "engine/dem/edits/edit.h"
+#include "engine/dem/edits/edit_shape.h"
 #include "engine/geo/lattice.h"
 
 namespace terrace::dem {
@@ -25,7 +28,11 @@ struct ReplacedHeights {
   std::vector<float> heights;
   double error_m = 0;  // of the surface between them, to that source's samples
 };
-using ReadReplacement = std::function<Result<ReplacedHeights>(const Edit&)>;
+// The result stays until the application ends.
+using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
+
+// The last row of each edit, by its number: points on one parallel share it.
+using EditRows = std::unordered_map<std::size_t, EditRow>;
 
 class EditSet {
  public:
@@ -37,18 +44,22 @@ class EditSet {
   // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order. Each thread remembers
   // the last box without edits: a tile asks for its surroundings first, and then for many boxes within these.
   std::vector<std::size_t> Find(const Box& degrees) const;
+  // Whether there are any: takes no longer for many edits.
+  bool Any(const Box& degrees) const;
 
   // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
   // in, an upper bound of the distance between the surface through the tile's nodes and the samples of the sources;
   // out, the same of the edited surface and the edited samples. The window then has a halo of one, which does not
-  // count.
+  // count. Errors: kCancelled.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                     std::span<float> heights, const ReadReplacement& replaced, double* error_m = nullptr) const;
+                     std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
+                     double* error_m = nullptr) const;
 
-  // The same at a position; NaN: no height. `replaced`: of an edit, at this position. Holes have no height.
+  // The same at a position; NaN: no height. `replaced`: of an edit, at this position. `rows`: of the positions before,
+  // at first empty. Holes have no height.
   double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
-                 const std::function<double(const Edit&)>& replaced) const;
+                 const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
 
   // A range of heights after the edits. `replaced`: the range of a replacement.
   HeightRange Extended(HeightRange range, std::span<const std::size_t> which,
@@ -66,8 +77,9 @@ class EditSet {
 };
 
 // Calls visit(column, row) for the lattice's nodes that a line passes: of each segment the nearest node in each column,
-// or in each row if it is steeper. Global columns continue beyond the last one.
-void ForNodesAlong(const geo::Lattice& lattice, const EditPlane& plane, PlanPoint a, PlanPoint b,
-                   const std::function<void(std::int64_t, std::int64_t)>& visit);
+// or in each row if it is steeper. Of other nodes than those in the window, or around the Earth from it, it calls for
+// few. Global columns continue beyond the last one.
+void ForNodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const EditPlane& plane, PlanPoint a,
+                   PlanPoint b, const std::function<void(std::int64_t, std::int64_t)>& visit);
 
 }  // namespace terrace::dem

@@ -1,6 +1,7 @@
 #include "engine/dem/edits/edit_shape.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
@@ -38,22 +39,28 @@ std::array<double, 3> PlaneThrough(PlanPoint a, PlanPoint b, PlanPoint c, double
 
 std::size_t EdgesOf(const Edit& edit, std::size_t ring) { return edit.rings[ring].size() - (edit.is_area ? 0 : 1); }
 
+// Never less for a larger y, so that an edge's bands contain the band of every y between its ends.
+std::size_t BandOf(const Edit& edit, double y, std::size_t bands) {
+  const double band = std::floor((y - edit.bands_from) * edit.bands_per_m);
+  return static_cast<std::size_t>(std::clamp(band, 0.0, static_cast<double>(bands - 1)));
+}
+
 }  // namespace
 
 double EditPlane::X(double lon) const { return std::remainder(lon - longitude, 360.0) * east_m; }
 
 EditRow::EditRow(const Edit& edit, double y) : edit_(edit), y_(y) {
   const double reach = edit.reach_m();
-  for (std::uint32_t r = 0; r < edit.rings.size(); ++r) {
+  const std::size_t band = BandOf(edit, y, edit.band_begins.size() - 1);
+  for (std::size_t k = edit.band_begins[band]; k < edit.band_begins[band + 1]; ++k) {
+    const auto [r, e] = edit.band_edges[k];
     const auto& ring = edit.rings[r];
-    for (std::uint32_t e = 0; e < EdgesOf(edit, r); ++e) {
-      const PlanPoint a = ring[e], b = ring[(e + 1) % ring.size()];
-      if (edit.is_area && (a.y <= y) != (b.y <= y)) crossings_.push_back(a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y));
-      const auto [low, high] = std::minmax(a.y, b.y);
-      if (y < low - reach || y > high + reach) continue;
-      const double dx = b.x - a.x, dy = b.y - a.y, length2 = dx * dx + dy * dy;
-      edges_.push_back({a, b, length2 > 0 ? 1 / length2 : 0, r, e});
-    }
+    const PlanPoint a = ring[e], b = ring[(e + 1) % ring.size()];
+    if (edit.is_area && (a.y <= y) != (b.y <= y)) crossings_.push_back(a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y));
+    const auto [low, high] = std::minmax(a.y, b.y);
+    if (y < low - reach || y > high + reach) continue;
+    const double dx = b.x - a.x, dy = b.y - a.y, length2 = dx * dx + dy * dy;
+    edges_.push_back({a, b, length2 > 0 ? 1 / length2 : 0, r, e});
   }
   std::ranges::sort(crossings_);
 }
@@ -169,6 +176,41 @@ void MeasureTarget(Edit& edit) {
   }
 }
 
+// As many bands as leave each edge in four on average: tall edges and wide blends are in many.
+void DivideIntoBands(Edit& edit, double south, double north) {
+  const double reach = edit.reach_m();
+  std::size_t edges = 0;
+  for (std::size_t r = 0; r < edit.rings.size(); ++r) edges += EdgesOf(edit, r);
+  edit.bands_from = south - reach;
+  const double height = north - south + 2 * reach;
+  const auto for_bands = [&](std::size_t bands, const auto& visit) {
+    for (std::uint32_t r = 0; r < edit.rings.size(); ++r) {
+      const auto& ring = edit.rings[r];
+      for (std::uint32_t e = 0; e < EdgesOf(edit, r); ++e) {
+        const auto [low, high] = std::minmax(ring[e].y, ring[(e + 1) % ring.size()].y);
+        visit(Edit::EdgeNumber{r, e}, BandOf(edit, low - reach, bands), BandOf(edit, high + reach, bands));
+      }
+    }
+  };
+  std::size_t bands = height > 0 ? std::bit_ceil(edges / 8 + 1) : 1;
+  for (;; bands /= 2) {
+    edit.bands_per_m = height > 0 ? static_cast<double>(bands) / height : 0;
+    std::size_t entries = 0;
+    for_bands(bands, [&](Edit::EdgeNumber, std::size_t first, std::size_t last) { entries += last - first + 1; });
+    if (bands == 1 || entries <= 4 * edges) break;
+  }
+  edit.band_begins.assign(bands + 1, 0);
+  for_bands(bands, [&](Edit::EdgeNumber, std::size_t first, std::size_t last) {
+    for (std::size_t b = first; b <= last; ++b) ++edit.band_begins[b + 1];
+  });
+  std::partial_sum(edit.band_begins.begin(), edit.band_begins.end(), edit.band_begins.begin());
+  edit.band_edges.resize(edit.band_begins.back());
+  std::vector<std::size_t> next = edit.band_begins;
+  for_bands(bands, [&](Edit::EdgeNumber number, std::size_t first, std::size_t last) {
+    for (std::size_t b = first; b <= last; ++b) edit.band_edges[next[b]++] = number;
+  });
+}
+
 void HashContent(Edit& edit) {
   ContentHasher hasher;
   hasher.Add(static_cast<std::uint8_t>(edit.op));
@@ -209,6 +251,7 @@ void Complete(Edit& edit) {
                 plane.longitude + (east + reach) / plane.east_m, plane.latitude + (north + reach) / plane.north_m};
   constexpr double kSlack = 1e-9;
   edit.reach.Grow(kSlack, kSlack);
+  DivideIntoBands(edit, south, north);
   edit.is_convex = edit.is_area && edit.rings.size() == 1 && IsConvex(edit.rings.front());
   MeasureTarget(edit);
   HashContent(edit);

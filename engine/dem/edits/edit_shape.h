@@ -21,6 +21,7 @@ class EditRow {
  public:
   EditRow(const Edit& edit, double y);
   EditPlace At(double x) const;
+  double y() const { return y_; }
 
  private:
   struct Edge {

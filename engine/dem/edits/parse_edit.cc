@@ -239,6 +239,9 @@ void Parser::ReadGeometry(const json& geometry) {
   if ((type == "Polygon" || type == "MultiPolygon") && takes_area) {
     edit_.is_area = true;
     if (type == "Polygon") return add_polygon(coordinates);
+    // The heights of a slope are those of one ring.
+    if (edit_.op == EditOp::kSlope && coordinates.size() > 1)
+      return Fail("slope takes one polygon; divide the parts into features");
     for (const json& polygon : coordinates) add_polygon(polygon);
   } else if ((type == "LineString" || type == "MultiLineString") && takes_line) {
     edit_.is_area = false;

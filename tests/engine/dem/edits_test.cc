@@ -214,7 +214,10 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
       "," +
       geometry(R"({"op":"carve","height":5})", R"({"type":"LineString","coordinates":[[10.1,50.1],[10.2,50.2]]})") +
       "," + Rectangle(R"({"op":"offset","metres":1})", 20, 50.15, 21, 50.25) + "," +
-      Middle(R"({"op":"offset","meters":1})") + "," + Rectangle(R"({"op":"hole"})", 10, 89.5, 11, 89.95));
+      Middle(R"({"op":"offset","meters":1})") + "," + Rectangle(R"({"op":"hole"})", 10, 89.5, 11, 89.95) + "," +
+      geometry(R"({"op":"slope"})", R"({"type":"MultiPolygon","coordinates":[)"
+                                    R"([[[10.1,50.1,1],[10.2,50.1,2],[10.2,50.2,3],[10.1,50.1,1]]],)"
+                                    R"([[[10.3,50.1,7],[10.4,50.1,8],[10.4,50.2,9],[10.3,50.1,7]]]]})"));
   for (const char* part : {"feature 1 at",  "did you mean \"flatten\"?",
                            "feature 2 at",  "flatten needs a \"height\"",
                            "feature 3 at",  "are the axes swapped?",
@@ -227,6 +230,7 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
                            "feature 10 at", "outside of the data",
                            "feature 11 at", "did you mean \"metres\"?",
                            "feature 12 at", "reaches a pole",
+                           "feature 13 at", "slope takes one polygon; divide the parts into features",
                            "edits.geojson"}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
   }

@@ -44,6 +44,15 @@ TEST(TileCache, ErasesWhatIsChosenAndKeepsItsBooks) {
   EXPECT_NE(cache.Find(Key(2)), nullptr);
 }
 
+// A choice that takes long holds nobody up: here it would wait for itself.
+TEST(TileCache, IsFreeWhileItIsChosenWhatToErase) {
+  TileCache cache(100 * kCharge);
+  for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());
+  EXPECT_EQ(cache.EraseIf([&](const CacheKey& key) { return key.request.key.x > 2 && cache.Find(key) != nullptr; }),
+            2u);
+  EXPECT_EQ(cache.stats().entries, 2u);
+}
+
 TEST(TileCache, EvictsOldestWhenOverBudget) {
   TileCache cache(3 * kCharge);
   for (int x = 1; x <= 4; ++x) cache.Insert(Key(x), Tile());

@@ -1,0 +1,156 @@
+// Edits of many vertices and many edits: what is found by bands, boxes and windows is what is found without.
+#include "engine/dem/edits/edit_set.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "engine/dem/common/box_index.h"
+#include "engine/dem/edits/edit_shape.h"
+
+namespace terrace::dem {
+namespace {
+
+// A jagged ring of about 10 km around 10 E, 50 N.
+Edit Star(int vertices, double blend_m) {
+  Edit edit;
+  edit.plane = {10, 50, 71'696, 111'229};
+  edit.height_m = 100;
+  edit.blend_m = blend_m;
+  auto& ring = edit.rings.emplace_back();
+  for (int i = 0; i < vertices; ++i) {
+    const double angle = 2 * 3.14159265358979 * i / vertices, radius = i % 2 == 0 ? 10'000 : 9'800;
+    ring.push_back({radius * std::cos(angle), radius * std::sin(angle)});
+  }
+  Complete(edit);
+  return edit;
+}
+
+TEST(EditRow, HasThePlacesOfAllEdges) {
+  for (const double blend_m : {0.0, 300.0, 30'000.0}) {
+    const Edit edit = Star(2'000, blend_m);
+    if (blend_m < 1'000) EXPECT_GT(edit.band_begins.size(), 10u);
+    EXPECT_LE(edit.band_edges.size(), 8'000u);
+    Edit whole = edit;
+    whole.bands_per_m = 0;
+    whole.band_edges.clear();
+    for (std::uint32_t e = 0; e < 2'000; ++e) whole.band_edges.push_back({0, e});
+    whole.band_begins = {0, 2'000};
+    for (int j = -60; j <= 60; ++j) {
+      const double y = j % 3 == 0 ? edit.rings[0][static_cast<std::size_t>(j + 60) * 16].y : j * 200.0;
+      const EditRow row(edit, y), row_of_whole(whole, y);
+      for (int i = -60; i <= 60; ++i) {
+        const EditPlace place = row.At(i * 200.0), expected = row_of_whole.At(i * 200.0);
+        EXPECT_EQ(place.is_inside, expected.is_inside) << i << " " << j;
+        EXPECT_EQ(place.distance_m, expected.distance_m) << i << " " << j;
+        EXPECT_EQ(place.edge, expected.edge) << i << " " << j;
+        EXPECT_EQ(place.along, expected.along) << i << " " << j;
+      }
+    }
+  }
+}
+
+TEST(EditSet, StopsBetweenRows) {
+  std::vector<Edit> list;
+  list.push_back(Star(100, 0));
+  const EditSet edits(std::move(list));
+  const geo::Lattice lattice{10, 64};
+  const double step = lattice.StepDegrees();
+  const NodeWindow window{static_cast<std::int64_t>(190 / step) - 2, static_cast<std::int64_t>(140 / step) - 2, 5, 5};
+  const std::vector<std::size_t> which = {0};
+  const ReadReplacement none = [](const Edit&) -> Result<const ReplacedHeights*> { return nullptr; };
+  std::vector<float> heights(25, 0);
+  std::stop_source stop;
+  ASSERT_TRUE(edits.Apply(lattice, window, which, heights, none, stop.get_token()).has_value());
+  EXPECT_EQ(heights[12], 100);
+  stop.request_stop();
+  const auto stopped = edits.Apply(lattice, window, which, heights, none, stop.get_token());
+  ASSERT_FALSE(stopped.has_value());
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+}
+
+// Rows that are kept from one point to the next are of the right parallel.
+TEST(EditSet, HasTheSameHeightAtAPointInAnyOrder) {
+  std::vector<Edit> list;
+  list.push_back(Star(500, 500));
+  const EditSet edits(std::move(list));
+  const std::vector<std::size_t> which = {0};
+  const auto none = [](const Edit&) { return 0.0; };
+  EditRows kept;
+  for (const double latitude : {50.0, 50.05, 50.05, 50.0, 50.09}) {
+    for (int i = -20; i <= 20; ++i) {
+      const GeoPosition at{10 + i * 0.01, latitude};
+      EditRows fresh;
+      EXPECT_EQ(edits.ApplyAt(at, which, 7, none, kept), edits.ApplyAt(at, which, 7, none, fresh));
+    }
+  }
+  EXPECT_EQ(kept.size(), 1u);
+}
+
+TEST(BoxIndex, HasAnyWhereItFindsSome) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(0, 100), size(0, 4);
+  const auto box = [&] {
+    const double west = place(random), south = place(random);
+    return Box{west, south, west + size(random), south + size(random)};
+  };
+  std::vector<BoxIndex::Entry> entries;
+  for (std::size_t i = 0; i < 300; ++i) entries.push_back({box(), i});
+  const BoxIndex index(entries);
+  int with = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Box asked = box();
+    EXPECT_EQ(index.Any(asked), !index.Find(asked).empty());
+    with += index.Any(asked) ? 1 : 0;
+  }
+  EXPECT_GT(with, 0);
+  EXPECT_LT(with, 300);
+  EXPECT_FALSE(BoxIndex().Any(box()));
+}
+
+using Nodes = std::set<std::pair<std::int64_t, std::int64_t>>;
+
+// Of the nodes along a line those in the window, and the number of calls.
+Nodes NodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const NodeWindow& clip, PlanPoint a,
+                 PlanPoint b, const EditPlane& plane, int& calls) {
+  Nodes nodes;
+  ForNodesAlong(lattice, clip, plane, a, b, [&](std::int64_t c, std::int64_t r) {
+    ++calls;
+    const std::int64_t turned = (c - window.column) % lattice.columns();
+    const std::int64_t i = turned < 0 ? turned + lattice.columns() : turned, j = r - window.row;
+    if (i < window.columns && j >= 0 && j < window.rows) nodes.insert({i, j});
+  });
+  return nodes;
+}
+
+TEST(EditSet, VisitsTheSameNodesOfAWindowThatIsClippedTo) {
+  const geo::Lattice lattice{8, 64};
+  const NodeWindow all{0, 0, static_cast<int>(lattice.columns()), static_cast<int>(lattice.rows()) + 1};
+  std::mt19937 random(2);
+  int some = 0;
+  // Also at the antimeridian, where the last tile ends with the first column.
+  for (const double longitude : {10.0, 179.95, -179.95}) {
+    const EditPlane plane{longitude, 50, 71'696, 111'229};
+    const auto column = static_cast<std::int64_t>((longitude + 180) / lattice.StepDegrees()) / 64 * 64;
+    const NodeWindow window{column, static_cast<std::int64_t>(140 / lattice.StepDegrees()) / 64 * 64, 65, 65};
+    std::uniform_real_distribution<double> place(-100'000, 100'000), near(-3'500, 3'500);
+    for (int k = 0; k < 400; ++k) {
+      const bool is_far = k % 2 == 0;
+      const auto at = [&] { return is_far ? place(random) : near(random); };
+      const PlanPoint a{at(), at()}, b{at(), at()};
+      int calls = 0, calls_of_all = 0;
+      const Nodes clipped = NodesAlong(lattice, window, window, a, b, plane, calls);
+      EXPECT_EQ(clipped, NodesAlong(lattice, window, all, a, b, plane, calls_of_all)) << k;
+      EXPECT_LE(calls, 67) << k;
+      some += clipped.empty() ? 0 : 1;
+    }
+  }
+  EXPECT_GT(some, 100);
+}
+
+}  // namespace
+}  // namespace terrace::dem
