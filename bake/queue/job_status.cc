@@ -13,7 +13,7 @@
 namespace terrace::bake {
 namespace {
 
-std::int64_t NumberOf(std::string_view text) {
+std::int64_t Int64Of(std::string_view text) {
   std::int64_t number = 0;
   std::from_chars(text.data(), text.data() + text.size(), number);
   return number;
@@ -39,7 +39,7 @@ double RateOf(const redis::ReplyView& done, std::int64_t now_ms) {
   if (count < 2) return 0;
   const auto time_of = [&](std::size_t i) {
     const std::string_view id = done[i][0].text();
-    return NumberOf(id.substr(0, id.find('-')));
+    return Int64Of(id.substr(0, id.find('-')));
   };
   std::size_t first = 0;
   while (count - first > kMinUnits && time_of(first) < now_ms - kWindowMs) ++first;
@@ -79,9 +79,9 @@ Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& p
   for (const auto& field : *job) {
     if (!IsOfQueue(field.first)) status.identity.push_back(field);
   }
-  status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(NumberOf(FieldOf(*job, "units")), 0));
-  status.lease_seconds = static_cast<double>(NumberOf(FieldOf(*job, "lease_ms"))) / 1000;
-  const std::int64_t now_ms = NumberOf((*replies)[0][0].text()) * 1000 + NumberOf((*replies)[0][1].text()) / 1000;
+  status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(Int64Of(FieldOf(*job, "units")), 0));
+  status.lease_seconds = static_cast<double>(Int64Of(FieldOf(*job, "lease_ms"))) / 1000;
+  const std::int64_t now_ms = Int64Of((*replies)[0][0].text()) * 1000 + Int64Of((*replies)[0][1].text()) / 1000;
 
   struct Pending {
     std::string worker;
@@ -101,7 +101,7 @@ Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& p
     if (found == pending.end()) continue;
     is_finishing |= taken[i].text() == scripts::kFinishUnit;
     status.running.push_back({std::string(taken[i].text()), found->second.worker,
-                              static_cast<double>(std::max<std::int64_t>(now_ms - NumberOf(since), 0)) / 1000,
+                              static_cast<double>(std::max<std::int64_t>(now_ms - Int64Of(since), 0)) / 1000,
                               static_cast<double>(found->second.idle_ms) / 1000,
                               static_cast<int>(found->second.deliveries)});
   }

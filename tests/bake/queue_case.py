@@ -1,4 +1,5 @@
 """What the tests of many bakers share: sources, an archive of a single process, a redis-server, workers."""
+import concurrent.futures
 import filecmp
 import json
 import os
@@ -102,9 +103,22 @@ class QueueCase(unittest.TestCase):
         return workers
 
     def end(self, process, code=0):
-        out, errors = process.communicate(timeout=120)
+        # Not communicate(): it would lose lines that a readline() before it has buffered.
+        with concurrent.futures.ThreadPoolExecutor(2) as pool:
+            texts = [pool.submit(stream.read) if stream else None for stream in (process.stdout, process.stderr)]
+            try:
+                process.wait(timeout=120)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                raise
+            out, errors = (text.result() if text else None for text in texts)
         self.assertEqual(process.returncode, code, errors)
         return out, errors
+
+    def end_all(self, workers, code=0):
+        """Reads all of them at once: a worker whose lines nobody reads stops, and the others wait for its unit."""
+        with concurrent.futures.ThreadPoolExecutor(len(workers)) as pool:
+            return list(pool.map(lambda worker: self.end(worker, code), workers))
 
     def run_bake(self, place, *arguments, code=0, **options):
         return self.end(self.start(place, *arguments, **options), code)

@@ -21,7 +21,7 @@ class QueueFaults(QueueCase):
         time.sleep(self.seconds / 4)
         self.redis.start()
         self.assertEqual(self.redis("EXISTS", self.key("units")), 1, "the AOF was read")
-        ends = [self.end(worker) for worker in workers]
+        ends = self.end_all(workers)
         self.assertTrue(any("is back" in errors for _, errors in ends), ends)
         self.expect_equal(place)
         self.assertEqual(sorted(set(self.baked(line, *(out for out, _ in ends)))), sorted(self.units))
@@ -48,7 +48,7 @@ class QueueFaults(QueueCase):
             self.assertLessEqual(queued, missing)
         for worker in workers:
             worker.send_signal(signal.SIGCONT)
-        ends = [self.end(worker) for worker in workers]
+        ends = self.end_all(workers)
         self.expect_equal(place)
         self.assertEqual(sorted(set(self.baked(line, *(out for out, _ in ends)))), sorted(self.units))
 
@@ -58,8 +58,7 @@ class QueueFaults(QueueCase):
             workers = self.joined(place, 2)
             workers[0].stdout.readline()
             self.redis(*command)
-            for worker in workers:
-                self.end(worker)
+            self.end_all(workers)
             self.expect_equal(place)
 
     def test_another_bake_of_the_same_name_is_refused(self):

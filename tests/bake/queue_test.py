@@ -18,7 +18,7 @@ class Queue(QueueCase):
     def test_workers_share_the_units(self):
         place = self.place()
         workers = [self.start(place) for _ in range(4)]
-        outputs = [self.end(worker)[0] for worker in workers]
+        outputs = [out for out, _ in self.end_all(workers)]
         self.expect_equal(place)
         self.assertEqual(self.baked(*outputs), sorted(self.units), "each unit once")
         self.assertEqual(json.loads(self.status("--json"))["state"], "finished")
@@ -90,7 +90,7 @@ class Queue(QueueCase):
         place = self.place()
         lease = self.seconds / len(self.units) / 2
         workers = [self.start(place, lease=round(lease, 3)) for _ in range(3)]
-        outputs = [self.end(worker)[0] for worker in workers]
+        outputs = [out for out, _ in self.end_all(workers)]
         self.assertEqual(self.baked(*outputs), sorted(self.units), f"a lease of {lease:.3f} s is shorter than a unit")
         self.expect_equal(place)
 
@@ -117,7 +117,7 @@ class Queue(QueueCase):
         os.truncate(config.parent / "N30E012.hgt", 100_000)
         for worker in workers:
             worker.send_signal(signal.SIGCONT)
-        ends = [self.end(worker, 1) for worker in workers]
+        ends = self.end_all(workers, 1)
         status = json.loads(self.status("--json", code=1))
         self.assertEqual(status["state"], "incomplete")
         dead = {unit["unit"].split("/")[1]: unit for unit in status["dead"]}
@@ -172,8 +172,7 @@ class Queue(QueueCase):
         done = subprocess.run([BINARY, "bake", "--config", self.config, "--levels", "0-8", "--out", reference, *formats],
                               env=self.environment, stderr=subprocess.PIPE, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
-        for worker in [self.start(place, *formats, levels="0-8") for _ in range(2)]:
-            self.end(worker)
+        self.end_all([self.start(place, *formats, levels="0-8") for _ in range(2)])
         self.expect_equal(place, reference)
 
     def test_clocks_do_not_matter(self):
@@ -182,7 +181,7 @@ class Queue(QueueCase):
         ahead = self.start(place, before=("faketime", "-f", "+1h"), environment=wrong)
         behind = self.start(place, before=("faketime", "-f", "-1h"), environment=wrong)
         right = self.start(place)
-        outputs = [self.end(worker)[0] for worker in (ahead, behind, right)]
+        outputs = [out for out, _ in self.end_all((ahead, behind, right))]
         self.assertEqual(self.baked(*outputs), sorted(self.units), "no unit was inherited")
         self.expect_equal(place)
 

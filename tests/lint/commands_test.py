@@ -17,7 +17,7 @@ import urllib.error
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-COMMAND = re.compile(r"(?<![\w-])terrace (serve|mesh|info|bake|fly|export)\b([^\n`#]*)")
+COMMAND = re.compile(r"(?<![\w-])terrace (serve|mesh|info|bake status|bake|fly)\b([^\n`#]*)")
 URL = re.compile(r"https?://(?:127\.0\.0\.1|localhost):8080(/[^\s`'\"{}<>)]*)")
 EXPECTED = {"/earth": 404, "/nope/layer.json": 404, "/jacksboro/9/272/359.terrain?error=0": 400}
 OTHER_DATA = re.compile(r"^/(andes|alps|maui|dem|NAME|DATASET)\b")
@@ -35,7 +35,7 @@ class Commands(unittest.TestCase):
             text = page.read_text().replace("\\\n", " ").replace("\\|", "|")
             for command, rest in COMMAND.findall(text):
                 if command not in known:
-                    help_text = subprocess.run([TERRACE, command, "--help"], text=True, capture_output=True).stdout
+                    help_text = subprocess.run([TERRACE, *command.split(), "--help"], text=True, capture_output=True).stdout
                     known[command] = set(re.findall(r"^ +(?:-\w,)?(--[a-z][a-z-]+)", help_text, re.MULTILINE)) | {"--help"}
                 for flag in re.findall(r"(?<![\w-])--[a-z][a-z-]*", re.split(r"[;&]| \| ", rest)[0]):
                     total += 1
