@@ -107,7 +107,7 @@ class QueueCase(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             texts = [pool.submit(stream.read) if stream else None for stream in (process.stdout, process.stderr)]
             try:
-                process.wait(timeout=120)
+                process.wait(timeout=40)
             except subprocess.TimeoutExpired:
                 process.kill()
                 raise
