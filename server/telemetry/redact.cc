@@ -53,7 +53,8 @@ constexpr std::string_view kWords[] = {"octvertexnormals",
                                        "r16",
                                        "png16",
                                        "geotiff",
-                                       "json"};
+                                       "json",
+                                       "terrain"};
 
 using Characters = std::array<bool, 256>;
 
