@@ -11,9 +11,9 @@
 namespace terrace::fly {
 namespace {
 
-constexpr double kPlotWidth = 640, kPlotHeight = 250;
+constexpr double kFigureWidth = 640, kFigureHeight = 250;
 constexpr double kLeft = 52, kRight = 12, kTop = 14, kBottom = 28;
-constexpr double kPlotWidth = kPlotWidth - kLeft - kRight, kPlotHeight = kPlotHeight - kTop - kBottom;
+constexpr double kPlotWidth = kFigureWidth - kLeft - kRight, kPlotHeight = kFigureHeight - kTop - kBottom;
 
 // "0.05", "12", "3.4k", "12M"
 std::string Short(double value) {
@@ -55,7 +55,7 @@ void AddGrid(const Scale& scale, std::string& svg) {
     fmt::format_to(
         std::back_inserter(svg),
         R"(<line class="grid" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
-        kLeft, kPlotWidth - kRight, y, y, kLeft - 6, y + 4, Short(tick));
+        kLeft, kFigureWidth - kRight, y, y, kLeft - 6, y + 4, Short(tick));
   }
 }
 
@@ -64,7 +64,7 @@ void AddTimeTicks(std::size_t seconds, std::string& svg) {
   for (double t = 0; t <= static_cast<double>(seconds) + 1e-9; t += step) {
     const double x = kLeft + kPlotWidth * t / static_cast<double>(seconds);
     fmt::format_to(std::back_inserter(svg),
-                   R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}{}</text>)", x, kPlotHeight - 8,
+                   R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}{}</text>)", x, kFigureHeight - 8,
                    PlainNumber(t), t == 0 ? " s" : "");
   }
 }
@@ -118,7 +118,7 @@ std::string Frame(const std::string& title, const std::string& unit, const std::
                   const std::string& svg) {
   return fmt::format(R"(<figure><figcaption><b>{}</b> <span class="unit">{}</span><p>{}</p><div>{}</div></figcaption>)"
                      R"(<svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}">{}</svg></figure>)",
-                     EscapeHtml(title), EscapeHtml(unit), EscapeHtml(note), legend, kPlotWidth, kPlotHeight,
+                     EscapeHtml(title), EscapeHtml(unit), EscapeHtml(note), legend, kFigureWidth, kFigureHeight,
                      EscapeHtml(title), svg);
 }
 
@@ -208,13 +208,13 @@ std::string SvgOf(const TimePlot& plot) {
     fmt::format_to(
         std::back_inserter(svg),
         R"(<line class="limit" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"/><text class="limit" x="{:.1f}" y="{:.1f}" text-anchor="end">{}</text>)",
-        kLeft, kPlotWidth - kRight, y, y, kPlotWidth - kRight - 4, y - 5, EscapeHtml(plot.limit_name));
+        kLeft, kFigureWidth - kRight, y, y, kFigureWidth - kRight - 4, y - 5, EscapeHtml(plot.limit_name));
   }
   for (const double mark : plot.marks) {
     const double x = kLeft + step * mark;
     fmt::format_to(std::back_inserter(svg),
                    R"(<line class="mark" x1="{:.1f}" x2="{:.1f}" y1="{:.1f}" y2="{:.1f}"><title>{}</title></line>)", x,
-                   x, kTop, kPlotHeight - kBottom, EscapeHtml(plot.marks_name));
+                   x, kTop, kFigureHeight - kBottom, EscapeHtml(plot.marks_name));
   }
   std::string legend = Legend(plot.series);
   if (!plot.marks.empty())
@@ -231,7 +231,7 @@ std::string SvgOf(const BarPlot& plot) {
   for (std::size_t i = 0; i < plot.labels.size(); ++i) {
     fmt::format_to(std::back_inserter(svg),
                    R"(<text class="tick" x="{:.1f}" y="{:.1f}" text-anchor="middle">{}</text>)",
-                   kLeft + step * (static_cast<double>(i) + 0.5), kPlotHeight - 8, EscapeHtml(plot.labels[i]));
+                   kLeft + step * (static_cast<double>(i) + 0.5), kFigureHeight - 8, EscapeHtml(plot.labels[i]));
   }
   AddAll(plot.series, scale, step, count, svg);
   return Frame(plot.title, plot.unit, plot.note, Legend(plot.series), svg);
