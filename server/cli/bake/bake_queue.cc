@@ -25,10 +25,6 @@ namespace {
 
 constexpr const char* kPasswordVariable = "TERRACE_QUEUE_PASSWORD";
 
-int Fail(const Error& error) {
-  return cli::Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
-}
-
 Result<std::string> PasswordOf(const BakeArguments& arguments) {
   if (arguments.queue_password_file.empty()) {
     const char* const password = std::getenv(kPasswordVariable);

@@ -40,10 +40,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-int Fail(const Error& error) {
-  return cli::Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
-}
-
 int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
 
 // Only ranges of tiles are made: no raster is opened.

@@ -23,10 +23,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-int Fail(const Error& error) {
-  return cli::Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
-}
-
 double Rounded(double seconds) { return std::round(seconds * 10) / 10; }
 
 std::string StatusJson(const bake::JobStatus& status, const std::string& job) {

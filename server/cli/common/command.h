@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <string>
 
+#include "engine/core/result.h"
+
 namespace CLI {
 class App;
 }
@@ -21,6 +23,11 @@ inline constexpr const char* kCommands = "Commands";  // heading in the help
 inline int Fail(const std::string& message, int code) {
   std::fprintf(stderr, "terrace: %s\n", message.c_str());
   return code;
+}
+
+// The same; the code says whether the user can correct the command.
+inline int Fail(const Error& error) {
+  return Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
 }
 
 // Flushes stdout. Returns `code`, or kExitFailure if stdout could not be written.
