@@ -28,7 +28,8 @@ std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop
 // larger than `max_bytes`. Accepts any bytes. Thread-safe.
 std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes);
 
-// A member of gzip as what other formats hold: the deflated bytes, and the CRC-32 and length of what they decompress to.
+// A member of gzip as what other formats hold: the deflated bytes, and the CRC-32 and length of what they decompress
+// to.
 struct GzipMember {
   std::string_view deflated;  // within the member
   std::uint32_t crc32 = 0, size = 0;

@@ -109,8 +109,8 @@ class SharedTier {
   std::list<Job> queue_;
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;
-  bool is_writing_ = false;  // the store's thread has a batch
-  std::string reported_;  // the last reason in the log, and when
+  bool is_writing_ = false;                      // the store's thread has a batch
+  std::string reported_;                         // the last reason in the log, and when
   Clock::time_point reported_at_, answered_at_;  // when the log said so
 
   ConnectionPtr writer_;  // of the store's thread
