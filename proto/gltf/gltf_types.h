@@ -1,7 +1,11 @@
 // Enumerations that describe GLB tiles.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <iterator>
+#include <optional>
+#include <string_view>
 
 namespace terrace::proto {
 
@@ -13,6 +17,15 @@ enum class GlbCompression : std::uint8_t {
                // more
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
+
+// The form with this name in URLs: draco, none, quantized or meshopt.
+inline std::optional<GlbCompression> GlbCompressionNamed(std::string_view name) {
+  constexpr std::string_view kNames[] = {"draco", "none", "quantized", "meshopt"};  // by value
+  for (std::size_t i = 0; i < std::size(kNames); ++i) {
+    if (name == kNames[i]) return static_cast<GlbCompression>(i);
+  }
+  return std::nullopt;
+}
 
 // How the texture of a GLB tile is stored.
 enum class TextureFormat : std::uint8_t {

@@ -113,13 +113,8 @@ Result<void> SetPositive(std::optional<double>& to, const char* name, std::strin
 }
 
 Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
-  constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
-      {"draco", proto::GlbCompression::kDraco},
-      {"none", proto::GlbCompression::kNone},
-      {"quantized", proto::GlbCompression::kQuantized},
-      {"meshopt", proto::GlbCompression::kMeshopt}};
-  for (const auto& [name, compression] : kNames) {
-    if (text == name) return SetOnce(to, compression, "compression", /*repeatable=*/true);
+  if (const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(text)) {
+    return SetOnce(to, *compression, "compression", /*repeatable=*/true);
   }
   return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
 }

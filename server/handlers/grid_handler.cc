@@ -11,6 +11,7 @@
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
+#include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/grid_query.h"
 #include "tiler/strong_etag.h"
@@ -23,9 +24,8 @@ constexpr std::int64_t kBatch = 65536;
 constexpr int kLargest = 65535;  // of 16 bits
 
 struct MadeGrid {
-  std::string bytes;  // in the reply's coding
+  MadeReply reply;
   std::string description;
-  tiler::StageTimes times;
 };
 
 // How integers of 16 bits mean heights: offset + scale * integer.
@@ -124,19 +124,19 @@ asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& c
   Work<MadeGrid> work = [catalog = from.catalog, dataset, query, coding, most = from.max_mesh_samples,
                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
-    made.times.queue = tiler::MicrosecondsSince(asked);
+    made.reply.times.queue = tiler::MicrosecondsSince(asked);
     auto begun = TileService::Clock::now();
     const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
     if (!grid) return tl::unexpected(grid.error());
     const Result<std::vector<float>> heights = ReadNodes(*catalog->pipeline, dataset, *query, *grid, stop);
     if (!heights) return tl::unexpected(heights.error());
-    made.times.read = tiler::MicrosecondsSince(begun);
+    made.reply.times.read = tiler::MicrosecondsSince(begun);
     begun = TileService::Clock::now();
     const Steps steps = Steps::Of(*heights, query->range);
     Result<std::string> bytes = Encode(*query, *grid, *heights, steps);
     if (!bytes) return tl::unexpected(std::move(bytes).error());
-    made.times.encode = tiler::MicrosecondsSince(begun);
-    made.bytes = tiler::Compress(*std::move(bytes), coding, stop);
+    made.reply.times.encode = tiler::MicrosecondsSince(begun);
+    made.reply.bytes = tiler::Compress(*std::move(bytes), coding, stop);
     made.description = Describe(*grid, steps);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");
     return made;
@@ -144,15 +144,9 @@ asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& c
   const auto deadline = from.Deadline();
   Result<MadeGrid> made =
       co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
-  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
-  if (is_absent || (!made && made.error().code == ErrorCode::kInvalidArgument)) {
-    co_return ClientErrorResponse(made.error(), context.request->id);
-  }
-  if (!made) co_return co_await BackendFailure(made.error(), context.request->id);
+  if (!made) co_return co_await RefusePoints(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
-  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
-  response.body = std::make_shared<const std::string>(std::move(made->bytes));
-  co_return response;
+  co_return co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
 }
 
 }  // namespace
@@ -164,11 +158,8 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   Result<GridQuery> query = ParseGrid(context.route.query);
   if (!query) return ClientErrorResponse(query.error(), request.id);
   const DatasetView& view = from.catalog->datasets[*dataset];
-  if (query->datum == dem::HeightDatum::kOrthometric && !view.has_datum) {
-    const Error unknown{
-        ErrorCode::kInvalidArgument,
-        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
-    return ClientErrorResponse(unknown, request.id);
+  if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
+    return ClientErrorResponse(datum.error(), request.id);
   }
   const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
   const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);

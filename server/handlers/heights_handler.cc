@@ -18,6 +18,7 @@
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
+#include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "tiler/strong_etag.h"
 
@@ -36,12 +37,6 @@ constexpr std::size_t kShortList = 1000;
 
 // Points written between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 1024;
-
-// The result of a job.
-struct Made {
-  std::string bytes;  // in the reply's coding
-  tiler::StageTimes times;
-};
 
 // Parses on a worker, unless the input is small.
 asio::awaitable<Result<HeightsQuery>> ParseOnWorker(const Handlers& from, const RequestContext& context,
@@ -109,25 +104,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
   const DatasetView& view = from.catalog->datasets[dataset];
   const auto deadline = from.Deadline();
   Result<HeightsQuery> parsed = co_await ParseOnWorker(from, context, deadline);
-  if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
-    co_return co_await BackendFailure(parsed.error(), request.id);
-  }
-  if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
-  if (parsed->datum == dem::HeightDatum::kOrthometric && !view.has_datum) {
-    const Error unknown{
-        ErrorCode::kInvalidArgument,
-        "datum: it is not known what this dataset's heights count from, so there are no orthometric ones"};
-    co_return ClientErrorResponse(unknown, request.id);
+  if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
+  if (const Result<void> datum = CheckDatum(parsed->datum, view); !datum) {
+    co_return ClientErrorResponse(datum.error(), request.id);
   }
 
-  const bool is_binary = parsed->is_binary;
-  // 32-bit floats of heights hardly shrink, and compression takes longer than reading them.
-  const tiler::Coding coding = is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
-  Response response;
-  response.content_type = is_binary ? "application/octet-stream" : "application/json";
-  response.content_encoding = tiler::NameOf(coding);
-  if (!is_binary) response.vary = "Accept-Encoding";
-  response.cache_control = "no-store";
+  PointReply reply = StartPointReply(request, parsed->is_binary);
+  const tiler::Coding coding = reply.coding;
+  Response& response = reply.response;
   if (request.method != Method::kPost) {
     // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
@@ -143,18 +127,15 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
     Result<CertifiedPoints> known = co_await Certify(from, dataset, *parsed, deadline, request.client);
-    if (!known && known.error().code == ErrorCode::kInvalidArgument) {
-      co_return ClientErrorResponse(known.error(), request.id);
-    }
-    if (!known) co_return co_await BackendFailure(known.error(), request.id);
+    if (!known) co_return co_await RefusePoints(known.error(), view, request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  Work<Made> work = [catalog = from.catalog, dataset, coding, query, certified,
-                     asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<Made> {
-    Made made;
+  Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query, certified,
+                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+    MadeReply made;
     made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
     const Result<tiler::PointHeights> heights = ReadSurface(*catalog->pipeline, dataset, *query, stop);
@@ -167,29 +148,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
-  Result<Made> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
-  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
-  const bool is_wrong = !made && made.error().code == ErrorCode::kInvalidArgument;
-  if (is_absent || is_wrong) co_return ClientErrorResponse(made.error(), request.id);
-  if (!made) co_return co_await BackendFailure(made.error(), request.id);
-  response.body = std::make_shared<const std::string>(std::move(made->bytes));
-  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
-  co_return response;
+  Result<MadeReply> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
 }
 
 }  // namespace
 
 Answer AnswerHeights(const Handlers& from, const RequestContext& context) {
-  const Request& request = *context.request;
-  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
-    return ProblemResponse(415,
-                           "the body's Content-Type must be application/json, application/x-www-form-urlencoded or "
-                           "application/octet-stream",
-                           request.id);
-  }
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
-  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  return ReadHeights(from, context, *dataset);
+  return AnswerPoints(from, context, ReadHeights);
 }
 
 std::string HeightsBytes(const tiler::PointHeights& known) {

@@ -11,6 +11,7 @@
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
+#include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/sight_query.h"
 #include "tiler/strong_etag.h"
@@ -24,11 +25,6 @@ constexpr std::size_t kFewRays = 16;
 constexpr std::size_t kQuickRays = 512;
 // Rays written between two checks of the stop token.
 constexpr std::size_t kRayStopPeriod = 1024;
-
-struct MadeSight {
-  std::string bytes;  // in the reply's coding
-  tiler::StageTimes times;
-};
 
 // Replaces heights above the surface by heights above the ellipsoid.
 Result<void> RaiseFromGround(const tiler::TilePipeline& pipeline, std::uint32_t dataset, SightQuery& query,
@@ -137,17 +133,10 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   const DatasetView& view = from.catalog->datasets[dataset];
   const auto deadline = from.Deadline();
   Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
-  if (!parsed && parsed.error().code != ErrorCode::kInvalidArgument) {
-    co_return co_await BackendFailure(parsed.error(), request.id);
-  }
-  if (!parsed) co_return ClientErrorResponse(parsed.error(), request.id);
-  const bool is_binary = parsed->is_binary;
-  const tiler::Coding coding = is_binary ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
-  Response response;
-  response.content_type = is_binary ? "application/octet-stream" : "application/json";
-  response.content_encoding = tiler::NameOf(coding);
-  if (!is_binary) response.vary = "Accept-Encoding";
-  response.cache_control = "no-store";
+  if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
+  PointReply reply = StartPointReply(request, parsed->is_binary);
+  const tiler::Coding coding = reply.coding;
+  Response& response = reply.response;
   if (request.method != Method::kPost) {
     response.cache_control = CacheControlOf(context.route.query, view, from.cache_control);
     response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
@@ -155,9 +144,9 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   }
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
-  Work<MadeSight> work = [catalog = from.catalog, dataset, coding, query,
-                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeSight> {
-    MadeSight made;
+  Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query,
+                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+    MadeReply made;
     made.times.queue = tiler::MicrosecondsSince(asked);
     const auto begun = TileService::Clock::now();
     const tiler::TilePipeline& pipeline = *catalog->pipeline;
@@ -174,30 +163,14 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
     return made;
   };
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
-  Result<MadeSight> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
-  const bool is_absent = !made && made.error().code == ErrorCode::kNotFound && view.baked_alone;
-  if (is_absent || (!made && made.error().code == ErrorCode::kInvalidArgument)) {
-    co_return ClientErrorResponse(made.error(), request.id);
-  }
-  if (!made) co_return co_await BackendFailure(made.error(), request.id);
-  response.body = std::make_shared<const std::string>(std::move(made->bytes));
-  response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
-  co_return response;
+  Result<MadeReply> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
 }
 
 }  // namespace
 
 Answer AnswerSight(const Handlers& from, const RequestContext& context) {
-  const Request& request = *context.request;
-  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
-    return ProblemResponse(415,
-                           "the body's Content-Type must be application/json, application/x-www-form-urlencoded or "
-                           "application/octet-stream",
-                           request.id);
-  }
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
-  if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  return LookAlong(from, context, *dataset);
+  return AnswerPoints(from, context, LookAlong);
 }
 
 }  // namespace terrace::server

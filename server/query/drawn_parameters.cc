@@ -46,17 +46,12 @@ Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
   if (drawn.format != tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
   }
-  constexpr std::pair<std::string_view, proto::GlbCompression> kNames[] = {
-      {"draco", proto::GlbCompression::kDraco},
-      {"none", proto::GlbCompression::kNone},
-      {"quantized", proto::GlbCompression::kQuantized},
-      {"meshopt", proto::GlbCompression::kMeshopt}};
-  for (const auto& [name, compression] : kNames) {
-    if (*texts.compression != name) continue;
-    drawn.compression = compression;
-    return {};
+  const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(*texts.compression);
+  if (!compression) {
+    return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
   }
-  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
+  drawn.compression = *compression;
+  return {};
 }
 
 }  // namespace

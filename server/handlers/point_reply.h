@@ -1,0 +1,42 @@
+// What replies about points have in common: heights, grids and lines of sight.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/dem/dem_types.h"
+#include "server/asio.h"
+#include "server/handlers/handlers.h"
+
+namespace terrace::server {
+
+// The result of a job.
+struct MadeReply {
+  std::string bytes;  // in the reply's coding
+  tiler::StageTimes times;
+};
+
+using PointHandler = asio::awaitable<Response> (*)(const Handlers& from, const RequestContext& context,
+                                                   std::uint32_t dataset);
+// Calls `handler` with the index of the dataset, or refuses: 415 for another body than of points, 404.
+Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHandler handler);
+
+// kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
+Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
+
+// JSON in a coding that the client takes, or binary values, which hardly shrink: compressing them takes longer than
+// reading them. `no-store`, as replies to POST are.
+struct PointReply {
+  tiler::Coding coding;
+  Response response;
+};
+PointReply StartPointReply(const Request& request, bool is_binary);
+
+// The reply to a request that failed: the client's fault (400, or 404 where an archive has no heights), or ours.
+asio::awaitable<Response> RefusePoints(Error error, const DatasetView& view, RequestId request_id);
+// The reply with what a worker made, or RefusePoints.
+asio::awaitable<Response> FinishPointReply(Response response, Result<MadeReply> made, const DatasetView& view,
+                                           RequestId request_id);
+
+}  // namespace terrace::server
