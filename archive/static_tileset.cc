@@ -30,7 +30,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           manifest.available,
           dataset.bounds,
           dataset.error_fraction,
-          dataset.max_level,
+          dataset.finest_level,
           [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all); },
           [&manifest](int level) {
             const auto at = static_cast<std::size_t>(level);

@@ -120,6 +120,7 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.has_datum = dataset.source->has_datum();
   baked.metadata_levels = dataset.metadata_levels;
   baked.max_level = info.max_level;
+  baked.finest_level = info.finest_level;
   baked.sources = info.sources.size();
   return baked;
 }
@@ -194,7 +195,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
       manifest.error_steps.push_back(
-          tiler::ErrorStep(order.requested, level, level == source.max_level(), dataset.error_fraction));
+          tiler::ErrorStep(order.requested, level, level >= source.finest_level(), dataset.error_fraction));
     }
   }
   return manifests;

@@ -59,7 +59,9 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   hasher.AddText(manifest.encoder);
   hasher.Add(dataset.options);
   AddKind(hasher, manifest.kind);
-  const int last = static_cast<int>(unit.tiles.size()) - 1;
+  // Without the levels that edits added elsewhere.
+  int last = static_cast<int>(unit.tiles.size()) - 1;
+  while (last > source.finest_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
   for (int level = 0; level <= last; ++level) {
     const auto& ranges = unit.tiles[static_cast<std::size_t>(level)];
     AddRanges(hasher, ranges);
@@ -73,7 +75,8 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
     hasher.Add(source.ContentBelow(*unit.root, last));
     if (manifest.kind.metadata) {
       // Metadata lists the dataset's tiles below a tile.
-      for (int level = unit.root->level; level <= source.max_level(); ++level) {
+      const int deepest = static_cast<int>(source.AvailabilityBelow(*unit.root).size()) - 1;
+      for (int level = unit.root->level; level <= deepest; ++level) {
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;
         for (const geo::TileRange& range : source.Available(level)) {

@@ -36,7 +36,10 @@ tl::unexpected<Error> NoSources() {
 }  // namespace
 
 std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
-  if (request.format != TileFormat::kHeightPng) return source.EditsOf(request.key);
+  if (request.format != TileFormat::kHeightPng) {
+    const std::uint64_t edits = source.EditsOf(request.key);
+    return request.metadata && edits == 0 ? source.DeeperTilesOf(request.key) : edits;
+  }
   const int size = request.height_size, depth = request.key.level + (size == 512 ? 1 : 0);
   if (depth > source.info().max_mercator_depth) return 0;
   return source.EditsOfMercator(depth, {request.key.x * size, request.key.y * size, size, size});
@@ -164,7 +167,7 @@ MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& sur
     TileRequest request;
     request.dataset = dataset;
     request.key = key;
-    const bool is_deepest = key.level == of.source->max_level();
+    const bool is_deepest = key.level >= of.source->finest_level();
     request.error_step = ErrorStep(surface.requested, key.level, is_deepest, of.error_fraction);
     request.format = surface.format;
     request.compression = surface.compression;

@@ -152,6 +152,7 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
+  int finest_level = 0;  // the deepest one without edits; equal to max_level unless `precision` goes deeper
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.

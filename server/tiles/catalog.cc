@@ -86,6 +86,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
   if (dataset.imagery.image) view.texture = dataset.imagery.texture;
+  view.sources_finest_level = info.finest_level;
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;

@@ -44,6 +44,7 @@ struct DatasetView {
   std::size_t sources = 1;                      // rasters that the heights come from
   bool has_water = false;                       // tiles have a water mask
   std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
+  std::optional<int> sources_finest_level;      // DemSource::finest_level; nothing: the deepest level
   int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
   std::optional<tiler::Coding> baked_coding;    // of the tiles of its archive; nothing: it has no archive
@@ -55,6 +56,10 @@ struct DatasetView {
   // What keys of caches contain.
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
+  // The deepest level without edits, as of dem::DemSource.
+  int finest_level() const {
+    return baked_alone ? baked_alone->extent().finest_level : sources_finest_level.value_or(max_level());
+  }
   // The deepest level of the sources; an archive may end above it.
   int deepest_level() const { return baked_alone ? baked_alone->extent().deepest_level : max_level(); }
 };

@@ -19,6 +19,8 @@ double MeshError(double error_m);
 // Empty if no edit asks for anything. Depends on edits, key and nodes alone.
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);
 
+tin::SampleLimits LimitsOf(dem::MeshDemands demands);
+
 // The error that each sample may have in a tile of this error, row by row; empty: `error_m` everywhere.
 std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m);
 
@@ -29,6 +31,8 @@ proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, doubl
 // or are vertices of the hole's outline.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
+// The same of a field of `width` nodes a row.
+std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh);
 
 // Removes these triangles. Vertices of the tile's edges stay: a triangle of one point refers to each that no other
 // triangle has, because clients need the lists of edges.

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,13 @@ inline const char* NameOf(EditOp op) { return kEditOpNames[static_cast<std::size
 // The height of a flatten.
 enum class FlatHeight : std::uint8_t { kGiven, kMean, kMedian };
 
+// What the heights of an edit count from.
+enum class EditDatum : std::uint8_t {
+  kNone,        // not stated: the ellipsoid
+  kEllipsoid,   // of WGS 84
+  kOrthometric  // the geoid of the sources; EGM96 where they refer to the ellipsoid
+};
+
 // Metres east and north of the origin of an edit's plane.
 struct PlanPoint {
   double x = 0, y = 0;
@@ -44,6 +52,16 @@ struct EditPlane {
 
   double X(double lon) const;  // the shorter way around the Earth
   double Y(double lat) const { return (lat - latitude) * north_m; }
+};
+
+// Heights of a geoid above the ellipsoid around an edit, bilinear between nodes on its plane.
+struct EditUndulations {
+  PlanPoint south_west;
+  double step_x = 1, step_y = 1;  // metres
+  std::size_t columns = 0, rows = 0;
+  std::vector<double> values;  // row by row from the south-western one
+
+  double At(PlanPoint point) const;  // of points beyond the patch: of the nearest one on it
 };
 
 struct Edit {
@@ -64,7 +82,10 @@ struct Edit {
   double blend_m = 0;
   double half_width_m = 0;  // of lines
   FlatHeight flat = FlatHeight::kGiven;
-  double height_m = 0;                                       // of flatten
+  double height_m = 0;                 // of flatten
+  EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
+  // If the heights are orthometric: is added to them. Null until the sources are known, and for the ellipsoid.
+  std::shared_ptr<const EditUndulations> undulations;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
@@ -89,6 +110,9 @@ struct Edit {
   ContentHash hash;
 
   double reach_m() const { return half_width_m + blend_m; }
+  bool has_heights() const {
+    return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
+  }
   bool changes_heights() const { return op <= EditOp::kRaise; }
   // The share of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double ShareAt(double distance_m) const {

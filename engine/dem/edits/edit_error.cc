@@ -12,8 +12,8 @@ namespace {
 // beyond a polygon is that of the nearest point of its outline, which for a convex one is no further away than the
 // points themselves.
 double TargetError(const Edit& edit, double diagonal_m, double furthest_m) {
-  if (edit.op == EditOp::kFlatten || edit.op == EditOp::kOffset) return 0;
-  const double range = edit.high_m - edit.low_m;
+  if (edit.op == EditOp::kOffset) return 0;
+  const double range = edit.high_m - edit.low_m;  // of flatten: of the geoid
   if (edit.is_convex) return std::min(range, 2 * edit.steepest * diagonal_m);
   if (edit.is_area && edit.triangles.empty()) {
     return std::min(range, 2 * edit.steepest * (diagonal_m + 2 * furthest_m));

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/dem/edits/edit.h"
 #include "engine/dem/edits/read_edits.h"
 
@@ -15,5 +16,8 @@ namespace terrace::dem {
 // there is no edit either.
 std::optional<Edit> ParseEdit(const nlohmann::json& json, const std::string& file, std::size_t feature,
                               std::vector<EditFault>& faults);
+
+// The value of a member "vertical"; or what is wrong with it.
+tl::expected<EditDatum, std::string> ParseDatum(const nlohmann::json& value);
 
 }  // namespace terrace::dem
