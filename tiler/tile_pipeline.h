@@ -139,6 +139,7 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
+  ByteCacheStats drawn_meshes() const { return drawn_->stats(); }
   ByteCacheStats refinements() const { return refinements_->stats(); }
 
  private:

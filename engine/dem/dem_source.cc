@@ -17,6 +17,7 @@
 #include "engine/dem/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/dem/mosaic/availability.h"
+#include "engine/dem/mosaic/point_blocks.h"
 #include "engine/dem/sources/open_rasters.h"
 #include "engine/dem/sources/raster_source.h"
 #include "engine/dem/statistics/cache_folder.h"
@@ -317,6 +318,11 @@ SampleCounts DemSource::CountSamples() const {
     sum.voids += counts.voids;
   }
   return sum;
+}
+
+KeptBlocks DemSource::CountKeptBlocks() {
+  const PointBlockCache& cache = PointBlockCache::Shared();
+  return {cache.count(), cache.bytes()};
 }
 
 bool DemSource::has_datum() const {

@@ -106,6 +106,7 @@ class DemSource {
 
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
+  static KeptBlocks CountKeptBlocks();
 
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
   // precedence, and every option that changes heights. Copies of the files have the same hash.

@@ -159,6 +159,11 @@ struct DemInfo {
   std::vector<std::string> left_out;
 };
 
+// Blocks of samples with their voids filled that the process keeps for points and lines of sight, of all sources.
+struct KeptBlocks {
+  std::size_t count = 0, bytes = 0;
+};
+
 // Numbers of samples read for tiles, at the resolution that they were read at.
 struct SampleCounts {
   std::uint64_t measured = 0;

@@ -161,6 +161,8 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
     return ClientErrorResponse(datum.error(), request.id);
   }
+  // Archives have no other heights.
+  if (view.baked_alone && query->datum == dem::HeightDatum::kEllipsoid && !query->drawn) query->drawn.emplace();
   const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
   const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
   Response response;

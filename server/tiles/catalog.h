@@ -75,7 +75,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline);
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// Returns the bounds of the largest connected group of ranges of the deepest tiles, clipped to the dataset's bounds.
+// Returns the bounds of the largest connected group of ranges of the deepest tiles without edits, clipped to the dataset's bounds.
 // Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 

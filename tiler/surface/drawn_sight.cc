@@ -79,8 +79,8 @@ class Clearances {
 
 class Walk {
  public:
-  Walk(const dem::DemSource& source, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
-      : source_(source), level_(level), options_(options), mesh_of_(mesh_of) {}
+  Walk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
+      : has_tile_(has_tile), level_(level), options_(options), mesh_of_(mesh_of) {}
 
   Result<dem::SightAnswer> Look(const dem::SightRay& ray, const std::stop_token& stop) {
     Clearances clearances;
@@ -96,7 +96,7 @@ class Walk {
  private:
   Result<const DrawnMesh*> MeshAt(const dem::GeoPosition& point) {
     geo::TileKey key = TileAt(point, level_);
-    for (int level = level_; level > 0 && !source_.IsAvailable(key);) key = TileAt(point, --level);
+    for (int level = level_; level > 0 && !has_tile_(key);) key = TileAt(point, --level);
     if (last_ != nullptr && last_->key() == key) return last_;
     auto& mesh = meshes_[key];
     if (mesh == nullptr) {
@@ -182,7 +182,7 @@ class Walk {
     clearances.Add({clearance_m, clearance_m, clearance_m}, 0, 1, start, length);
   }
 
-  const dem::DemSource& source_;
+  const HasTile& has_tile_;
   const int level_;
   const dem::SightOptions& options_;
   const MeshOfTile& mesh_of_;
@@ -205,11 +205,11 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
       samples, kMaxSamplesAlong);
 }
 
-Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const dem::DemSource& source, int level,
+Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,
                                                      const std::stop_token& stop) {
-  Walk walk(source, level, options, mesh_of);
+  Walk walk(has_tile, level, options, mesh_of);
   std::vector<dem::SightAnswer> answers;
   answers.reserve(rays.size());
   for (const dem::SightRay& ray : rays) {

@@ -68,6 +68,7 @@ class PointBlockCache {
   // points, is not worth reading as a whole.
   bool Note(const PointBlockKey& key);
 
+  std::size_t count() const;
   std::size_t bytes() const;
 
  private:

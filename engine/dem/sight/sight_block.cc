@@ -10,11 +10,35 @@ namespace {
 // Metres between positions at which undulations are read.
 constexpr double kUndulationStep = 240;
 
+float Larger(float a, float b) { return b > a ? b : a; }  // of a void and a height: the height
+
+// SightBlock::largest.
+std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_t width, std::int64_t height) {
+  std::vector<float> across(heights.size()), largest(heights.size());
+  const auto lowest = [](float h) { return std::isnan(h) ? -std::numeric_limits<float>::infinity() : h; };
+  for (std::int64_t row = 0; row < height; ++row) {
+    const float* const from = &heights[static_cast<std::size_t>(row * width)];
+    float* const to = &across[static_cast<std::size_t>(row * width)];
+    std::int64_t i = 0;
+    for (; i + 2 < width; ++i) to[i] = Larger(Larger(lowest(from[i]), from[i + 1]), from[i + 2]);
+    for (; i < width; ++i) to[i] = i + 1 < width ? Larger(lowest(from[i]), from[i + 1]) : lowest(from[i]);
+  }
+  for (std::int64_t row = 0; row < height; ++row) {
+    const float* const from = &across[static_cast<std::size_t>(row * width)];
+    const float* const next = row + 1 < height ? from + width : from;
+    const float* const last = row + 2 < height ? next + width : next;
+    float* const to = &largest[static_cast<std::size_t>(row * width)];
+    for (std::int64_t i = 0; i < width; ++i) to[i] = Larger(Larger(from[i], next[i]), last[i]);
+  }
+  return largest;
+}
+
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
     : window_(source.window), heights_(source.Samples()), owned_(source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
+  largest_ = LargestOfThree(heights_, window().columns, window().rows);
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
   Level level{(width + 1) / 2, (height + 1) / 2, {}};
