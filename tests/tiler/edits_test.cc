@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <set>
 #include <string>
@@ -179,16 +180,15 @@ double LeastInFormat(const dem::DemSource& source, const geo::TileKey& key, cons
     step = 0x1p-10;
     while (step < range / 16384) step *= 2;
   }
-  const auto steepest = [&](int i, int j) {
-    double rise = 0;
-    for (const int side : {-1, 1}) {
-      const int to_x = x + side * i, to_y = y + side * j;
-      if (to_x < 0 || to_y < 0 || to_x > cells || to_y > cells) continue;
-      rise = std::max(rise, std::abs(static_cast<double>(tile.At(to_x, to_y) - tile.At(x, y))));
+  double low = std::numeric_limits<double>::infinity(), high = -low;  // of the nodes around, on an edge along it
+  for (const int i : {-1, 0, 1}) {
+    for (const int j : {-1, 0, 1}) {
+      if ((east != 0 && i != 0) || (north != 0 && j != 0)) continue;
+      const auto height = static_cast<double>(tile.At(x + i, y + j));
+      low = std::min(low, height), high = std::max(high, height);
     }
-    return rise;
-  };
-  const double across = (east == 0 ? steepest(1, 0) : 0) + (north == 0 ? steepest(0, 1) : 0);
+  }
+  const double across = (high - low) * ((east == 0 ? 1 : 0) + (north == 0 ? 1 : 0));
   return step / 2 + across * cells / (2 * 32767.0);
 }
 

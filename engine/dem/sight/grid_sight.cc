@@ -17,7 +17,7 @@ constexpr double kUndulationPart = 500;
 // Samples between places that are measured first.
 constexpr double kProbes = 24;
 // Samples: parts of a ray that cross at most this many, none of them void, are walked along.
-constexpr double kWalked = 32;
+constexpr double kWalked = 64;
 // Metres: over the rounding of heights.
 constexpr double kSlack = 1e-6;
 // Parts of a cell with voids: its heights are no polynomial.
