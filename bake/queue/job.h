@@ -25,8 +25,10 @@ struct JobPlace {
 Result<void> CheckJobName(const std::string& name);
 
 // Connects, and checks that the server has what the queue needs. Errors: as redis::Connection::Open; kInvalidArgument:
-// a Redis before 6.2.
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place);
+// a Redis before 6.2. `timeout`: of connecting, and of each call.
+inline constexpr std::chrono::milliseconds kJobTimeout{10'000};  // a Redis that replies a second late is slow but works
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place,
+                                                        std::chrono::milliseconds timeout = kJobTimeout);
 
 // What all workers of a job must agree on: names and values.
 using JobIdentity = std::vector<std::pair<std::string, std::string>>;
