@@ -55,9 +55,9 @@ Result<void> CheckJobName(const std::string& name) {
                    kMaxSize);
 }
 
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place, std::chrono::milliseconds timeout) {
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place) {
   redis::ConnectionOptions options;
-  options.connect_timeout = options.command_timeout = timeout;
+  options.connect_timeout = options.command_timeout = place.timeout;
   options.ca_file = place.ca_file;
   auto connection = redis::Connection::Open(place.address, options);
   if (!connection) return connection;

@@ -17,6 +17,8 @@ struct JobPlace {
   redis::Address address;
   std::string ca_file = {};  // as in redis::ConnectionOptions
   std::string name;
+  // Of connecting, and of each call. A Redis that replies a second late is slow but works.
+  std::chrono::milliseconds timeout{10'000};
 
   std::string Key(const std::string& what) const;
 };
@@ -25,10 +27,8 @@ struct JobPlace {
 Result<void> CheckJobName(const std::string& name);
 
 // Connects, and checks that the server has what the queue needs. Errors: as redis::Connection::Open; kInvalidArgument:
-// a Redis before 6.2. `timeout`: of connecting, and of each call.
-inline constexpr std::chrono::milliseconds kJobTimeout{10'000};  // a Redis that replies a second late is slow but works
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place,
-                                                        std::chrono::milliseconds timeout = kJobTimeout);
+// a Redis before 6.2.
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place);
 
 // What all workers of a job must agree on: names and values.
 using JobIdentity = std::vector<std::pair<std::string, std::string>>;

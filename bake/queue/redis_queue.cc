@@ -345,7 +345,9 @@ void RedisQueue::Beat() {
   // A call that takes longer is given up, so that the next one comes in time. Whether Redis is away is told by Take.
   constexpr milliseconds kMinTimeout{500};
   if (!beat_connection_ || beat_connection_->HasEnded()) {
-    auto connection = ConnectToJob(options_.place, std::clamp(Lease() / 3, kMinTimeout, kJobTimeout));
+    JobPlace place = options_.place;
+    place.timeout = std::min(place.timeout, std::max(Lease() / 3, kMinTimeout));
+    auto connection = ConnectToJob(place);
     if (!connection) return;
     beat_connection_ = *std::move(connection);
   }

@@ -96,11 +96,12 @@ void SharedTier::Drop(Loan loan) {
 void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
   std::deque<Idle> gone;  // closed after the lock is released
   const std::lock_guard lock(mutex_);
-  if (epoch != epoch_) return;
+  if (epoch != epoch_ || !on_) return;
+  on_ = false;
+  ++epoch_;
+  ++switched_off_;
   ++errors_;
   if (IsTimeout(why)) ++timeouts_;
-  ++epoch_;
-  if (std::exchange(on_, false)) ++switched_off_;
   gone.swap(idle_);
   for (const redis::Connection* const connection : borrowed_) connection->Interrupt();
   borrowed_.clear();

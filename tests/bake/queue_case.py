@@ -14,6 +14,8 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+import in_parallel  # noqa: E402, F401
 from redis_process import Redis  # noqa: E402
 from srtm import write_hgt  # noqa: E402
 

@@ -7,9 +7,8 @@ import signal
 import subprocess
 import sys
 import time
-import unittest
 
-from queue_case import BINARY, IS_LONG, QueueCase, files_of, write_hgt
+from queue_case import BINARY, IS_LONG, QueueCase, files_of, in_parallel, write_hgt
 
 KILLS = 200 if IS_LONG else 8
 
@@ -87,6 +86,7 @@ class Queue(QueueCase):
         self.end(first)
         self.expect_equal(place)
 
+    @in_parallel.alone
     def test_a_slow_unit_is_not_inherited_while_its_worker_lives(self):
         place = self.place()
         lease = self.seconds / len(self.units) / 2
@@ -255,4 +255,4 @@ class Queue(QueueCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    in_parallel.main()
