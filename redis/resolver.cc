@@ -1,9 +1,9 @@
 #include "redis/resolver.h"
 
 #include <netdb.h>
+#include <sys/socket.h>
 
 #include <condition_variable>
-#include <cstring>
 #include <map>
 #include <mutex>
 #include <system_error>
@@ -30,11 +30,7 @@ Result<Addresses> AskSystem(const std::string& host, std::uint16_t port, int fla
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owned(found, ::freeaddrinfo);
   Addresses addresses;
   for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
-    HostAddress address;
-    if (one->ai_addrlen > sizeof address.address) continue;
-    std::memcpy(&address.address, one->ai_addr, one->ai_addrlen);
-    address.size = one->ai_addrlen;
-    addresses.push_back(address);
+    addresses.emplace_back(reinterpret_cast<const char*>(one->ai_addr), one->ai_addrlen);
   }
   return addresses;
 }

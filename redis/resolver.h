@@ -4,8 +4,6 @@
 // caller waits only for so long, and the addresses that it found last stand in for those that it does not find in time.
 #pragma once
 
-#include <sys/socket.h>
-
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -17,10 +15,7 @@
 
 namespace terrace::redis {
 
-struct HostAddress {
-  sockaddr_storage address{};
-  socklen_t size = 0;
-};
+using HostAddress = std::string;  // the bytes of a sockaddr
 
 // Thread-safe. A look-up that is not over when the object is destroyed goes on by itself.
 class Resolver {

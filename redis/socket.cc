@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstddef>
 #include <system_error>
 #include <utility>
 
@@ -23,6 +24,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 std::string WhyOf(int error) { return std::generic_category().message(error); }
+
+int FamilyOf(const HostAddress& address) {
+  sa_family_t family = AF_UNSPEC;
+  address.copy(reinterpret_cast<char*>(&family), sizeof family, offsetof(sockaddr, sa_family));
+  return family;
+}
 
 // The oldest error of OpenSSL in this thread; empties its list.
 std::string TlsError() {
@@ -64,7 +71,7 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
     // An address that does not answer leaves time for the others.
     const Deadline now = std::chrono::steady_clock::now();
     const Deadline share = now + (deadline - now) / left;
-    const int fd = ::socket(one->address.ss_family, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+    const int fd = ::socket(FamilyOf(*one), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) {
       why = WhyOf(errno);
       continue;
@@ -72,7 +79,9 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
     Socket socket(fd, name);
     const int on = 1;
     ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    int error = ::connect(fd, reinterpret_cast<const sockaddr*>(&one->address), one->size) == 0 ? 0 : errno;
+    int error = ::connect(fd, reinterpret_cast<const sockaddr*>(one->data()), static_cast<socklen_t>(one->size())) == 0
+                    ? 0
+                    : errno;
     if (error == EINPROGRESS) {
       if (const auto waited = socket.WaitFor(POLLOUT, share); !waited) {
         why = "does not answer";

@@ -89,7 +89,7 @@ void SocketFile::Remove() {
   if (found.st_dev == device_ && found.st_ino == inode_) ::unlink(path.c_str());
 }
 
-Result<PathSocket> ListenOnPath(const std::string& path, mode_t mode) {
+Result<PathSocket> ListenOnPath(const std::string& path, unsigned mode) {
   const Result<bool> is_stale = IsStale(path);
   if (!is_stale) return tl::unexpected(is_stale.error());
   if (*is_stale) ::unlink(path.c_str());

@@ -1,8 +1,7 @@
 // Listening on a path of the file system (a Unix socket).
 #pragma once
 
-#include <sys/types.h>
-
+#include <cstdint>
 #include <string>
 
 #include "engine/core/result.h"
@@ -24,8 +23,7 @@ class SocketFile {
 
  private:
   std::string path_;  // empty: none
-  dev_t device_ = 0;
-  ino_t inode_ = 0;
+  std::uint64_t device_ = 0, inode_ = 0;
 };
 
 struct PathSocket {
@@ -36,7 +34,7 @@ struct PathSocket {
 // `mode`: of the file, who may connect: 0600, 0660 ... A socket that a killed process has left is replaced.
 // kUnavailable: another process listens there, something else lies there, or the folder cannot be written; the message
 // has the remedy.
-Result<PathSocket> ListenOnPath(const std::string& path, mode_t mode);
+Result<PathSocket> ListenOnPath(const std::string& path, unsigned mode);
 
 // Whether ListenOnPath could succeed now. Changes nothing.
 Result<void> CheckSocketPath(const std::string& path);

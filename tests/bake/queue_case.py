@@ -15,7 +15,6 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-import in_parallel  # noqa: E402, F401
 from redis_process import Redis  # noqa: E402
 from srtm import write_hgt  # noqa: E402
 
@@ -109,7 +108,7 @@ class QueueCase(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             texts = [pool.submit(stream.read) if stream else None for stream in (process.stdout, process.stderr)]
             try:
-                process.wait(timeout=40)
+                process.wait(timeout=150)
             except subprocess.TimeoutExpired:
                 process.kill()
                 raise

@@ -6,7 +6,8 @@ import signal
 import subprocess
 import time
 
-from queue_case import BINARY, QueueCase, files_of, in_parallel
+from queue_case import BINARY, QueueCase, files_of
+import in_parallel  # queue_case has set the path
 from redis_process import Listener, proxy
 
 

@@ -212,7 +212,7 @@ class Purge(unittest.TestCase):
             with Server({**self.config, "admin_listen": f"unix:{path}", "admin_socket_mode": mode, "access_log": "combined"}, self.folder) as server:
                 self.assertIn(f"operators: unix:{path} answers", server.log())
                 self.assertEqual(oct(path.stat().st_mode & 0o777), oct(int(mode, 8)))
-                self.assertEqual(server.get("/alps/7/133/105.terrain")[0], 200)
+                self.assertEqual(server.get("/alps/7/133/97.terrain")[0], 200)
 
                 def ask(method, target):
                     done = subprocess.run(["curl", "-s", "-i", "--unix-socket", path, "-X", method, "http://localhost" + target], check=True,

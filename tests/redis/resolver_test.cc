@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstring>
@@ -19,19 +20,16 @@ using std::chrono::seconds;
 auto In(milliseconds time) { return std::chrono::steady_clock::now() + time; }
 
 HostAddress Address(std::uint32_t number) {
-  HostAddress address;
   sockaddr_in in{};
   in.sin_family = AF_INET;
   in.sin_addr.s_addr = htonl(number);
-  std::memcpy(&address.address, &in, sizeof in);
-  address.size = sizeof in;
-  return address;
+  return {reinterpret_cast<const char*>(&in), sizeof in};
 }
 
 std::uint32_t NumberOf(const Result<std::vector<HostAddress>>& found) {
   if (!found || found->size() != 1) return 0;
   sockaddr_in in{};
-  std::memcpy(&in, &found->front().address, sizeof in);
+  std::memcpy(&in, found->front().data(), std::min(sizeof in, found->front().size()));
   return ntohl(in.sin_addr.s_addr);
 }
 
