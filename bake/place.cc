@@ -303,24 +303,49 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   return {};
 }
 
+namespace {
+
+// What processes that were killed have left: unfinished files, and the locks of those that have surely ended. A lock of
+// another host stays, since nobody here knows of its owner.
+void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
+  std::error_code ignored;
+  std::vector<fs::path> leftovers;
+  for (const fs::path& folder : folders) {
+    for (const fs::path& within : {folder, folder / "units"}) {
+      for (const auto& entry : fs::directory_iterator(within, ignored)) {
+        if (IsPartial(entry.path().filename().string())) leftovers.push_back(entry.path());
+      }
+    }
+  }
+  for (const auto& entry : fs::directory_iterator(place, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (IsLock(name) && Owner::Parse(ReadText(entry.path())).HasEnded()) leftovers.push_back(entry.path());
+  }
+  for (const fs::path& file : leftovers) fs::remove(file, ignored);
+}
+
+}  // namespace
+
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::error_code ignored;
+  std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
+    folders.push_back(folder);
     std::set<std::string> wanted;
     for (const archive::UnitEntry& unit : manifest.units) {
       if (unit.tiles > 0) wanted.insert(fs::path(archive::UnitPath(unit.name)).filename().string());
     }
-    std::vector<fs::path> leftovers;
+    std::vector<fs::path> unknown;
     for (const fs::path& within : {folder, folder / "units"}) {
       for (const auto& entry : fs::directory_iterator(within, ignored)) {
         const std::string name = entry.path().filename().string();
-        const bool is_unit = name.ends_with(".pmtiles");
-        if ((is_unit && !wanted.contains(name)) || IsPartial(name)) leftovers.push_back(entry.path());
+        if (name.ends_with(".pmtiles") && !wanted.contains(name)) unknown.push_back(entry.path());
       }
     }
-    for (const fs::path& file : leftovers) fs::remove(file, ignored);
+    for (const fs::path& file : unknown) fs::remove(file, ignored);
   }
+  RemoveLeftovers(place, folders);
   fs::remove(fs::path(place) / kPlaceIdFile, ignored);
   fs::remove(fs::path(place) / kIdentityFile, ignored);
 }
@@ -338,10 +363,12 @@ Result<std::string> PlaceId(const std::string& place) {
 
 bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::error_code ignored;
+  std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
-    const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
-    if (!fs::exists(folder / archive::kManifestFile, ignored)) return false;
+    folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
+    if (!fs::exists(folders.back() / archive::kManifestFile, ignored)) return false;
   }
+  RemoveLeftovers(place, folders);
   fs::remove(fs::path(place) / kPlaceIdFile, ignored);
   fs::remove(fs::path(place) / kIdentityFile, ignored);
   return true;

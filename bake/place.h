@@ -47,7 +47,8 @@ std::string ToJson(const BakeIdentity& identity);
 // the message says what differs and what to do. kUnavailable: it cannot be read or written.
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
 
-// Removes what only an unfinished bake needs: the identity, and leftovers of units that were interrupted.
+// Removes what only an unfinished bake needs: the identity, and what killed processes have left: unfinished files, and
+// locks of processes of this host that have ended.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.
@@ -55,7 +56,8 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 // A random number that is kept in the place until the bake is finished: workers that have the same one write into the
 // same place, wherever it is mounted. kUnavailable: the place cannot be written.
 Result<std::string> PlaceId(const std::string& place);
-// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted.
+// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted, and what killed
+// processes have left, as TidyPlace does.
 bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
 // Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
 // refused.

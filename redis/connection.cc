@@ -160,6 +160,10 @@ Error Connection::Refusal(const std::string& command, const ReplyView& error) co
   if (starts("ERR AUTH") || starts("ERR Client sent AUTH")) {
     return make(ErrorCode::kInvalidArgument, "has no password, but one was given; leave it out");
   }
+  if (kind == "DENIED") {
+    return make(ErrorCode::kInvalidArgument,
+                "is in protected mode, and answers its own machine only; give it a password (requirepass)");
+  }
   if (kind == "NOAUTH") return make(ErrorCode::kInvalidArgument, "wants a password; give one");
   if (kind == "NOPERM") {
     return make(ErrorCode::kInvalidArgument, fmt::format("the user may not use {} there; extend its ACL", command));

@@ -30,7 +30,7 @@ struct ConnectionOptions {
 // The name and the arguments; bytes, not text.
 using Command = std::vector<std::string>;
 
-// Used by one thread at a time. No message contains user, password or an argument of a command.
+// Used by one thread at a time, but for Interrupt. No message contains user, password or an argument of a command.
 class Connection {
  public:
   // Connects, authenticates, selects the database. kUnavailable: nobody answers there, or not as Redis does.
@@ -51,6 +51,11 @@ class Connection {
   Error Refusal(const std::string& command, const ReplyView& error) const;
 
   bool is_open() const { return is_open_; }
+  // Whether the server has closed the connection meanwhile. Of a connection that is silently gone nobody knows. Does
+  // not wait.
+  bool HasEnded() { return !is_open_ || socket_.HasEnded(); }
+  // From any thread: the call that is under way, and all later ones, fail at once with kUnavailable.
+  void Interrupt() const { socket_.Interrupt(); }
 
  private:
   Connection(Socket socket, const Address& address, const ConnectionOptions& options);

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -76,7 +77,7 @@ class RedisQueue : public UnitQueue {
   };
 
   explicit RedisQueue(RedisQueueOptions options);
-  // All below: the mutex is held.
+  // `calls_` is held by the caller of these, `mutex_` is not.
   Result<void> Enter(bool is_emptied);
   Result<void> CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const;
   Result<bool> Fill(const std::string& incarnation);
@@ -88,16 +89,30 @@ class RedisQueue : public UnitQueue {
   void NoteBack();
   std::optional<Taken> TakeOnce();
   std::optional<Taken> Accept(const redis::ReplyView& reply);
-  // Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
-  void Send(const Held& held, const char* script, std::vector<std::string> arguments);
-  void Beat();
+  Taken WaitOrOver();
+  void EndBecause(End end, const Error& why);
   void Flush();
+  // As it is in Redis.
+  void SetJob(const std::string& incarnation, std::chrono::milliseconds lease);
+  std::string Incarnation() const;
+  std::chrono::milliseconds Lease() const;
+  // `mutex_` is held. Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
+  void Send(const Held& held, const char* script, std::vector<std::string> arguments);
+
+  // Of the thread of the heartbeat, which has a connection of its own: a call that Redis answers late, or a search for
+  // what is missing, must not cost the units in hand.
+  void KeepBeating(const std::stop_token& stop);
+  void Beat();
 
   const RedisQueueOptions options_;
   std::unordered_map<std::string, std::size_t> index_;  // of units_
 
-  mutable std::mutex mutex_;
+  std::mutex calls_;  // held while Redis is waited for; taken before mutex_
   std::unique_ptr<redis::Connection> connection_;
+  Clock::time_point next_take_{}, next_connect_{};
+  std::optional<Clock::time_point> away_since_;
+
+  mutable std::mutex mutex_;  // of what follows; never held while Redis is waited for
   std::string incarnation_;
   std::chrono::milliseconds lease_;
   std::map<std::size_t, Held> held_;
@@ -105,8 +120,8 @@ class RedisQueue : public UnitQueue {
   std::deque<redis::Command> outbox_;  // to be sent before the next command
   End end_ = End::kNone;
   Error why_;
-  std::optional<Clock::time_point> away_since_;
-  Clock::time_point next_take_{}, next_connect_{};
+
+  std::unique_ptr<redis::Connection> beat_connection_;
   std::jthread beat_;
 };
 

@@ -153,6 +153,9 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
   command.add_option("--lease", arguments.lease)
       ->check(NumberAbove0("a number of seconds above 0"))
       ->group("");  // for tests: how long a worker may be silent
+  command.add_option("--queue-timeout", arguments.queue_timeout)
+      ->check(NumberAbove0("a number of seconds above 0"))
+      ->group("");  // for tests: how long Redis may take for a reply
   command
       .add_option("--update", arguments.update,
                   "An older bake in chunks: what did not change is copied from it, the rest is baked")

@@ -28,7 +28,7 @@ struct BakeArguments {
   unsigned threads = 0;                                      // 0: one for each processor
   std::string shard;
   std::string queue, job, queue_password_file, queue_ca;  // empty: not given
-  double lease = 30;                                      // seconds
+  double lease = 30, queue_timeout = 10;                  // seconds
   bool finish = false, dry_run = false, json = false, yes = false, no_gzip = false;
   std::string catalogue;
   double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
