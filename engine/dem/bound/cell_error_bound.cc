@@ -7,8 +7,8 @@
 namespace terrace::dem {
 namespace {
 
-// Lines between nodes deviate from straight lines by much less than this fraction of the cell: a margin that exceeds the
-// curvature of its edges.
+// Lines between nodes deviate from straight lines by much less than this fraction of the cell: a margin that exceeds
+// the curvature of its edges.
 constexpr double kBulge = 1.0 / 32;
 
 // The samples whose centres lie in a box of pixels, moved by `shift` columns.

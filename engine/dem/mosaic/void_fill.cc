@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <span>
+
+#include "engine/dem/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -102,13 +105,30 @@ class NearValid {
 std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow& wide, const GridWindow& core,
                              int max_gap) {
   const Filler filler(heights, wide, max_gap);
-  const NearValid near(heights, wide, max_gap - 1);
+  const auto row_of = [&](std::int64_t row) {
+    const auto first = static_cast<std::size_t>((row - wide.row) * wide.columns + core.column - wide.column);
+    return std::span(heights).subspan(first, static_cast<std::size_t>(core.columns));
+  };
+  std::vector<std::int64_t> rows;  // with voids
+  std::int64_t voids = 0;
   std::vector<float> filled;
   filled.reserve(static_cast<std::size_t>(core.columns * core.rows));
-  for (std::int64_t r = core.row - wide.row; r < core.row - wide.row + core.rows; ++r) {
-    for (std::int64_t c = core.column - wide.column; c < core.column - wide.column + core.columns; ++c) {
-      const float height = filler.At(c, r);
-      filled.push_back(std::isnan(height) && near.Has(c, r) ? filler.Bridge(c, r) : height);
+  for (std::int64_t row = core.row; row < core.row + core.rows; ++row) {
+    const std::span<const float> of_row = row_of(row);
+    filled.insert(filled.end(), of_row.begin(), of_row.end());
+    if (!HasVoids(of_row)) continue;
+    rows.push_back(row);
+    voids += std::ranges::count_if(of_row, [](float height) { return std::isnan(height); });
+  }
+  // Marking costs about as much as bridging this share of the samples.
+  constexpr std::int64_t kShare = 16;
+  std::optional<NearValid> near;
+  if (voids > wide.columns * wide.rows / kShare) near.emplace(heights, wide, max_gap - 1);
+  for (const std::int64_t row : rows) {
+    float* const to = filled.data() + (row - core.row) * core.columns;
+    for (std::int64_t i = 0; i < core.columns; ++i) {
+      const std::int64_t c = core.column - wide.column + i, r = row - wide.row;
+      if (std::isnan(to[i]) && (!near || near->Has(c, r))) to[i] = filler.Bridge(c, r);
     }
   }
   return filled;
