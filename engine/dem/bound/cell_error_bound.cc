@@ -222,10 +222,11 @@ bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
 // One query for the box in place of one for each cell: the samples around a cell are among those around the box.
 bool CellErrorBound::HasNoSamples(const CellBox& box) const {
   const bool has_turns = grid_.georeference().is_geographic_grid();
+  const bool is_separable = trace_.cells.positions().is_separable();  // then one row and one column tell all
   const double turn = grid_.georeference().period(), middle = grid_.columns() / 2.0;
   PixelBounds at;
   for (int j = box.south; j <= box.north; ++j) {
-    for (int i = box.west; i <= box.east; ++i) {
+    for (int i = box.west; i <= (is_separable && j > box.south ? box.west : box.east); ++i) {
       const std::int64_t column = tile_.window.column + 1 + i, row = tile_.window.row + 1 + j;
       // The places of a pole's nodes are those of the rows beside it, and far from the middle turns may be added.
       if (has_turns && (row <= 0 || row >= tile_.lattice.rows())) return false;
