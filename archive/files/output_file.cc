@@ -103,6 +103,13 @@ Result<void> OutputFile::Write(std::string_view bytes) {
   return impl_->Flush();
 }
 
+Result<void> OutputFile::Skip(std::uint64_t bytes) {
+  if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
+  if (::lseek(impl_->descriptor, static_cast<off_t>(bytes), SEEK_CUR) < 0) return CannotWrite(impl_->partial, errno);
+  impl_->size += bytes;
+  return {};
+}
+
 Result<void> OutputFile::Finish() {
   if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
   if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);

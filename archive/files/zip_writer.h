@@ -19,7 +19,8 @@ namespace terrace::archive {
 // in memory. Destroyed without Finish: removes what it wrote. Errors: those of OutputFile.
 class ZipWriter {
  public:
-  static Result<ZipWriter> Create(const std::string& path);
+  // `start`: where the first entry begins, after a hole; readers of zip files allow it. For tests of large files.
+  static Result<ZipWriter> Create(const std::string& path, std::uint64_t start = 0);
 
   // An entry as it is. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
   Result<void> Add(std::string_view name, std::string_view bytes);
