@@ -1,5 +1,5 @@
-// The largest error of a row of samples, and the extent of samples, in vectors. Results are bit-equal on all sets of
-// instructions.
+// The largest error of a row of samples, and the extent of samples, with SIMD. Results are bit-equal on all instruction
+// sets.
 #pragma once
 
 #include <cstddef>
