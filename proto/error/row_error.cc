@@ -14,7 +14,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Calls step(i) for vectors of nodes. The last one begins earlier if need be: nodes may be measured twice.
+// Calls step(i) for vectors of nodes. If count is no multiple of a vector, the last vector overlaps the one before it:
+// some nodes are measured twice.
 template <class D, typename Step>
 HWY_INLINE void ForVectors(D d, std::size_t count, const Step& step) {
   const std::size_t lanes = hn::Lanes(d);

@@ -338,7 +338,7 @@ double ChordDeviation(const Ground& ground, double steps) {
 // `beside_m` beside their places at most.
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
-// shift. So most chords are known to matter less than what was found already, without a look at them.
+// shift. Most chords are therefore known to stay below the largest difference found so far, and are not measured.
 double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
