@@ -26,12 +26,12 @@ HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
   const hn::Rebind<float, decltype(d)> floats;
   using V = hn::Vec<decltype(d)>;
   const double lanes = static_cast<double>(hn::Lanes(d));
-  const V most_line = hn::Set(d, last), from = hn::Set(d, edge.from), zero = hn::Zero(d);
+  const V last_line = hn::Set(d, last), from = hn::Set(d, edge.from), zero = hn::Zero(d);
   const V inverse = hn::Set(d, 1 / (edge.to - edge.from)), last_cell = hn::Set(d, edge.cells - 1);
   V largest = zero;
   for (double line = first; line <= last; line += lanes) {
     // Surplus lanes repeat the last crossing.
-    const V lines = hn::Min(hn::Iota(d, line), most_line);
+    const V lines = hn::Min(hn::Iota(d, line), last_line);
     const V part = hn::Mul(hn::Sub(lines, from), inverse);
     const V along = hn::Add(hn::Set(d, edge.along_from), hn::Mul(part, hn::Set(d, edge.along)));
     const V cell = hn::Min(hn::Max(hn::Floor(along), zero), last_cell);

@@ -48,6 +48,9 @@ struct EdgeErrors {
   std::array<double, 4> side, corner;
 };
 
+// The largest power of two that is at most `value`. Precondition: `value` > 0.
+double PowerOfTwoAtMost(double value);
+
 double NeededStep(double min_height, double max_height);
 
 // `needed[row][column]` holds NeededStep of the tile (row = column = 1) and its eight neighbours, row 0 in the SOUTH.
