@@ -118,39 +118,6 @@ std::vector<config::ConfigError> FindSameNames(const config::Config& config, con
   return errors;
 }
 
-// Adds a dataset for a DEM or an archive of the command line. `flags`: options of such datasets. Returns false if the
-// argument can be neither.
-bool AddDem(const std::string& written, const std::filesystem::path& directory, const config::DatasetConfig& flags,
-            config::Config& config, std::vector<config::ConfigError>& errors) {
-  if (written.empty()) {
-    errors.push_back({"", "a DEM on the command line has an empty name"});
-    return false;
-  }
-  if (written.ends_with(".json")) {
-    errors.push_back({"", fmt::format("{} looks like a configuration: terrace serve --config {}", written, written)});
-    return false;
-  }
-  const std::string dem = config::FromWorkingDirectory(directory, written);
-  if (std::filesystem::path(dem).is_relative()) {
-    errors.push_back({written, config::kNoWorkingDirectory});
-    return false;
-  }
-  config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
-  if (IsArchive(dem)) {
-    if (const Result<void> named = NameArchive(dem, dataset); !named) {
-      errors.push_back({written, named.error().message});
-    }
-    return true;
-  }
-  if (dataset.name.empty()) dataset.name = DatasetNameOf(dem);
-  Result<config::SourceConfig> source = config::SourceAt(dem);
-  if (source)
-    dataset.sources = {*std::move(source)};
-  else
-    errors.push_back({written, source.error().message});
-  return true;
-}
-
 // Applies the file's options, then the flags, then adds a dataset per DEM of the command line. Collects all errors.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
@@ -180,7 +147,33 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   }
   std::vector<std::string> taken;  // the DEMs that became datasets
   for (const std::string& written : arguments.dems) {
-    if (AddDem(written, arguments.directory, flags, config, errors)) taken.push_back(written);
+    if (written.empty()) {
+      errors.push_back({"", "a DEM on the command line has an empty name"});
+      continue;
+    }
+    if (written.ends_with(".json")) {
+      errors.push_back({"", fmt::format("{} looks like a configuration: terrace serve --config {}", written, written)});
+      continue;
+    }
+    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
+    if (std::filesystem::path(dem).is_relative()) {
+      errors.push_back({written, config::kNoWorkingDirectory});
+      continue;
+    }
+    taken.push_back(written);
+    config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
+    if (IsArchive(dem)) {
+      if (const Result<void> named = NameArchive(dem, dataset); !named) {
+        errors.push_back({written, named.error().message});
+      }
+      continue;
+    }
+    if (dataset.name.empty()) dataset.name = DatasetNameOf(dem);
+    Result<config::SourceConfig> source = config::SourceAt(dem);
+    if (source)
+      dataset.sources = {*std::move(source)};
+    else
+      errors.push_back({written, source.error().message});
   }
   if (errors.empty()) errors = FindSameNames(config, taken);
   if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
