@@ -35,7 +35,8 @@ int Paeth(int a, int b, int c) {
 }
 
 // PNG, section 9.2. The filter type comes first. `pixel`: its bytes.
-void Filter(int type, std::span<const std::uint8_t> row, std::span<const std::uint8_t> above, std::size_t pixel, Row& out) {
+void Filter(int type, std::span<const std::uint8_t> row, std::span<const std::uint8_t> above, std::size_t pixel,
+            Row& out) {
   out[0] = static_cast<std::uint8_t>(type);
   for (std::size_t i = 0; i < row.size(); ++i) {
     const bool first = i < pixel;

@@ -38,9 +38,8 @@ Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, cons
 Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   if (!input.dataset.imagery.image) return NoImagery();
   const auto start = std::chrono::steady_clock::now();
-  return EncodeMapPicture(
-      input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.height_size, stop), start, input,
-      encoded);
+  return EncodeMapPicture(input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.height_size, stop),
+                          start, input, encoded);
 }
 
 }  // namespace terrace::tiler

@@ -1,4 +1,6 @@
 // Hillshades and slopes.
+#include "tiler/map/relief.h"
+
 #include <chrono>
 #include <cstdint>
 #include <utility>
@@ -7,7 +9,6 @@
 #include "proto/documents/map_picture.h"
 #include "tiler/encoders.h"
 #include "tiler/map/map_heights.h"
-#include "tiler/map/relief.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
@@ -34,8 +35,8 @@ Result<std::string> EncodeGrey(const std::vector<int>& values, int size, proto::
     samples.push_back(static_cast<std::uint8_t>(value < 0 ? 0 : value));
     if (has_gaps) samples.push_back(value < 0 ? 0 : 255);
   }
-  return proto::EncodeExactly(
-      {size, size, has_gaps ? proto::PixelKind::kGreyAlpha : proto::PixelKind::kGrey, samples}, format);
+  return proto::EncodeExactly({size, size, has_gaps ? proto::PixelKind::kGreyAlpha : proto::PixelKind::kGrey, samples},
+                              format);
 }
 
 // PNG: a palette whose first entry is transparent.

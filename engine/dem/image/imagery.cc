@@ -158,8 +158,7 @@ Result<MapPicture> Imagery::ReadMercator(int depth, std::int64_t column, std::in
   for (std::size_t j = 0; j < found.rows(); ++j) {
     for (std::size_t i = 0; i < found.columns(); ++i) positions.push_back(found.At(i, j));
   }
-  const auto colors =
-      impl_->ColorsAt(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
+  const auto colors = impl_->ColorsAt(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
   if (!colors) return tl::unexpected(colors.error());
   MapPicture picture{side, std::vector<std::uint8_t>(4 * positions.size())};
   for (std::size_t i = 0; i < colors->size(); ++i) {

@@ -33,8 +33,8 @@ struct MapPicture {
 // Where an image lies, and the first levels of its map tiles whose pixels are as fine as its own.
 struct ImageExtent {
   GeoBounds bounds;
-  int max_mercator_depth = 1;   // of a geo::MercatorGrid
-  int max_geodetic_level = 0;   // of tiles of kMapSide pixels in the scheme of terrain tiles
+  int max_mercator_depth = 1;  // of a geo::MercatorGrid
+  int max_geodetic_level = 0;  // of tiles of kMapSide pixels in the scheme of terrain tiles
 };
 
 class Imagery {
