@@ -33,8 +33,16 @@ bool TouchesBuffer(const proto::TilePoint& a, const proto::TilePoint& b) {
          std::min(a.y, b.y) <= kLast;
 }
 
+// Away from the edges, where neighbouring tiles have the same points.
+bool IsInside(const proto::TilePoint& point) {
+  constexpr int kNear = kContourBuffer * kUnits;
+  const auto is_inside = [](std::int32_t at) { return at > kNear && at < proto::kVectorTileExtent - kNear; };
+  return is_inside(point.x) && is_inside(point.y);
+}
+
 // Whether b can be left out between a and c: the line does not change.
 bool IsBetween(const proto::TilePoint& a, const proto::TilePoint& b, const proto::TilePoint& c) {
+  if (!IsInside(a) || !IsInside(b) || !IsInside(c)) return false;
   const std::int64_t x = b.x - a.x, y = b.y - a.y, to_x = c.x - b.x, to_y = c.y - b.y;
   return x * to_y == y * to_x && x * to_x + y * to_y > 0;
 }

@@ -57,6 +57,10 @@ std::vector<Gradient> GradientsOf(const MapHeights& heights, const MapWindow& wi
     const PixelStep step = StepAt(grid, window.first_row + row);
     for (int column = 1; column <= window.size; ++column, ++out) {
       const float own = heights.At(column, row);
+      if (std::isnan(own)) {  // Horn's formula does not use it
+        *out = {own, own};
+        continue;
+      }
       const auto at = [&](int east, int south) -> double {
         const float height = heights.At(column + east, row + south);
         return std::isnan(height) ? own : height;

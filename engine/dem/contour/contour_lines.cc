@@ -9,9 +9,11 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/dem/dem_types.h"
+#include "engine/dem/gdal/gdal_runtime.h"
 
 namespace terrace::dem {
 namespace {
@@ -29,6 +31,8 @@ GDALDatasetUniquePtr RasterOver(std::span<const float> heights, int columns, int
   const std::string pointer = "DATAPOINTER=" + std::to_string(address);
   char* options[] = {const_cast<char*>(pointer.c_str()), nullptr};
   if (raster->AddBand(GDT_Float32, options) != CE_None) return nullptr;
+  double in_nodes[] = {0, 1, 0, 0, 0, 1};  // rows count downwards; this driver's default has them upwards
+  if (raster->SetGeoTransform(in_nodes) != CE_None) return nullptr;
   return raster;
 }
 
@@ -36,22 +40,42 @@ int ContinueUnlessStopped(double, const char*, void* stop) {
   return static_cast<const std::stop_token*>(stop)->stop_requested() ? FALSE : TRUE;
 }
 
-std::vector<ContourLine> LinesOf(OGRLayer& layer) {
-  std::vector<ContourLine> lines;
-  for (const OGRFeatureUniquePtr& feature : layer) {
+// A layer that keeps the lines of GDAL's generator. GDAL's driver for vectors in memory is not among those of this
+// process (gdal/driver_list.h).
+class LineCollector final : public OGRLayer {
+ public:
+  LineCollector() : definition_(new OGRFeatureDefn("contours")) {
+    definition_->Reference();
+    definition_->SetGeomType(wkbLineString);
+    OGRFieldDefn height(kHeightField, OFTReal);
+    definition_->AddFieldDefn(&height);
+  }
+  ~LineCollector() override { definition_->Release(); }
+
+  OGRFeatureDefn* GetLayerDefn() override { return definition_; }
+  void ResetReading() override {}
+  OGRFeature* GetNextFeature() override { return nullptr; }
+  int TestCapability(const char*) override { return FALSE; }
+
+  OGRErr ICreateFeature(OGRFeature* feature) override {
     const OGRGeometry* const geometry = feature->GetGeometryRef();
-    if (geometry == nullptr || wkbFlatten(geometry->getGeometryType()) != wkbLineString) continue;
+    if (geometry == nullptr || wkbFlatten(geometry->getGeometryType()) != wkbLineString) return OGRERR_FAILURE;
     const OGRLineString& string = *geometry->toLineString();
     ContourLine line;
-    line.height = feature->GetFieldAsDouble(kHeightField);
+    line.height = feature->GetFieldAsDouble(0);
     line.points.reserve(static_cast<std::size_t>(string.getNumPoints()));
     for (int i = 0; i < string.getNumPoints(); ++i) {
       line.points.push_back({string.getX(i) - 0.5, string.getY(i) - 0.5});  // GDAL's nodes are the middles of pixels
     }
     lines.push_back(std::move(line));
+    return OGRERR_NONE;
   }
-  return lines;
-}
+
+  std::vector<ContourLine> lines;
+
+ private:
+  OGRFeatureDefn* const definition_;  // counted: features refer to it
+};
 
 std::size_t CrossingsBetween(float a, float b, double interval) {
   if (std::isnan(a) || std::isnan(b)) return 0;
@@ -77,26 +101,22 @@ Result<std::vector<ContourLine>> TraceContours(std::span<const float> heights, i
   TERRACE_CHECK(interval > 0 && columns > 0 && rows > 0 && heights.size() == Area(columns, rows));
   const auto failed = [&stop]() -> tl::unexpected<Error> {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "contours: stopped");
-    return MakeError(ErrorCode::kInternal, "GDAL cannot make contours: {}", CPLGetLastErrorMsg());
+    return MakeError(ErrorCode::kInternal, "GDAL cannot make contours: {}", TakeGdalError());
   };
+  InitGdal();
+  ForgetGdalError();
   const GDALDatasetUniquePtr raster = RasterOver(heights, columns, rows);
-  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("Memory");
-  if (!raster || driver == nullptr) return failed();
-  const GDALDatasetUniquePtr vectors(driver->Create("", 0, 0, 0, GDT_Unknown, nullptr));
-  if (!vectors) return failed();
-  OGRLayer* const layer = vectors->CreateLayer("", nullptr, wkbLineString, nullptr);
-  OGRFieldDefn field(kHeightField, OFTReal);
-  if (layer == nullptr || layer->CreateField(&field) != OGRERR_NONE) return failed();
+  if (!raster) return failed();
+  LineCollector collector;
   const std::string spacing = "LEVEL_INTERVAL=" + std::to_string(interval);
   char* options[] = {const_cast<char*>(spacing.c_str()), const_cast<char*>("ELEV_FIELD=0"),
                      const_cast<char*>("NODATA=nan"), nullptr};
   std::stop_token token = stop;
-  if (GDALContourGenerateEx(raster->GetRasterBand(1), layer, options, ContinueUnlessStopped, &token) != CE_None) {
+  if (GDALContourGenerateEx(raster->GetRasterBand(1), &collector, options, ContinueUnlessStopped, &token) != CE_None) {
     return failed();
   }
-  std::vector<ContourLine> lines = LinesOf(*layer);
-  std::ranges::stable_sort(lines, {}, &ContourLine::height);
-  return lines;
+  std::ranges::stable_sort(collector.lines, {}, &ContourLine::height);
+  return std::move(collector.lines);
 }
 
 }  // namespace terrace::dem
