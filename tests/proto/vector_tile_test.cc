@@ -39,9 +39,8 @@ Layer Read(const std::string& tile) {
           feature.type = of.get_enum();
           continue;
         }
-        for (const std::uint32_t number : of.get_packed_uint32()) {
-          (of.tag() == 2 ? feature.tags : feature.geometry).push_back(number);
-        }
+        std::vector<std::uint32_t>& numbers = of.tag() == 2 ? feature.tags : feature.geometry;
+        for (const std::uint32_t number : of.get_packed_uint32()) numbers.push_back(number);
       }
     } else if (in.tag() == 3)
       layer.keys.push_back(in.get_string());
