@@ -11,7 +11,7 @@
 namespace terrace::bake {
 namespace {
 
-// A layout of the units' files or of this key that differs from an older one.
+// Raise it with every change of the layout of the units' files or of this key.
 constexpr int kKeyVersion = 1;
 
 void AddRanges(dem::ContentHasher& hasher, const std::vector<geo::TileRange>& ranges) {
@@ -35,7 +35,7 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
 void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source, const geo::TileKey& root) {
   const double tiles = static_cast<double>(std::int64_t{1} << root.level);
   const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / tiles; };
-  // A pixel more on each side, which interpolation may need.
+  // Interpolation may need one more pixel on each side.
   const double slack = 360 / tiles / 256;
   const dem::GeoBounds box{share(root.x) * 360 - 180, std::max(-90.0, geo::MercatorLatitude(share(root.y + 1)) - slack),
                            share(root.x + 1) * 360 - 180, std::min(90.0, geo::MercatorLatitude(share(root.y)) + slack)};

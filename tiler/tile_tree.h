@@ -1,4 +1,4 @@
-// The 3D Tiles documents of a dataset's GLB tiles: what a tileset and its subtrees say, whoever holds the tiles.
+// The 3D Tiles documents of a dataset's GLB tiles: tileset and subtrees. The server and exports of archives use them.
 #pragma once
 
 #include <functional>

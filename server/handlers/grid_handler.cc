@@ -28,7 +28,7 @@ struct MadeGrid {
   std::string description;
 };
 
-// How integers of 16 bits mean heights: offset + scale * integer.
+// The code of heights as integers of 16 bits: height = offset + scale * integer.
 struct Steps {
   double offset = 0, scale = 0;
   std::size_t voids = 0;
@@ -47,7 +47,7 @@ struct Steps {
     steps.scale = (max - min) / kLargest;
     return steps;
   }
-  // Voids are the lowest height, and heights outside the range its ends.
+  // Voids become the lowest height. Heights outside the range are clamped.
   std::uint16_t Of(float height) const {
     if (std::isnan(height) || scale == 0) return 0;
     return static_cast<std::uint16_t>(std::clamp(std::floor((height - offset) / scale + 0.5), 0.0, double{kLargest}));

@@ -43,10 +43,10 @@ std::size_t DrawnMesh::bytes() const {
          (bucket_starts_.size() + bucket_triangles_.size()) * sizeof(std::uint32_t);
 }
 
-// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are no straight lines in
-// degrees, so boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds
-// nothing. Boxes of triangles of shallow levels and near the poles cover many buckets; then buckets are larger, so that
-// their memory stays proportional to that of the triangles.
+// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are not straight in degrees, so
+// boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds nothing. On
+// shallow levels and near the poles a box covers many buckets; then buckets are larger, so that their memory stays
+// proportional to that of the triangles.
 void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   constexpr int kMaxSide = 256;
   side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(triangles_.size()))), 1, kMaxSide);

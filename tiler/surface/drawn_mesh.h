@@ -36,12 +36,12 @@ class DrawnMesh {
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
   // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
-  // is rare except near the tile's edge. Where it meets several triangles, the one that it meets farthest inside
-  // counts.
+  // is rare except near the tile's edge. Of several triangles, the one that it meets farthest inside counts.
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
-  // The same among all triangles, in time proportional to their number; beside the mesh on the plane of the nearest
-  // triangle. The edge of a tile is a parallel, and the triangles end at chords of it: in the north a tile reaches
-  // beyond its northern edge and not to all of its southern one.
+  // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
+  // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles
+  // end at chords of them: in the northern hemisphere they exceed the northern edge, and leave out a strip at the
+  // southern one.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.

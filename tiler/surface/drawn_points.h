@@ -29,7 +29,7 @@ struct DrawnSurface {
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
 };
 
-// Points of one request may lie in this many tiles, because each of them may have to be made.
+// Limit of the tiles that the points of one request lie in: each of them may have to be made.
 inline constexpr std::size_t kMaxDrawnTiles = 64;
 
 // Level of the surface. kInvalidArgument: the dataset has no such level.

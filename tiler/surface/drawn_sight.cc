@@ -28,7 +28,7 @@ struct Along {
     const double a = 2 * (first + last) - 4 * middle;
     return (a * s + last - first - a) * s + first;
   }
-  // Where it is `value`, between a place with less and one with more.
+  // The s with At(s) = value, for At(low) < value <= At(high); `low` may be larger than `high`.
   double Solve(double value, double low, double high) const {
     for (int step = 0; step < 50 && low != high; ++step) {
       const double half = (low + high) / 2;
@@ -77,6 +77,7 @@ class Clearances {
   bool has_gaps_ = false;
 };
 
+// Follows rays over the meshes of tiles.
 class Walk {
  public:
   Walk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
@@ -114,7 +115,7 @@ class Walk {
     return last_ = mesh.get();
   }
 
-  // Divides a part where it leaves a bucket of a mesh.
+  // Divides a part of a ray where it leaves a bucket of a mesh.
   Result<void> AddPart(const dem::SightRay& ray, double start, double length, Clearances& clearances) {
     const auto at = [&](double s) { return dem::PointAt(ray, start + s * length, options_); };
     const dem::SightPoint first = at(0), last = at(1);

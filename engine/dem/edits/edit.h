@@ -71,8 +71,8 @@ struct Edit {
   bool is_area = true;      // polygons; else lines
 
   EditPlane plane;
-  // Closed rings of polygons, without the repeated first point; the inside is where an odd number of rings is around.
-  // Or lines. `heights`: of the points, for slope, carve and raise; else empty.
+  // Lines, or closed rings of polygons without the repeated first point. A point is inside if an odd number of rings
+  // encloses it. `heights`: of the points, for slope, carve and raise; else empty.
   std::vector<std::vector<PlanPoint>> rings;
   std::vector<std::vector<double>> heights;
   // Of slope: corners of the first ring; empty: the plane h = gradient . (x, y) + level.
@@ -98,9 +98,8 @@ struct Edit {
   double low_m = 0, high_m = 0;  // of the target heights
   double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;
-  // Edges by bands of equal height in y, so that a row scans few of them: of band b, which begins at
-  // `bands_from` + b / `bands_per_m`, `band_edges` [`band_begins`[b], `band_begins`[b + 1]), in order of rings and
-  // edges: those within reach of the band.
+  // Edges by bands in y, so that a row scans few of them. Band b begins at y = bands_from + b / bands_per_m. The edges
+  // within reach of it are band_edges[i] for band_begins[b] <= i < band_begins[b + 1], in the order of rings and edges.
   struct EdgeNumber {
     std::uint32_t ring, edge;
   };
@@ -114,7 +113,7 @@ struct Edit {
     return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
-  // The share of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
+  // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double ShareAt(double distance_m) const {
     const double beyond = distance_m - half_width_m;
     if (beyond <= 0) return 1;

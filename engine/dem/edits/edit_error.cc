@@ -52,7 +52,8 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
         is_above |= node->height > low;
         is_below |= node->height < high;
       }
-      // Distances change by no more than the way; any point of the cell is within half a diagonal of a node.
+      // A distance changes by at most the length of a move, and each point of the cell is within half a diagonal of a
+      // node.
       const double high_share = edit.ShareAt(std::max(nearest - diagonal_m / 2, 0.0));
       const double low_share = edit.ShareAt(furthest + diagonal_m / 2);
       if (high_share <= 0) continue;

@@ -12,8 +12,8 @@
 
 namespace terrace::dem {
 
-// A feature without properties.terrain is no edit: nothing. `file` and `feature` name it. Appends what is wrong; then
-// there is no edit either.
+// Returns nothing for a feature without properties.terrain, and for a wrong one, whose faults are appended. `file` and
+// `feature` name the feature in the edit and in faults.
 std::optional<Edit> ParseEdit(const nlohmann::json& json, const std::string& file, std::size_t feature,
                               std::vector<EditFault>& faults);
 

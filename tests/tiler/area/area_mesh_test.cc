@@ -239,7 +239,9 @@ TEST_F(AreaMeshTest, ClipsToTheDataset) {
   area.west = -90;
   area.north = 89;
   area.error_m = 20;
-  for (const geo::Vec3& v : ReadObj(Build(area).bytes).vertices) {
+  const auto vertices = ReadObj(Build(area).bytes).vertices;
+  ASSERT_FALSE(vertices.empty());
+  for (const geo::Vec3& v : vertices) {
     ASSERT_GT(v.x, -84.43);
     ASSERT_LT(v.y, 36.46);
   }
