@@ -1,4 +1,4 @@
-// A TCP connection, with TLS or without, of which every operation has a deadline.
+// A TCP connection, with TLS or without. Every operation has a deadline.
 #pragma once
 
 #include <chrono>
@@ -29,7 +29,7 @@ class Socket {
   Socket& operator=(Socket&&) = delete;
   ~Socket();
 
-  // kUnavailable: the connection ended, or the deadline passed. The socket is of no use then.
+  // kUnavailable: the connection ended, or the deadline passed. The socket cannot be used afterwards.
   Result<void> Write(std::string_view bytes, Deadline deadline);
   // At least one byte.
   Result<std::size_t> Read(std::span<char> into, Deadline deadline);

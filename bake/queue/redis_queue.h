@@ -30,10 +30,10 @@ struct RedisQueueOptions {
   std::vector<std::string> units;  // the names of the units of the plan, by index
   // The indexes of the units that have no file with the right key. Called whenever the queue is filled.
   std::function<std::vector<std::size_t>()> find_missing;
-  // Another worker inherits a unit whose worker was not heard of for so long. Counts when the queue is filled.
+  // A unit whose worker was silent for so long goes to another worker. The worker that fills the queue sets it for all.
   std::chrono::milliseconds lease{30'000};
-  std::chrono::milliseconds patience{600'000};  // how long a Redis that is away is waited for
-  // Told when Redis is away, and when it is back. May be empty. Called by any thread.
+  std::chrono::milliseconds patience{600'000};  // how long an unreachable Redis is waited for
+  // Receives a message when Redis becomes unreachable, and when it is back. May be empty. Called by any thread.
   std::function<void(const std::string&)> on_message = {};
 };
 
@@ -43,7 +43,7 @@ class RedisQueue : public UnitQueue {
   // tries them again. kInvalidArgument: the job bakes something else; the message says what differs. Errors of
   // ConnectToJob.
   static Result<std::unique_ptr<RedisQueue>> Join(RedisQueueOptions options);
-  // Gives back what was not done.
+  // Gives back the units that were not done.
   ~RedisQueue() override;
 
   Taken Take() override;
@@ -57,15 +57,15 @@ class RedisQueue : public UnitQueue {
     kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
     kFinished,    // another worker has done that
     kIncomplete,  // units were given up: Dead
-    kLost,        // Redis is away for too long, or the job is another one now: Why
+    kLost,        // Redis was unreachable for too long, or the job is another one now: Why
   };
   End end() const;
   Error Why() const;
   // The units that were given up.
   Result<std::vector<DeadUnit>> Dead();
-  // Of kFinish. The manifest is written.
+  // After kFinish: the manifest is written.
   void Finished();
-  // Units that are not there although they were done: the job goes on with them.
+  // After kFinish: these units are absent although they were done. The job continues with them.
   void AddMissing(const std::vector<std::size_t>& units);
 
  private:

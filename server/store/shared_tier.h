@@ -63,8 +63,8 @@ class SharedTier {
   // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
 
-  // Takes the lease of a key for `time`, unless somebody else has it. kHeld: wait, and look again. kNone: the store is
-  // switched off, so nobody is to be waited for. Let go of it with Release, or by the time.
+  // Takes the lease of a key, which ends with Release or after `time`. kHeld: another server has it; wait, and look
+  // again. kNone: the store is switched off; do not wait.
   enum class Lease { kTaken, kHeld, kNone };
   Lease Take(const std::string& key, std::chrono::milliseconds time);
   void Release(const std::string& key);
@@ -127,7 +127,7 @@ class SharedTier {
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
-  std::string reported_;                         // the last reason in the log, and when
+  std::string reported_;                         // the last reason in the log
   Clock::time_point reported_at_, answered_at_;  // when the log said so
 
   ConnectionPtr writer_;  // of the store's thread
