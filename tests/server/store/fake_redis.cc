@@ -57,6 +57,11 @@ void FakeRedis::SetReply(const std::string& bytes) {
   reply_ = bytes;
 }
 
+void FakeRedis::CloseOne() {
+  const std::lock_guard lock(mutex_);
+  if (!open_.empty()) ::shutdown(open_.back(), SHUT_RDWR);
+}
+
 void FakeRedis::CloseAll() {
   const std::lock_guard lock(mutex_);
   for (const int fd : open_) ::shutdown(fd, SHUT_RDWR);

@@ -26,7 +26,8 @@ class FakeRedis {
   // Reads and replies nothing, as after a partition; and replies again.
   void FallSilent() { is_silent_ = true; }
   void Speak() { is_silent_ = false; }
-  // Ends all connections that are open.
+  // Ends one of the connections that are open, or all.
+  void CloseOne();
   void CloseAll();
 
   std::uint64_t pings() const { return pings_; }
