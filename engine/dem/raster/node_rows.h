@@ -1,5 +1,5 @@
-// Rows of nodes: the places of their samples and the heights between them, in vectors. Results are bit-equal on all
-// sets of instructions, and to those of GridAxes::CellAt and Interpolate for each node.
+// Rows of nodes: the places of their samples and the heights between them, with SIMD. Results are bit-equal on all
+// instruction sets, and to those of GridAxes::CellAt and Interpolate for each node.
 #pragma once
 
 #include <array>
