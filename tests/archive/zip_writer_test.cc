@@ -81,7 +81,8 @@ void WriteAndRead(std::uint64_t start) {
       "python3 -c \"import sys, zipfile; z = zipfile.ZipFile(sys.argv[1]); assert z.testzip() is None; "
       "assert len(z.namelist()) == 41, len(z.namelist()); "
       "[exec('assert z.read(\\'tile%d\\' % i) == bytes([97 + i % 26]) * (100 + i), i') for i in range(40)]; "
-      "assert min(e.header_offset for e in z.infolist()) == int(sys.argv[2])\" '" +
+      "assert min(e.header_offset for e in z.infolist()) == int(sys.argv[2]); "
+      "assert all((len(e.extra) == 12) == (e.header_offset >= 2**32 - 1) for e in z.infolist())\" '" +
       path.string() + "' " + std::to_string(start);
   EXPECT_EQ(std::system(check.c_str()), 0) << check;
 }

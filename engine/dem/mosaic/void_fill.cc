@@ -123,7 +123,8 @@ std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow
   // Marking costs about as much as bridging this share of the samples.
   constexpr std::int64_t kShare = 16;
   std::optional<NearValid> near;
-  if (voids > wide.columns * wide.rows / kShare) near.emplace(heights, wide, max_gap - 1);
+  // The nearer one of a pair of samples is at most half a gap away.
+  if (voids > wide.columns * wide.rows / kShare) near.emplace(heights, wide, max_gap / 2);
   for (const std::int64_t row : rows) {
     float* const to = filled.data() + (row - core.row) * core.columns;
     for (std::int64_t i = 0; i < core.columns; ++i) {

@@ -209,7 +209,7 @@ TEST(NodeRows, VoidsAreCountedAndWantedWhereNodesAreInside) {
   std::mt19937 random(7);
   tin::ForEachInstructionSet([&] {
     for (std::size_t count = 0; count < 70; ++count) {
-      const unsigned voids = 1 + count % 9;  // one of so many
+      const auto voids = static_cast<unsigned>(1 + count % 9);  // one of so many
       std::vector<float> heights(count);
       std::vector<std::uint8_t> inside(count), wanted(count, 7), expected(count);
       std::size_t counted = 0;
