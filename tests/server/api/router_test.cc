@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "server/api/tile_formats.h"
 #include "server/routes.h"
 
 namespace terrace::server {
