@@ -33,10 +33,10 @@ Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
         "`vertical` of the source, such as \"egm96\", or \"vertical\": \"ellipsoid\" of the feature");
   }
   // Of the finest models, nodes are two kilometres apart.
-  constexpr double kStep_m = 500, kMostSteps = 64;
+  constexpr double kStep_m = 500, kMaxSteps = 64;
   const Box& reach = edit.reach;
   const double width = (reach.east - reach.west) * plane.east_m, height = (reach.north - reach.south) * plane.north_m;
-  const auto steps = [&](double metres) { return std::clamp(std::ceil(metres / kStep_m), 1.0, kMostSteps); };
+  const auto steps = [&](double metres) { return std::clamp(std::ceil(metres / kStep_m), 1.0, kMaxSteps); };
   auto patch = std::make_shared<EditUndulations>();
   patch->south_west = {(reach.west - plane.longitude) * plane.east_m, (reach.south - plane.latitude) * plane.north_m};
   patch->columns = static_cast<std::size_t>(steps(width)) + 1;

@@ -17,7 +17,7 @@ int LevelFor(const Edit& edit, double error_fraction, int deepest) {
 }
 
 std::vector<geo::TileRange> TilesTouching(const Edit& edit, int level) {
-  constexpr std::int64_t kMostBoxes = 64;  // along an axis
+  constexpr std::int64_t kMaxBoxes = 64;  // along an axis
   const double east_m = edit.blend_m / edit.plane.east_m, north_m = edit.blend_m / edit.plane.north_m;
   const Box box{edit.reach.west + east_m, edit.reach.south + north_m, edit.reach.east - east_m,
                 edit.reach.north - north_m};
@@ -30,7 +30,7 @@ std::vector<geo::TileRange> TilesTouching(const Edit& edit, int level) {
     west = at(box.west + 180, side), east = at(box.east + 180, side);
     south = std::max<std::int64_t>(at(box.south + 90, side), 0), north = at(box.north + 90, side);
     north = std::min(north, geo::TileRows(level - coarser) - 1);
-    if (coarser == level || std::max(east - west, north - south) < kMostBoxes) break;
+    if (coarser == level || std::max(east - west, north - south) < kMaxBoxes) break;
   }
   // Touched: its centre is no further away than its corners are.
   Edit grown = edit;
