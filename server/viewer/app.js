@@ -1,9 +1,10 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
-import { Access, UnknownToken } from "/viewer/access.js";
-import { boxOf, firstRegion, suggestedFraction } from "/viewer/framing.js";
+import { UnknownToken } from "/viewer/access.js";
+import { access, firstList, startOf } from "/viewer/early.js";
+import { boxOf, defaultFraction, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
 import { formatHeight } from "/viewer/numbers.js";
-import { Panel, fractionOfStep, stepOfFraction } from "/viewer/panel.js";
+import { Panel } from "/viewer/panel.js";
 import { fromLocalMeanTime, sunDirection } from "/viewer/sun.js";
 import { onTheme } from "/viewer/theme.js";
 import { TokenCard } from "/viewer/token_card.js";
@@ -24,7 +25,6 @@ const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
 
-const access = new Access();
 const panel = new Panel({
   dataset: (name) => choose(name),
   home: () => state.dataset && lookAt(firstRegion(state.dataset), kFlightSeconds),
@@ -69,10 +69,6 @@ function makeGlobe() {
   }
 }
 
-function defaultFraction(dataset) {
-  return fractionOfStep(stepOfFraction(suggestedFraction(firstRegion(dataset))));
-}
-
 function coarserThan(fraction) {
   return fractionOfStep(stepOfFraction(fraction * kCoarser));
 }
@@ -83,7 +79,7 @@ async function show() {
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);
-  traffic.reset();
+  if (state.ready) traffic.reset();
   lightSun();
   try {
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
@@ -242,14 +238,13 @@ function remember() {
 async function apply(view) {
   if (state.datasets.length === 0) return;
   state.refreshing ??= setInterval(refresh, 400);
-  const named = state.datasets.find((dataset) => dataset.name === view.dataset);
-  state.wanted = view.dataset && !named ? view : undefined;
-  state.dataset = named ?? state.datasets[0];
-  state.fraction = (named && view.fraction) ?? defaultFraction(state.dataset);
+  const { isNamed, dataset, fraction } = startOf(view, state.datasets);
+  state.wanted = view.dataset && !isNamed ? view : undefined;
+  Object.assign(state, { dataset, fraction });
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
-  if (named && view.camera) globe.camera = view.camera;
+  if (isNamed && view.camera) globe.camera = view.camera;
   else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);
   setColouring(view.colouring);
@@ -275,7 +270,10 @@ function refresh() {
 
 // Throws UnknownToken.
 async function list(token) {
-  const { datasets, moreWithToken } = await access.list(token);
+  keep(await access.list(token));
+}
+
+function keep({ datasets, moreWithToken }) {
   Object.assign(state, { datasets, moreWithToken });
   panel.setDatasets(datasets, moreWithToken, state.dataset?.name);
 }
@@ -291,17 +289,6 @@ async function useToken(token) {
   card.close();
   panel.setMessage(undefined);
   await apply(state.wanted ?? decodeView(location.hash));
-}
-
-// Uses the token of this tab, if it has a valid one.
-async function listAtStart() {
-  try {
-    await list();
-  } catch (error) {
-    if (!(error instanceof UnknownToken)) throw error;
-    access.token = "";
-    await list();
-  }
 }
 
 async function read(position) {
@@ -320,7 +307,7 @@ async function start() {
   globe.scene.camera.moveEnd.addEventListener(remember);
   addEventListener("hashchange", () => apply(decodeView(location.hash)));
   try {
-    await listAtStart();
+    keep(await firstList);
   } catch (error) {
     complain(`The list of datasets could not be read: ${error.message}. Is the server running?`);
     watch.isLost = true;

@@ -1,7 +1,7 @@
 // The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
 // colours by height and shading. Drag and wheel or arrow keys, plus and minus move it; a click reads a height.
-import { Access } from "/viewer/access.js";
 import { heightColour } from "/viewer/colours.js";
+import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
 
@@ -187,14 +187,13 @@ class FlatMap {
 
 export async function startFlatMap() {
   document.body.classList.add("flat");
-  const access = new Access();
   const map = new FlatMap(byId("globe"), access);
   byId("globe").setAttribute("aria-label", "Map. Arrow keys move it, plus and minus zoom, Enter reads the height in the middle.");
   const say = (text) => Object.assign(byId("note"), { textContent: text, hidden: !text });
   const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
   say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
   try {
-    const { datasets } = await access.list();
+    const { datasets } = await firstList;
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
     const show = async (name) => {

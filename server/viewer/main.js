@@ -1,4 +1,5 @@
 // The page begins here: the globe if the browser can draw it, else a flat map. Only the one that is needed is loaded.
+import { allBegun } from "/viewer/early.js";
 import { startTheme } from "/viewer/theme.js";
 
 function hasWebGl2() {
@@ -10,6 +11,12 @@ function hasWebGl2() {
 }
 
 startTheme();
+if (matchMedia("(max-width: 560px)").matches) document.getElementById("panel").open = false;
+if (innerHeight < 760) document.getElementById("costs").open = false;
+// The globe keeps this thread busy: before, the panel is painted and the first tiles are asked for. A page in the background
+// has no frames, and a server may be slow.
+const isReady = Promise.all([allBegun, new Promise(requestAnimationFrame)]);
+await Promise.race([isReady, new Promise((resolve) => setTimeout(resolve, 150))]);
 if (hasWebGl2()) {
   await import("/viewer/app.js");
 } else {

@@ -1,6 +1,6 @@
 // The material of the globe: colours by height, slope or aspect, shading by the tiles' vertex normals, and contour lines.
 // Without a sun, the light is in the local north-west of every point, as on a printed map, so no hemisphere is dark.
-import { Material } from "/viewer/cesium/index.js";
+import { Material, Sampler, Texture, TextureMagnificationFilter, TextureMinificationFilter } from "/viewer/cesium/index.js";
 import { kColourings, kSteepest, waterline } from "/viewer/colours.js";
 
 export const kRampWidth = 2048;
@@ -130,8 +130,9 @@ czm_material czm_getMaterial(czm_materialInput materialInput) {
   return material;
 }`;
 
+// `strips`: the canvases of `ramp` and `theme`.
 export function makeTerrainMaterial() {
-  return new Material({
+  const material = new Material({
     translucent: false,
     fabric: {
       type: "TerraceTerrain",
@@ -158,13 +159,23 @@ export function makeTerrainMaterial() {
       source: kSource,
     },
   });
+  return Object.assign(material, { strips: {} });
 }
 
-export function setHeights(material, heights) {
-  const canvas = document.createElement("canvas");
-  canvas.width = kRampWidth;
-  canvas.height = 1;
-  material.uniforms.ramp = kColourings.height.draw(canvas, heights);
+// A strip of colours, drawn by `draw(canvas)`. CesiumJS uses an image only from its second frame on, and white before; a
+// texture it uses at once.
+function setStrip(material, context, name, draw) {
+  const canvas = Object.assign(document.createElement("canvas"), { width: kRampWidth, height: 1 });
+  material.strips[name] = draw(canvas);
+  const sampler = new Sampler({
+    minificationFilter: TextureMinificationFilter.LINEAR, magnificationFilter: TextureMagnificationFilter.LINEAR,
+  });
+  material.uniforms[name] = new Texture({ context, source: canvas, sampler });
+}
+
+// `context`: of the scene that draws the material.
+export function setHeights(material, context, heights) {
+  setStrip(material, context, "ramp", (canvas) => kColourings.height.draw(canvas, heights));
   material.uniforms.water = waterline(heights);
   material.uniforms.heightRange = { x: heights.min, y: Math.max(heights.max, heights.min + 1) };
 }
@@ -172,11 +183,8 @@ export function setHeights(material, heights) {
 const kOrder = Object.keys(kColourings);
 
 // `name`: a key of kColourings.
-export function setColouring(material, name) {
-  const canvas = document.createElement("canvas");
-  canvas.width = kRampWidth;
-  canvas.height = 1;
+export function setColouring(material, context, name) {
   const number = Math.max(0, kOrder.indexOf(name));
-  if (number > 0) material.uniforms.theme = kColourings[name].draw(canvas);
+  if (number > 0) setStrip(material, context, "theme", (canvas) => kColourings[name].draw(canvas));
   material.uniforms.colouring = number;
 }

@@ -1,17 +1,11 @@
 // The controls and the numbers beside the globe. Uses the page's elements, but not CesiumJS.
+import { fractionOfStep, kCoarsest, kFinest, stepOfFraction } from "/viewer/framing.js";
 import { drawLegend } from "/viewer/legend.js";
 import {
   formatBytes, formatCompact, formatFraction, formatHeight, formatMetres, formatNumber, formatPosition,
 } from "/viewer/numbers.js";
 import { Splitter } from "/viewer/splitter.js";
 import { kPhases } from "/viewer/traffic.js";
-
-// The slider has steps of half powers of two, finer to the right: 4, 2.83, ... 1/32.
-const kCoarsest = -4;
-const kFinest = 10;
-export const fractionOfStep = (step) => 2 ** (-step / 2);
-export const stepOfFraction = (fraction) =>
-  Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
 const byId = (id) => document.getElementById(id);
 const kSwitches = ["contours", "wireframe", "tiles3d", "compare", "sunny"];
@@ -47,8 +41,6 @@ export class Panel {
       byId(name).addEventListener("change", (event) => actions[name](event.target.checked));
     }
     this.splitter = new Splitter(byId("splitter"), actions.split);
-    if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
-    if (innerHeight < 760) byId("costs").open = false;
   }
 
   #readSun(actions) {

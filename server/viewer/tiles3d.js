@@ -58,9 +58,9 @@ function makeShader() {
 export class Tiles3d {
   #latest = 0;  // number of the latest show() or hide(): of overlapping loads only the latest may enter the scene
 
-  // `look`: the uniforms of the terrain's material, which the tiles use in every frame.
-  constructor(scene, look) {
-    Object.assign(this, { scene, look, tileset: undefined, pending: false, wireframe: false });
+  // `material`: the terrain's; the tiles use its uniforms in every frame.
+  constructor(scene, material) {
+    Object.assign(this, { scene, strips: material.strips, look: material.uniforms, tileset: undefined, pending: false, wireframe: false });
     scene.preUpdate.addEventListener(() => this.tileset && this.#follow());
   }
 
@@ -117,10 +117,9 @@ export class Tiles3d {
 
   // Copies a strip of colours where the terrain's material has a new one.
   #copyStrip(name) {
-    const canvas = this.look[name];
-    if (this.copied[name] === canvas) return;
+    const canvas = this.strips[name];
+    if (!canvas || this.copied[name] === canvas) return;
     this.copied[name] = canvas;
-    if (canvas.width !== kRampWidth) return;  // not drawn yet
     const pixels = canvas.getContext("2d").getImageData(0, 0, kRampWidth, 1).data;
     const typedArray = new Uint8Array(pixels.buffer);
     this.shader.setUniform(name, new TextureUniform({ typedArray, width: kRampWidth, height: 1 }));
