@@ -76,7 +76,13 @@ describe('the start of the viewer', () => {
       devtools.send('Page.screencastFrameAck', { sessionId }).catch(() => {});
     });
     await devtools.send('Page.startScreencast', { format: 'png' });
+    let release;
+    const held = new Promise((resolve) => (release = resolve));
+    await page.route('**/*.terrain*', (route) => held.then(() => route.continue()));
     await page.goto(server.url, { waitUntil: 'commit' });
+    await page.waitForFunction(() => window.terrace?.globe.widget.useDefaultRenderLoop, undefined, kWait);
+    await page.waitForTimeout(1500);  // frames without any tile
+    release();
     await ground(page);
     await page.waitForTimeout(1500);
     await devtools.send('Page.stopScreencast');
