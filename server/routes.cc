@@ -145,6 +145,7 @@ constexpr RouteRow kRows[] = {
     {.label = "layer", .pattern = "/{dataset}/layer.json", .handle = Write<DescribeLayer>, .has_templates = true},
     {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
     {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
+    {.label = "edits", .pattern = "/{dataset}/edits.geojson", .handle = Write<DescribeEdits>},
     {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
     {.label = "grid", .pattern = "/{dataset}/grid", .handle = AnswerGrid},
     {.label = "sight", .pattern = "/{dataset}/sight", .handle = AnswerSight, .max_body_bytes = MaxRaysBytes},

@@ -79,6 +79,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["urls"]["tiles_json"] = base + "/tiles.json";
     entry["urls"]["heights"] = base + "/heights";
     entry["urls"]["mesh"] = base + "/mesh";
+    if (dataset.edits_of) entry["urls"]["edits"] = base + "/edits.geojson";
     list.push_back(std::move(entry));
   }
   Json document;

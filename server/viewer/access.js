@@ -60,6 +60,15 @@ export class Access {
     }
   }
 
+  // Heights at {longitude, latitude}: metres, undefined where the dataset has none.
+  async heights(dataset, places) {
+    const locations = places.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
+    const headers = { ...this.headers, "Content-Type": "application/json" };
+    const reply = await fetch(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
+    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
+    return (await reply.json()).results.map(({ elevation }) => elevation ?? undefined);
+  }
+
   // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where
   // the dataset has none.
   async profile(dataset, corners, samples) {

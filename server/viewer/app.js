@@ -21,7 +21,7 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // of the line. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
 // missing. `isGone`: the server has no more this dataset.
 const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
-                wireframe: false, tiles3d: false, right: undefined, colouring: "height", sun: undefined,
+                wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
 
@@ -37,6 +37,8 @@ const panel = new Panel({
   tiles3d: (on) => { setSwitches({ ...state, tiles3d: on, right: undefined }); return show(); },
   compare: (on) => { setSwitches({ ...state, tiles3d: false, right: on ? coarserThan(state.fraction) : undefined }); return show(); },
   right: (fraction) => { setSwitches({ ...state, right: fraction }); return show(); },
+  edits: (on) => setSwitches({ ...state, edits: on }),
+  imagery: (on) => setSwitches({ ...state, imagery: on }),
   colouring: (name) => setColouring(name),
   sunny: (on) => setSun(on ? `${new Date().getFullYear()}-${kFirstSun}` : undefined),
   sun: (text) => setSun(text),
@@ -82,6 +84,7 @@ async function show() {
   if (state.ready) traffic.reset();
   lightSun();
   try {
+    globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
     panel.setMessage(undefined);
     state.ready = true;
@@ -168,12 +171,22 @@ function setSun(text) {
   remember();
 }
 
-// Measuring is loaded when it is first used.
+// The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
+  const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
+  if (name === "draft") {
+    const { Draft } = await import("/viewer/draft.js");
+    state.measure?.end();
+    state.draft ??= new Draft(options);
+    return state.draft.toggle();
+  }
   const { Measure } = await import("/viewer/measure.js");
-  state.measure ??= new Measure({ globe, access, dataset: () => state.dataset, onMode: setMode });
-  state.measure.toggle(name);
+  state.draft?.end();
+  state.measure ??= new Measure(options);
+  return state.measure.toggle(name);
 }
+
+const openTool = () => (state.draft?.isOpen ? state.draft : state.measure);
 
 function setMode(name) {
   panel.setTool(name);
@@ -196,9 +209,10 @@ const kKeys = {
   x: () => document.getElementById("compare").click(),
   d: () => useTool("distance"),
   l: () => useTool("sight"),
+  e: () => useTool("draft"),
   Home: () => document.getElementById("home").click(),
-  Escape: () => state.measure?.end(),
-  Backspace: () => state.measure?.undo(),
+  Escape: () => openTool()?.end(),
+  Backspace: () => openTool()?.undo(),
   "?": () => document.getElementById("help").click(),
 };
 
@@ -216,12 +230,31 @@ async function labelContours() {
   if (state.contours) globe.overlay.setLabels(placeLabels(globe.scene, 5 * globe.interval, formatHeight));
 }
 
-function setSwitches({ contours, wireframe, tiles3d, right }) {
-  Object.assign(state, { contours, wireframe, tiles3d, right });
+// Outlines of edits follow the drawn ground. They are read when they are first wanted, and anew for each version.
+async function outlineEdits() {
+  const { dataset } = state;
+  const isWanted = () => state.edits && dataset === state.dataset && Boolean(dataset.urls.edits);
+  if (!isWanted()) return globe.overlay.setLine("edits", undefined);
+  try {
+    const { drawEdits, fetchEdits } = await import("/viewer/edit_outlines.js");
+    const key = `${dataset.name} ${dataset.version}`;
+    if (state.editsOf?.key !== key) state.editsOf = { key, features: fetchEdits(dataset, access.headers) };
+    const features = await state.editsOf.features;
+    if (isWanted()) state.editsInView = drawEdits(globe.overlay, features, globe.viewTest(), (...at) => globe.heightAt(...at));
+  } catch (error) {
+    state.editsOf = undefined;
+    panel.note(`The edits could not be read: ${error.message}.`);
+  }
+}
+
+function setSwitches({ contours, wireframe, tiles3d, edits, imagery, right }) {
+  Object.assign(state, { contours, wireframe, tiles3d, edits, imagery, right });
+  globe.drape(imagery ? state.dataset : undefined, access.headers);
   globe.contours = contours;
   globe.wireframe = wireframe;
   globe.adaptToCamera();
   if (!contours) globe.overlay.setLabels([]);
+  if (!edits) globe.overlay.setLine("edits", undefined);
   state.labelled = undefined;
   panel.setSwitches(state);
   remember();
@@ -266,6 +299,7 @@ function refresh() {
   if (globe.loading || view === state.labelled) return;
   state.labelled = view;
   labelContours();
+  outlineEdits();
 }
 
 // Throws UnknownToken.

@@ -2,7 +2,7 @@
 import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
   GeographicTilingScheme, GroundPolylinePrimitive, GroundPrimitive, HeadingPitchRange, Math as CesiumMath,
-  QuantizedMeshTerrainData, Resource, ScreenSpaceEventHandler, ScreenSpaceEventType,
+  QuantizedMeshTerrainData, Rectangle, Resource, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
 import { layerUrl } from "/viewer/early.js";
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
@@ -122,6 +122,24 @@ export class Globe {
     this.adaptToCamera();
     const tileset = `${dataset.urls.tileset}?fraction=${compared}`;
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
+  }
+
+  // Lays the image of `dataset` on the ground; undefined, or without an image: none.
+  async drape(dataset, headers) {
+    const wanted = dataset?.urls.imagery_geodetic;
+    if (this.draped === wanted) return;
+    this.draped = wanted;
+    this.scene.imageryLayers.removeAll();
+    this.material.uniforms.draped = 0;
+    this.scene.requestRender();
+    if (!wanted) return;
+    const { addImagery } = await import("/viewer/imagery.js");
+    if (this.draped !== wanted) return;
+    addImagery(this.scene, wanted, dataset.imagery, headers, this.onTileError);
+    const { longitude, latitude, width, height } = boxOf(dataset.imagery.bounds);
+    const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
+    Object.assign(this.material.uniforms, { draped: 1, imageBox: { x, y, z, w } });
+    this.scene.requestRender();
   }
 
   // 3D Tiles from this resource to the right of the splitter; without one, terrain everywhere.
@@ -281,6 +299,19 @@ export class Globe {
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
              height: ground.height / this.exaggeration };
+  }
+
+  // Metres above the ellipsoid of the drawn ground; undefined where none is drawn.
+  heightAt(longitude, latitude) {
+    const height = this.scene.globe.getHeight(Cartographic.fromDegrees(longitude, latitude));
+    return height === undefined ? undefined : height / this.exaggeration;
+  }
+
+  // A function that tells whether a place may be in view.
+  viewTest() {
+    const { camera, ellipsoid } = this.scene;
+    const box = camera.computeViewRectangle(ellipsoid);
+    return (longitude, latitude) => !box || Rectangle.contains(box, Cartographic.fromDegrees(longitude, latitude));
   }
 
   get loading() {

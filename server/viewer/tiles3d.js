@@ -21,7 +21,8 @@ void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
   vec3 offset = fromCamera / kRadii;
   float f = cameraLevel + dot(offset, 2.0 * camera + offset);
   float height = f / (sqrt(1.0 + f) + 1.0) * sqrt(1.0 + f) / length((camera + offset) / kRadii);
-  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true);
+  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true,
+                              draped > 0.5 ? czm_linearToSrgb(material.diffuse) : vec3(-1.0));
   material.diffuse = czm_srgbToLinear(colour);
 }`;
 
@@ -29,7 +30,7 @@ const kTypes = {
   heightRange: UniformType.VEC2, box: UniformType.VEC4, water: UniformType.FLOAT, contourInterval: UniformType.FLOAT,
   relief: UniformType.FLOAT, shading: UniformType.FLOAT, graticule: UniformType.FLOAT, farness: UniformType.FLOAT,
   hazeDistance: UniformType.FLOAT, wire: UniformType.FLOAT, split: UniformType.FLOAT, paper: UniformType.FLOAT,
-  exaggeration: UniformType.FLOAT, colouring: UniformType.FLOAT, sunny: UniformType.FLOAT, sun: UniformType.VEC3,
+  exaggeration: UniformType.FLOAT, colouring: UniformType.FLOAT, draped: UniformType.FLOAT, sunny: UniformType.FLOAT, sun: UniformType.VEC3,
 };
 const kStrips = ["ramp", "theme"];
 
