@@ -17,9 +17,15 @@ if (innerHeight < 760) document.getElementById("costs").open = false;
 // has no frames, and a server may be slow.
 const isReady = Promise.all([allBegun, new Promise(requestAnimationFrame)]);
 await Promise.race([isReady, new Promise((resolve) => setTimeout(resolve, 150))]);
-if (hasWebGl2()) {
-  await import("/viewer/app.js");
-} else {
-  const { startFlatMap } = await import("/viewer/flat_map.js");
-  await startFlatMap();
+try {
+  if (hasWebGl2()) {
+    await import("/viewer/app.js");
+  } else {
+    const { startFlatMap } = await import("/viewer/flat_map.js");
+    await startFlatMap();
+  }
+} catch (error) {
+  const message = document.getElementById("message");
+  if (message.hidden) Object.assign(message, { hidden: false, textContent: `The page could not be loaded completely; reload it. (${error.message})` });
+  throw error;
 }
