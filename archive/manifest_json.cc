@@ -134,8 +134,9 @@ BakedDataset ReadDataset(const Json& json) {
 Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_steps) {
   // All members are named, so that a new one fails to compile until it is added here.
   const auto& [dataset, key, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, height_size] = kind;
+               height_encoding, height_size, map] = kind;
   static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
+  static_cast<void>(map);  // archives have no tiles for maps
   Json json;
   json["format"] = NameOf(kFormats, format);
   json["coding"] = NameOf(kCodings, coding);

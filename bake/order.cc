@@ -101,6 +101,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& or
       if (order.compress && kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
       break;
     case tiler::TileFormat::kHeightPng:
+    default:  // archives have no others
       break;
   }
   return kind;

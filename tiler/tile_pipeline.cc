@@ -9,6 +9,9 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
+#include "tiler/map/contour_tile.h"
+#include "tiler/map/map_heights.h"
+#include "tiler/map/relief.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/strong_etag.h"
 #include "tiler/surface/drawn_sight.h"
@@ -36,10 +39,28 @@ tl::unexpected<Error> NoSources() {
 }  // namespace
 
 std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
-  if (request.format != TileFormat::kHeightPng) return source.EditsOf(request.key);
-  const int size = request.height_size, depth = request.key.level + (size == 512 ? 1 : 0);
-  if (depth > source.info().max_mercator_depth) return 0;
-  return source.EditsOfMercator(depth, {request.key.x * size, request.key.y * size, size, size});
+  int size = request.height_size, margin = 0;
+  switch (request.format) {
+    case TileFormat::kQuantizedMesh:
+    case TileFormat::kGlb:
+      return source.EditsOf(request.key);
+    case TileFormat::kImagery:
+    case TileFormat::kGeodeticImagery:
+      return 0;
+    case TileFormat::kHeightPng:
+      break;
+    case TileFormat::kHillshade:
+    case TileFormat::kSlope:
+      margin = kReliefMargin;
+      break;
+    case TileFormat::kContours:
+      size = kHeightSizes[0];
+      margin = kContourMargin;
+      break;
+  }
+  const MapWindow window(request.key, size, margin);
+  if (window.depth > source.info().max_mercator_depth) return 0;
+  return source.EditsOfMercator(window.depth, window.nodes);
 }
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)

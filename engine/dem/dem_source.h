@@ -67,6 +67,11 @@ class DemSource {
   // source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
+  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
+  // kEllipsoid, or kSource for what a map calls elevation; an edit changes both by the same difference.
+  Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
+                                               std::stop_token stop = {}) const;
+
   // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
   // sources, in collars, and in holes that are not filled. Voids are filled as in tiles. `filled` has one element for
   // each point, or none; an element becomes 1 where the point lies in the pixel of a void sample. A height does not

@@ -80,6 +80,21 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["urls"]["heights"] = base + "/heights";
     entry["urls"]["mesh"] = base + "/mesh";
     if (dataset.edits_of) entry["urls"]["edits"] = base + "/edits.geojson";
+    if (!dataset.baked_alone) {
+      for (const char* const layer : {"hillshade", "slope", "contours"}) {
+        entry["urls"][layer] = fmt::format("{}/{}/tiles.json", base, layer);
+      }
+    }
+    if (dataset.imagery) {
+      entry["urls"]["imagery"] = base + "/imagery/tiles.json";
+      entry["urls"]["imagery_geodetic"] = base + "/imagery/geodetic/{z}/{x}/{y}.webp?v=" + dataset.version();
+      Json& imagery = entry["imagery"];
+      const dem::GeoBounds& bounds = dataset.imagery->bounds;
+      imagery["attribution"] = dataset.imagery_attribution;
+      imagery["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
+      imagery["max_level"] = dataset.imagery->max_mercator_depth;
+      imagery["geodetic_max_level"] = dataset.imagery->max_geodetic_level;
+    }
     list.push_back(std::move(entry));
   }
   Json document;

@@ -85,7 +85,11 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.has_datum = dataset.source->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
-  if (dataset.imagery.image) view.texture = dataset.imagery.texture;
+  if (dataset.imagery.image) {
+    view.texture = dataset.imagery.texture;
+    view.imagery = dataset.imagery.image->extent();
+    view.imagery_attribution = dataset.imagery.attribution;
+  }
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;

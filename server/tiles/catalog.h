@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
+#include "engine/dem/image/imagery.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "proto/gltf/glb_tile.h"
@@ -40,13 +41,15 @@ struct DatasetView {
   // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
   // above holds for all tiles.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
-  bool has_datum = true;                        // the vertical datum of its heights is known
-  std::size_t sources = 1;                      // rasters that the heights come from
-  bool has_water = false;                       // tiles have a water mask
-  std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
-  int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
-  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
-  std::optional<tiler::Coding> baked_coding;    // of the tiles of its archive; nothing: it has no archive
+  bool has_datum = true;                         // the vertical datum of its heights is known
+  std::size_t sources = 1;                       // rasters that the heights come from
+  bool has_water = false;                        // tiles have a water mask
+  std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
+  std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
+  std::string imagery_attribution = {};
+  int metadata_levels = 0;                    // tiles at multiples of this level have metadata; 0: none
+  int max_mercator_depth = 1;                 // the deepest geo::MercatorGrid of height tiles
+  std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
   // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
   std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
 

@@ -5,7 +5,7 @@ import {
   PolygonHierarchy, Primitive,
 } from "/viewer/cesium/index.js";
 import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from "/viewer/edit_shapes.js";
-import { formatHeight, formatNumber } from "/viewer/numbers.js";
+import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
 
 const kSamples = 400;
 const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
@@ -148,12 +148,11 @@ export class Draft {
     if (corners.length < 3) return "Click the next corner.";
     if (!this.#isPolygon) return "The outline crosses itself: remove the last corner.";
     const area = Math.abs(signedArea(corners));
-    const size = `${formatNumber(Math.round(area))} m²`;
+    const size = formatArea(area);
     if (!ground) return `${size}.`;
     const { samples, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
     if (samples === 0) return `${size}; no heights there.`;
-    const volume = (metres) => `${formatNumber(Math.round(metres))} m³`;
-    return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${volume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${volume(cut)}.`;
+    return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${formatVolume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${formatVolume(cut)}.`;
   }
 
   #save() {

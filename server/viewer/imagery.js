@@ -6,7 +6,7 @@ export function addImagery(scene, template, { bounds, attribution, geodetic_max_
   const provider = new UrlTemplateImageryProvider({
     url: new Resource({ url: template.replace("{y}", "{reverseY}"), headers }),
     tilingScheme: new GeographicTilingScheme(), tileWidth: 256, tileHeight: 256,
-    rectangle: Rectangle.fromDegrees(...bounds), maximumLevel, credit: attribution, hasAlphaChannel: false, enablePickFeatures: false,
+    rectangle: Rectangle.fromDegrees(...bounds), maximumLevel, credit: attribution, enablePickFeatures: false,
   });
   provider.errorEvent.addEventListener((failure) => {
     if (failure.timesRetried === 0) onError(failure.message);

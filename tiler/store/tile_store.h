@@ -35,7 +35,7 @@ struct CacheKeyHash {
 };
 
 inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
-  return selection.Contains(key.generation, key.request.key, key.request.format == TileFormat::kHeightPng);
+  return selection.Contains(key.generation, key.request.key, IsMercator(key.request.format));
 }
 inline bool IsSelected(const TileSelection& selection, const RefinedTileKey& key) {
   return selection.Contains(key.generation, key.key, /*is_mercator=*/false);

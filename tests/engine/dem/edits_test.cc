@@ -169,6 +169,39 @@ TEST_F(TerrainEdits, ShowInNodesAndPixels) {
   EXPECT_NE(source->fingerprint(), source->unedited_fingerprint());
 }
 
+// The source fills a part of the window. Where neither it nor an edit has a height, maps have none.
+TEST_F(TerrainEdits, ShowInMapPixelsAndLeaveTheRestAsItIs) {
+  const auto plain = OpenOrFail(slope_);
+  const auto edited = Open(Middle(R"({"op":"offset","metres":50})") + "," +
+                           Rectangle(R"({"op":"flatten","height":30})", 9.9, 50.1, 10.05, 50.2));
+  ASSERT_NE(edited, nullptr);
+  const int depth = 10;
+  const double pixels = 256.0 * 1024;
+  const NodeWindow window{static_cast<std::int64_t>((9.8 + 180) / 360 * pixels), 87'800, 600, 600};
+  const auto before = plain->ReadMercator(depth, window), after = edited->ReadMercator(depth, window);
+  ASSERT_TRUE(before && after);
+  for (const HeightDatum datum : {HeightDatum::kEllipsoid, HeightDatum::kSource}) {
+    const auto unedited = plain->ReadKnownMercator(depth, window, datum);
+    const auto known = edited->ReadKnownMercator(depth, window, datum);
+    ASSERT_TRUE(unedited && known);
+    int voids = 0, changed = 0, made = 0;
+    for (std::size_t i = 0; i < known->size(); ++i) {
+      if (std::isnan((*unedited)[i])) {
+        ASSERT_EQ((*before)[i], static_cast<float>(plain->info().floor));
+        ++(std::isnan((*known)[i]) ? voids : made);
+      } else {
+        ASSERT_EQ((*unedited)[i], (*before)[i]);
+      }
+      if (std::isnan((*known)[i])) continue;
+      ASSERT_NEAR((*known)[i], (*after)[i], 1e-4);
+      changed += (*after)[i] != (*before)[i] ? 1 : 0;
+    }
+    EXPECT_GT(voids, 10'000);
+    EXPECT_GT(changed, 1000);
+    EXPECT_GT(made, 100) << "an edit beside the source";
+  }
+}
+
 TEST_F(TerrainEdits, HeightsLieWithinRangeBounds) {
   const auto source =
       Open(Middle(R"({"op":"offset","metres":600,"blend_m":500})") + "," +

@@ -1,0 +1,107 @@
+#include "tiler/map/contour_tile.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+
+#include "engine/core/check.h"
+#include "engine/dem/contour/contour_lines.h"
+
+namespace terrace::tiler {
+namespace {
+
+constexpr int kTilePixels = 256;
+constexpr int kUnits = proto::kVectorTileExtent / kTilePixels;  // of a pixel
+constexpr int kFirst = -kContourBuffer * kUnits, kLast = proto::kVectorTileExtent + kContourBuffer * kUnits;
+
+// Metres, by level from 0; the last for all deeper levels.
+constexpr std::uint32_t kIntervals[] = {1000, 1000, 1000, 1000, 1000, 1000, 1000, 500, 500, 200,
+                                        200,  100,  50,   20,   10,   10,   5,    2,   1};
+
+// Node positions count from the middle of the margin's first pixel. Rounding does not depend on the tile: half units
+// are rounded up, to the south and east.
+proto::TilePoint UnitsOf(const dem::ContourPoint& point) {
+  const auto units = [](double node) {
+    return static_cast<std::int32_t>(std::floor((node - kContourMargin + 0.5) * kUnits + 0.5));
+  };
+  return {units(point.x), units(point.y)};
+}
+
+bool TouchesBuffer(const proto::TilePoint& a, const proto::TilePoint& b) {
+  return std::max(a.x, b.x) >= kFirst && std::min(a.x, b.x) <= kLast && std::max(a.y, b.y) >= kFirst &&
+         std::min(a.y, b.y) <= kLast;
+}
+
+// Away from the edges, where neighbouring tiles have the same points.
+bool IsInside(const proto::TilePoint& point) {
+  constexpr int kNear = kContourBuffer * kUnits;
+  const auto is_inside = [](std::int32_t at) { return at > kNear && at < proto::kVectorTileExtent - kNear; };
+  return is_inside(point.x) && is_inside(point.y);
+}
+
+// Whether b can be left out between a and c: the line does not change.
+bool IsBetween(const proto::TilePoint& a, const proto::TilePoint& b, const proto::TilePoint& c) {
+  if (!IsInside(a) || !IsInside(b) || !IsInside(c)) return false;
+  const std::int64_t x = b.x - a.x, y = b.y - a.y, to_x = c.x - b.x, to_y = c.y - b.y;
+  return x * to_y == y * to_x && x * to_x + y * to_y > 0;
+}
+
+void Append(std::vector<proto::TilePoint>& line, const proto::TilePoint& point) {
+  if (!line.empty() && line.back() == point) return;
+  if (line.size() >= 2 && IsBetween(line[line.size() - 2], line.back(), point)) line.pop_back();
+  line.push_back(point);
+}
+
+// The parts of a line in the tile and its buffer.
+void AddParts(const dem::ContourLine& line, std::vector<std::vector<proto::TilePoint>>& lines) {
+  std::vector<proto::TilePoint> part;
+  const auto finish = [&] {
+    if (part.size() >= 2) lines.push_back(part);
+    part.clear();
+  };
+  for (std::size_t i = 1; i < line.points.size(); ++i) {
+    const proto::TilePoint from = UnitsOf(line.points[i - 1]), to = UnitsOf(line.points[i]);
+    if (!TouchesBuffer(from, to)) {
+      finish();
+      continue;
+    }
+    Append(part, from);
+    Append(part, to);
+  }
+  finish();
+}
+
+}  // namespace
+
+std::uint32_t DefaultIntervalCm(int level) {
+  const auto last = static_cast<int>(std::size(kIntervals)) - 1;
+  return 100 * kIntervals[std::clamp(level, 0, last)];
+}
+
+std::uint32_t MinIntervalCm(int level) { return std::max(DefaultIntervalCm(level) / 20, 10u); }
+
+Result<std::vector<proto::ContourFeature>> ContoursOf(const MapHeights& heights, std::uint32_t interval_cm,
+                                                      const std::stop_token& stop) {
+  TERRACE_CHECK(heights.side == kTilePixels + 2 * kContourMargin && interval_cm > 0);
+  const auto metres = [](std::int64_t of_cm) { return static_cast<double>(of_cm) / 100; };
+  std::int64_t interval = interval_cm;
+  const auto crossings = [&] {
+    return dem::CountContourCrossings(heights.heights, heights.side, heights.side, metres(interval));
+  };
+  while (crossings() > dem::kMaxContourCrossings) interval *= kIndexEvery;
+  const auto traced = dem::TraceContours(heights.heights, heights.side, heights.side, metres(interval), stop);
+  if (!traced) return tl::unexpected(traced.error());
+  std::vector<proto::ContourFeature> features;
+  for (const dem::ContourLine& line : *traced) {
+    const std::int64_t height_cm = std::llround(line.height / metres(interval)) * interval;
+    if (features.empty() || features.back().height_m != metres(height_cm)) {
+      const bool is_index = height_cm % (std::int64_t{kIndexEvery} * interval_cm) == 0;
+      features.push_back({metres(height_cm), is_index, {}});
+    }
+    AddParts(line, features.back().lines);
+  }
+  return features;
+}
+
+}  // namespace terrace::tiler
