@@ -15,6 +15,7 @@ import { Watch } from "/viewer/watch.js";
 const kFlightSeconds = 2.5;
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
+const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
@@ -244,6 +245,7 @@ async function outlineEdits() {
   } catch (error) {
     state.editsOf = undefined;
     panel.note(`The edits could not be read: ${error.message}.`);
+    setTimeout(() => (state.labelled = undefined), kRetryMs);
   }
 }
 
