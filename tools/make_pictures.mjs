@@ -35,8 +35,8 @@ const profile = () => {
   return terrace.state.measure.add({ longitude: 8.5, latitude: 46.6, height: 2000 });
 };
 const draft = () => {
-  const corners = [[8.24, 46.42], [8.33, 46.40], [8.36, 46.46], [8.27, 46.48]];
-  for (const [longitude, latitude] of corners) terrace.state.draft.add({ longitude, latitude, height: 1900 });
+  const corners = [[8.27, 46.33], [8.33, 46.315], [8.35, 46.355], [8.29, 46.37]];
+  for (const [longitude, latitude] of corners) terrace.state.draft.add({ longitude, latitude, height: 2100 });
 };
 
 // `strip`: a part of the README's strip, without panels. `tool`: opened before `act` runs in the page.

@@ -31,6 +31,7 @@ export class Draft {
   toggle() {
     if (this.isOpen) return this.end();
     this.isOpen = true;
+    this.globe.scene.globe.depthTestAgainstTerrain = true;  // ground hides what is below it
     this.globe.overlay.setMarker("picked", undefined);
     this.globe.onClick = (ground) => ground && this.add(ground);
     byId("draft").hidden = false;
@@ -41,6 +42,7 @@ export class Draft {
   end() {
     if (!this.isOpen) return;
     this.isOpen = false;
+    this.globe.scene.globe.depthTestAgainstTerrain = false;
     this.globe.onClick = undefined;
     this.corners = [];
     this.isHeightChosen = false;
