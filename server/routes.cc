@@ -86,7 +86,7 @@ bool ReadTile(const Segments& segments, Route& route) {
 
 // RouteRow::read of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
 template <std::size_t kAt>
-bool ReadMapTile(const Segments& segments, Route& route) {
+bool ReadTileInFolder(const Segments& segments, Route& route) {
   std::string_view row = segments[kAt + 2];
   const std::string folder = kAt == 2 ? std::string(segments[1]) : fmt::format("{}/{}", segments[1], segments[2]);
   route.format = CutSuffix(row, folder);
@@ -169,23 +169,23 @@ constexpr RouteRow kRows[] = {
     {.label = "hillshade",
      .pattern = "/{dataset}/hillshade/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
-     .read = ReadMapTile<2>},
+     .read = ReadTileInFolder<2>},
     {.label = "slope",
      .pattern = "/{dataset}/slope/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
-     .read = ReadMapTile<2>},
+     .read = ReadTileInFolder<2>},
     {.label = "contours",
      .pattern = "/{dataset}/contours/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
-     .read = ReadMapTile<2>},
+     .read = ReadTileInFolder<2>},
     {.label = "imagery",
      .pattern = "/{dataset}/imagery/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
-     .read = ReadMapTile<2>},
+     .read = ReadTileInFolder<2>},
     {.label = "imagery",
      .pattern = "/{dataset}/imagery/geodetic/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
-     .read = ReadMapTile<3>},
+     .read = ReadTileInFolder<3>},
     {.label = "hillshade",
      .pattern = "/{dataset}/hillshade/tiles.json",
      .handle = AnswerMapTileJson,

@@ -40,7 +40,7 @@ Samples Expanded(const PixelView& pixels, bool with_alpha) {
 }
 
 // `quality`: 0 means lossless.
-Result<std::string> EncodeWebp(const PixelView& pixels, int quality) {
+Result<std::string> EncodeWebpPixels(const PixelView& pixels, int quality) {
   const bool with_alpha = !IsOpaque(pixels);
   const Samples samples = Expanded(pixels, with_alpha);
   const int width = pixels.width, height = pixels.height;
@@ -86,7 +86,7 @@ const char* ToString(PictureFormat format) {
 
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format) {
   TERRACE_CHECK(format != PictureFormat::kJpeg);
-  if (format == PictureFormat::kWebp) return EncodeWebp(pixels, 0);
+  if (format == PictureFormat::kWebp) return EncodeWebpPixels(pixels, 0);
   return EncodePng(pixels);
 }
 
@@ -94,7 +94,7 @@ Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, i
                                 const std::array<std::uint8_t, 3>& background) {
   TERRACE_CHECK(pixels.kind == PixelKind::kRgba && quality >= 1 && quality <= 100);
   if (format == PictureFormat::kPng) return EncodePng(pixels);
-  if (format == PictureFormat::kWebp) return EncodeWebp(pixels, quality);
+  if (format == PictureFormat::kWebp) return EncodeWebpPixels(pixels, quality);
   Samples rgb = Expanded(pixels, /*with_alpha=*/false);
   for (std::size_t i = 0; i < rgb.size() / 3; ++i) {
     if (pixels.samples[4 * i + 3] == 0) std::ranges::copy(background, rgb.begin() + static_cast<std::ptrdiff_t>(3 * i));

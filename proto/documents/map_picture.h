@@ -16,8 +16,8 @@ const char* MediaTypeOf(PictureFormat format);
 // As in URLs: "png", "webp", "jpg".
 const char* ToString(PictureFormat format);
 
-// The samples unchanged, as PNG or as lossless WebP; in WebP, grey becomes equal red, green and blue, and a picture
-// without transparent pixels has no alpha. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
+// The samples unchanged, as PNG or as lossless WebP. WebP has red, green and blue of grey, any colour in transparent
+// pixels, and no alpha if there are none. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
 
 // A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has the

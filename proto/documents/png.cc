@@ -12,7 +12,7 @@
 namespace terrace::proto {
 namespace {
 
-using Row = std::vector<std::uint8_t>;
+using PngRow = std::vector<std::uint8_t>;
 
 void PutBigEndian(std::string& out, std::uint32_t value) {
   for (const int shift : {24, 16, 8, 0}) out += static_cast<char>(value >> shift & 0xff);
@@ -36,7 +36,7 @@ int Paeth(int a, int b, int c) {
 
 // PNG, section 9.2. The filter type comes first. `pixel`: its bytes.
 void Filter(int type, std::span<const std::uint8_t> row, std::span<const std::uint8_t> above, std::size_t pixel,
-            Row& out) {
+            PngRow& out) {
   out[0] = static_cast<std::uint8_t>(type);
   for (std::size_t i = 0; i < row.size(); ++i) {
     const bool first = i < pixel;
@@ -48,8 +48,8 @@ void Filter(int type, std::span<const std::uint8_t> row, std::span<const std::ui
 
 // The filter with the smallest sum of absolute output values, bytes taken as signed: the heuristic of PNG, section
 // 12.7.
-const Row& BestFilter(std::span<const std::uint8_t> row, std::span<const std::uint8_t> above, std::size_t pixel,
-                      std::array<Row, 5>& candidates) {
+const PngRow& BestFilter(std::span<const std::uint8_t> row, std::span<const std::uint8_t> above, std::size_t pixel,
+                         std::array<PngRow, 5>& candidates) {
   std::size_t best = 0;
   std::uint64_t least = ~std::uint64_t{0};
   for (std::size_t type = 0; type < candidates.size(); ++type) {
@@ -88,14 +88,14 @@ std::string Encode(const PixelView& pixels, char colour_type, Palette palette) {
   TERRACE_CHECK(pixels.width > 0 && pixels.height > 0);
   const std::size_t row_bytes = pixel * static_cast<std::size_t>(pixels.width);
   TERRACE_CHECK(pixels.samples.size() == row_bytes * static_cast<std::size_t>(pixels.height));
-  const Row nothing(row_bytes);
-  std::array<Row, 5> candidates;
+  const PngRow nothing(row_bytes);
+  std::array<PngRow, 5> candidates;
   std::string filtered;
   filtered.reserve((row_bytes + 1) * static_cast<std::size_t>(pixels.height));
   std::span<const std::uint8_t> above = nothing;
   for (std::size_t at = 0; at < pixels.samples.size(); at += row_bytes) {
     const std::span<const std::uint8_t> row = pixels.samples.subspan(at, row_bytes);
-    const Row& best = BestFilter(row, above, pixel, candidates);
+    const PngRow& best = BestFilter(row, above, pixel, candidates);
     filtered.append(reinterpret_cast<const char*>(best.data()), best.size());
     above = row;
   }

@@ -14,9 +14,9 @@
 namespace terrace::server {
 namespace {
 
-using tiler::TileFormat;
-
-bool IsImagery(TileFormat format) { return format == TileFormat::kImagery || format == TileFormat::kGeodeticImagery; }
+bool IsImagery(tiler::TileFormat format) {
+  return format == tiler::TileFormat::kImagery || format == tiler::TileFormat::kGeodeticImagery;
+}
 
 // A reader of one parameter's value. kInvalidArgument: the message begins with what the value must be.
 using SetParameter = Result<void> (*)(std::string_view text, MapTileParameters& parameters);
@@ -90,23 +90,23 @@ Result<void> SetPicture(std::string_view text, MapTileParameters& parameters) {
 
 struct MapParameterRow {
   std::string_view name;
-  bool (*is_of)(TileFormat format);
+  bool (*is_of)(tiler::TileFormat format);
   SetParameter set;
   bool in_tile_json_only = false;
 };
 
 constexpr MapParameterRow kRows[] = {
-    {"size", [](TileFormat format) { return format != TileFormat::kContours; }, SetSize},
-    {"azimuth", [](TileFormat format) { return format == TileFormat::kHillshade; }, SetAzimuth},
-    {"altitude", [](TileFormat format) { return format == TileFormat::kHillshade; }, SetAltitude},
-    {"zfactor", [](TileFormat format) { return format == TileFormat::kHillshade; }, SetZFactor},
-    {"style", [](TileFormat format) { return format == TileFormat::kSlope; }, SetStyle},
-    {"interval", [](TileFormat format) { return format == TileFormat::kContours; }, SetInterval},
-    {"format", [](TileFormat format) { return format != TileFormat::kContours; }, SetPicture,
+    {"size", [](tiler::TileFormat format) { return format != tiler::TileFormat::kContours; }, SetSize},
+    {"azimuth", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetAzimuth},
+    {"altitude", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetAltitude},
+    {"zfactor", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetZFactor},
+    {"style", [](tiler::TileFormat format) { return format == tiler::TileFormat::kSlope; }, SetStyle},
+    {"interval", [](tiler::TileFormat format) { return format == tiler::TileFormat::kContours; }, SetInterval},
+    {"format", [](tiler::TileFormat format) { return format != tiler::TileFormat::kContours; }, SetPicture,
      /*in_tile_json_only=*/true},
 };
 
-Error UnknownParameter(TileFormat format, bool in_tile_json) {
+Error UnknownParameter(tiler::TileFormat format, bool in_tile_json) {
   std::string known;
   for (const MapParameterRow& row : kRows) {
     if (!row.is_of(format) || (row.in_tile_json_only && !in_tile_json)) continue;
@@ -125,7 +125,7 @@ bool Meets(const dem::GeoBounds& box, const dem::GeoBounds& tile) {
 
 }  // namespace
 
-Result<MapTileParameters> ParseMapParameters(std::string_view query, TileFormat format, bool in_tile_json) {
+Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format, bool in_tile_json) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
   MapTileParameters parameters;
@@ -160,24 +160,24 @@ std::string MapTileQuery(const MapTileParameters& parameters) {
   return query;
 }
 
-int MaxMapLevel(const DatasetView& dataset, TileFormat format, int size) {
+int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size) {
   const int above = size == 512 ? 1 : 0;
   switch (format) {
-    case TileFormat::kImagery:
+    case tiler::TileFormat::kImagery:
       return std::max(dataset.imagery->max_mercator_depth - above, 0);
-    case TileFormat::kGeodeticImagery:
+    case tiler::TileFormat::kGeodeticImagery:
       return std::max(dataset.imagery->max_geodetic_level - above, 0);
     default:
       return MaxHeightLevel(dataset, size);
   }
 }
 
-dem::GeoBounds MapBounds(const DatasetView& dataset, TileFormat format) {
+dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
   if (IsImagery(format)) return dataset.imagery->bounds;
   return {dataset.west, dataset.south, dataset.east, dataset.north};
 }
 
-Result<void> CheckHasImagery(const DatasetView& dataset, TileFormat format) {
+Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format) {
   if (!IsImagery(format) || dataset.imagery) return {};
   return MakeError(ErrorCode::kNotFound, "the dataset has no imagery; its option \"imagery\" names an image");
 }
@@ -197,7 +197,7 @@ Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, til
   const proto::PictureFormat picture = tile.map.picture;
   tile.map = parameters->map;
   tile.map.picture = picture;
-  if (tile.format != TileFormat::kContours) {
+  if (tile.format != tiler::TileFormat::kContours) {
     tile.height_size = parameters->size;
     return {};
   }
@@ -211,8 +211,8 @@ Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, til
 }
 
 std::string_view MapTileType(const tiler::TileRequest& tile) {
-  return tile.format == TileFormat::kContours ? "application/vnd.mapbox-vector-tile"
-                                              : proto::MediaTypeOf(tile.map.picture);
+  return tile.format == tiler::TileFormat::kContours ? "application/vnd.mapbox-vector-tile"
+                                                     : proto::MediaTypeOf(tile.map.picture);
 }
 
 }  // namespace terrace::server

@@ -14,6 +14,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import urllib.error
 import urllib.request
@@ -22,7 +23,7 @@ BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 SOURCE_DIR = pathlib.Path(sys.argv.pop(1)).resolve()
 DEM = SOURCE_DIR / "config/samples/jacksboro.tif"
 WORLD = 20037508.342789244
-LEVEL, COLUMN, ROW = 11, 544, 803  # inside the DEM, and so are the tiles around it
+LEVEL, COLUMN, ROW = 11, 544, 802  # inside the DEM, which the tiles around it touch
 
 
 def run(*command):
@@ -173,16 +174,20 @@ class MapLayers(unittest.TestCase):
             width, png = self.pixels(f"/hills/{layer}/{level}/{column}/{row}.png{query}")
             again, webp = self.pixels(f"/hills/{layer}/{level}/{column}/{row}.webp{query}")
             self.assertEqual(width, again)
+            there = [i for i in range(width * width) if len(png) == 1 or png[1][i] == 255]
+            self.assertGreater(len(there), width * width / 3)
             for band in webp[:3]:
-                self.assertEqual(band, png[0])
+                self.assertEqual([band[i] for i in there], [png[0][i] for i in there])
+            if len(png) == 2:
+                self.assertEqual(webp[3], png[1])
 
     def test_tiles_of_512_pixels_are_the_four_below(self):
         for layer in ("hillshade", "slope"):
             query = "style=degrees&" if layer == "slope" else ""
-            width, (large,) = self.pixels(f"/hills/{layer}/{LEVEL - 1}/{COLUMN // 2}/{ROW // 2}.png?{query}size=512")
+            width, (large, *_) = self.pixels(f"/hills/{layer}/{LEVEL - 1}/{COLUMN // 2}/{ROW // 2}.png?{query}size=512")
             self.assertEqual(width, 512)
-            for dx, dy in ((0, 0), (1, 1)):
-                _, (small,) = self.pixels(f"/hills/{layer}/{LEVEL}/{COLUMN // 2 * 2 + dx}/{ROW // 2 * 2 + dy}.png?{query}")
+            for dx, dy in ((0, 0), (0, 1), (1, 0)):
+                _, (small, *_) = self.pixels(f"/hills/{layer}/{LEVEL}/{COLUMN // 2 * 2 + dx}/{ROW // 2 * 2 + dy}.png?{query}")
                 for y in range(256):
                     at = (256 * dy + y) * 512 + 256 * dx
                     self.assertEqual(large[at:at + 256], small[256 * y:256 * y + 256], (layer, dx, dy, y))
@@ -241,7 +246,7 @@ class MapLayers(unittest.TestCase):
 
     def test_contours_meet_at_the_edges(self):
         """Pieces of line that cross an edge are the same in both tiles."""
-        def crossing(lines, axis, edge, shift):
+        def crossing(lines, axis, edge):
             pieces = set()
             for height, (_, parts) in lines.items():
                 for part in parts:
@@ -253,10 +258,9 @@ class MapLayers(unittest.TestCase):
                             if 0 < where < 4096:
                                 pieces.add((height, round(where, 6)))
             return pieces
-        here = self.lines(LEVEL, COLUMN, ROW, "?interval=20")
-        for axis, there in ((0, (COLUMN + 1, ROW)), (1, (COLUMN, ROW + 1))):
-            ours = crossing(here, axis, 4096, 0)
-            theirs = crossing(self.lines(LEVEL, *there, "?interval=20"), axis, 0, 0)
+        for axis, here, there in ((0, (COLUMN, ROW), (COLUMN + 1, ROW)), (1, (COLUMN, ROW - 1), (COLUMN, ROW))):
+            ours = crossing(self.lines(LEVEL, *here, "?interval=20"), axis, 4096)
+            theirs = crossing(self.lines(LEVEL, *there, "?interval=20"), axis, 0)
             self.assertGreater(len(ours), 5)
             self.assertEqual(ours, theirs)
 
@@ -320,6 +324,87 @@ class MapLayers(unittest.TestCase):
         empty = [i for i in range(65536) if bands[3][i] == 0]
         grey = sorted(jpeg[0][i] for i in empty)[len(empty) // 2]
         self.assertAlmostEqual(grey, 188, delta=2)
+
+    def entry(self, server, name):
+        return next(d for d in json.loads(server.get("/datasets")[0])["datasets"] if d["name"] == name)
+
+    def test_a_replaced_image_is_another_version(self):
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        image = folder / "photo.tif"
+
+        def paint(red, path):
+            run("gdal_translate", "-q", "-b", 1, "-b", 1, "-b", 1, "-ot", "Byte", "-scale", 0, 1e6, red, red, self.folder / "utm.tif", path)
+        paint(30, image)
+        server = Server(folder, [{"name": "swap", "sources": [str(DEM)], "imagery": {"image": str(image)}}])
+        try:
+            before = self.entry(server, "swap")
+            level, (west, south, east, north) = before["imagery"]["geodetic_max_level"], before["imagery"]["bounds"]
+            step = 180 / 2 ** level
+            place = {"z": level, "x": int(((west + east) / 2 + 180) / step), "y": int(((south + north) / 2 + 90) / step)}
+
+            def middle():
+                file = folder / "tile.webp"
+                data, headers = server.get(before["urls"]["imagery_geodetic"].format(**place))
+                file.write_bytes(data)
+                return self.bands(file)[1][0][128 * 256 + 128], headers["Cache-Control"]
+            red, cache = middle()
+            self.assertAlmostEqual(red, 30, delta=4)
+            self.assertIn("immutable", cache)
+            paint(220, folder / "next.tif")
+            (folder / "next.tif").rename(image)
+            end = time.monotonic() + 30
+            while self.entry(server, "swap")["version"] == before["version"] and time.monotonic() < end:
+                time.sleep(0.1)
+            self.assertNotEqual(self.entry(server, "swap")["version"], before["version"])
+            red, cache = middle()
+            self.assertAlmostEqual(red, 220, delta=4)
+            self.assertEqual(cache, "no-store", "the URL has the old version")
+        finally:
+            server.stop()
+
+    def test_a_palette_is_shown_in_its_colours_and_coarse_levels_use_averages(self):
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        # Columns of two colours, a pixel wide: their average is neither.
+        lines = "\n".join(" ".join(str(x % 2) for x in range(512)) for _ in range(512))
+        (folder / "plain.asc").write_text(f"ncols 512\nnrows 512\nxllcorner -84.4\nyllcorner 36.2\ncellsize 0.0004\n{lines}\n")
+        run("gdal_translate", "-q", "-ot", "Byte", "-a_srs", "EPSG:4326", folder / "plain.asc", folder / "plain.vrt")
+        vrt = (folder / "plain.vrt").read_text()
+        table = '<ColorInterp>Palette</ColorInterp><ColorTable><Entry c1="200" c2="200" c3="40" c4="255"/><Entry c1="0" c2="0" c3="40" c4="255"/></ColorTable>'
+        (folder / "plain.vrt").write_text(re.sub(r"<VRTRasterBand[^>]*>", lambda found: found[0] + table, vrt))
+        run("gdal_translate", "-q", folder / "plain.vrt", folder / "palette.tif")
+        server = Server(folder, [{"name": "palette", "sources": [str(DEM)], "imagery": {"image": str(folder / "palette.tif")}}])
+        try:
+            level = self.entry(server, "palette")["imagery"]["max_level"]
+            shown = {}
+            for z in (level + 0, level - 3):
+                n = 2 ** z
+                x, y = int((-84.3 + 180) / 360 * n), int((1 - math.asinh(math.tan(math.radians(36.3))) / math.pi) / 2 * n)
+                data, _ = server.get(f"/palette/imagery/{z}/{x}/{y}.webp")
+                (folder / "tile.webp").write_bytes(data)
+                bands = self.bands(folder / "tile.webp")[1]
+                inside = [i for i in range(65536) if len(bands) == 3 or bands[3][i] == 255]
+                shown[z] = sorted(bands[0][i] for i in inside), sorted(bands[2][i] for i in inside)
+            fine, coarse = shown[level][0], shown[level - 3][0]
+            self.assertGreater(quantile(fine, 0.98) - quantile(fine, 0.02), 80, "single pixels")
+            self.assertAlmostEqual(quantile(coarse, 0.5), 100, delta=12)
+            self.assertLess(quantile(coarse, 0.9) - quantile(coarse, 0.1), 40, "averages")
+            self.assertAlmostEqual(quantile(shown[level - 3][1], 0.5), 40, delta=12)
+        finally:
+            server.stop()
+
+    def test_images_that_cannot_be_used_are_refused_at_the_start(self):
+        folder = pathlib.Path(tempfile.mkdtemp(dir=self.folder))
+        run("gdal_translate", "-q", "-of", "PNG", "-b", 1, "-ot", "Byte", "-scale", self.folder / "utm.tif", folder / "nowhere.png")
+        (folder / "nowhere.png.aux.xml").unlink(missing_ok=True)
+        (folder / "nowhere.wld").unlink(missing_ok=True)
+        for image, words in (("missing.tif", "missing.tif"), ("nowhere.png", "georeference|reference system"), (str(self.folder / "utm.tif"), "colours")):
+            config = folder / "bad.json"
+            config.write_text(json.dumps({"listen": "127.0.0.1:0", "cache_dir": "none", "datasets": [
+                {"name": "bad", "sources": [str(DEM)], "imagery": {"image": image}}]}))
+            done = subprocess.run([BINARY, "serve", "--config", config], capture_output=True, text=True, timeout=60)
+            self.assertIn(done.returncode, (1, 2), image)
+            self.assertRegex(done.stderr, words)
+            self.assertIn("dataset bad", done.stderr)
 
     def test_documents_name_what_is_there(self):
         for layer, kind, suffix in (("hillshade", "raster", "png"), ("slope", "raster", "png"), ("contours", "vector", "mvt"), ("imagery", "raster", "webp")):

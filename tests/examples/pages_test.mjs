@@ -227,7 +227,7 @@ describe('the pages of examples/', () => {
         return y > 0 && y < 4096 ? [`${ele} m at ${y.toFixed(6)}`] : [];
       }));
     }));
-    const west = crossings(await read(544, 803), 4096), east = crossings(await read(545, 803), 0);
+    const west = crossings(await read(544, 802), 4096), east = crossings(await read(545, 802), 0);
     assert.ok(west.size > 5, `${west.size} crossings`);
     assert.deepEqual([...west].sort(), [...east].sort());
   });

@@ -10,20 +10,20 @@
 namespace terrace::proto {
 namespace {
 
-struct Feature {
+struct VectorFeature {
   std::vector<std::uint32_t> tags, geometry;
   int type = 0;
 };
-struct Layer {
+struct VectorLayer {
   std::string name;
-  std::vector<Feature> features;
+  std::vector<VectorFeature> features;
   std::vector<std::string> keys;
   std::vector<std::variant<bool, std::int64_t, double>> values;
   std::uint32_t extent = 0, version = 0;
 };
 
-Layer Read(const std::string& tile) {
-  Layer layer;
+VectorLayer ReadVectorTile(const std::string& tile) {
+  VectorLayer layer;
   protozero::pbf_reader reader(tile);
   EXPECT_TRUE(reader.next(3));
   protozero::pbf_reader in = reader.get_message();
@@ -33,15 +33,14 @@ Layer Read(const std::string& tile) {
       layer.name = in.get_string();
     else if (in.tag() == 2) {
       protozero::pbf_reader of = in.get_message();
-      Feature& feature = layer.features.emplace_back();
+      VectorFeature& feature = layer.features.emplace_back();
       while (of.next()) {
         if (of.tag() == 3) {
           feature.type = of.get_enum();
           continue;
         }
-        for (const std::uint32_t number : of.get_packed_uint32()) {
-          (of.tag() == 2 ? feature.tags : feature.geometry).push_back(number);
-        }
+        std::vector<std::uint32_t>& numbers = of.tag() == 2 ? feature.tags : feature.geometry;
+        for (const std::uint32_t number : of.get_packed_uint32()) numbers.push_back(number);
       }
     } else if (in.tag() == 3)
       layer.keys.push_back(in.get_string());
@@ -64,19 +63,19 @@ Layer Read(const std::string& tile) {
 
 // The examples of the specification, sections 4.3.5.3 and 4.3.5.5.
 TEST(VectorTile, GeometryIsThatOfTheSpecification) {
-  const Layer layer = Read(EncodeContourTile(
+  const VectorLayer layer = ReadVectorTile(EncodeContourTile(
       {{100, true, {{{2, 2}, {2, 10}, {10, 10}}}}, {120, false, {{{2, 2}, {2, 10}, {10, 10}}, {{1, 1}, {3, 5}}}}}));
   ASSERT_EQ(layer.features.size(), 2u);
   EXPECT_EQ(layer.features[0].geometry, (std::vector<std::uint32_t>{9, 4, 4, 18, 0, 16, 16, 0}));
   EXPECT_EQ(layer.features[1].geometry, (std::vector<std::uint32_t>{9, 4, 4, 18, 0, 16, 16, 0, 9, 17, 17, 10, 4, 8}));
-  for (const Feature& feature : layer.features) EXPECT_EQ(feature.type, 2) << "LINESTRING";
+  for (const VectorFeature& feature : layer.features) EXPECT_EQ(feature.type, 2) << "LINESTRING";
 }
 
 TEST(VectorTile, AttributesAreHeightAndIndex) {
-  const Layer layer = Read(EncodeContourTile({{-2.5, false, {{{0, 0}, {1, 1}}}},
-                                              {7, false, {}},
-                                              {1000, true, {{{0, 0}, {1, 1}}}},
-                                              {-30, false, {{{-9, 0}, {1, 1}}}}}));
+  const VectorLayer layer = ReadVectorTile(EncodeContourTile({{-2.5, false, {{{0, 0}, {1, 1}}}},
+                                                              {7, false, {}},
+                                                              {1000, true, {{{0, 0}, {1, 1}}}},
+                                                              {-30, false, {{{-9, 0}, {1, 1}}}}}));
   EXPECT_EQ(layer.name, "contour");
   EXPECT_EQ(layer.extent, 4096u);
   EXPECT_EQ(layer.version, 2u);

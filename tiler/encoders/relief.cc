@@ -57,7 +57,7 @@ Result<std::string> EncodeSlopeColors(const std::vector<int>& steps, int size, p
   return proto::EncodeExactly({size, size, proto::PixelKind::kRgba, samples}, format);
 }
 
-Result<void> Finish(Result<std::string> bytes, EncodedTile& encoded, std::chrono::steady_clock::time_point start) {
+Result<void> StoreBytes(Result<std::string> bytes, EncodedTile& encoded, std::chrono::steady_clock::time_point start) {
   if (!bytes) return tl::unexpected(std::move(bytes.error()));
   encoded.bytes = *std::move(bytes);
   encoded.times.encode = MicrosecondsSince(start);
@@ -77,7 +77,7 @@ Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, co
     const int shade = hillshade.Of(gradient);
     values.push_back(shade == 0 ? -1 : shade);
   }
-  return Finish(EncodeGrey(values, input.request.height_size, input.request.map.picture), encoded, start);
+  return StoreBytes(EncodeGrey(values, input.request.height_size, input.request.map.picture), encoded, start);
 }
 
 Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
@@ -88,7 +88,7 @@ Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const 
   steps.reserve(gradients->size());
   for (const Gradient& gradient : *gradients) steps.push_back(SlopeStep(gradient));
   const auto encode = input.request.map.slope_style == SlopeStyle::kColors ? EncodeSlopeColors : EncodeGrey;
-  return Finish(encode(steps, input.request.height_size, input.request.map.picture), encoded, start);
+  return StoreBytes(encode(steps, input.request.height_size, input.request.map.picture), encoded, start);
 }
 
 }  // namespace terrace::tiler

@@ -33,31 +33,78 @@ bool TouchesBuffer(const proto::TilePoint& a, const proto::TilePoint& b) {
          std::min(a.y, b.y) <= kLast;
 }
 
-// Away from the edges, where neighbouring tiles have the same points.
-bool IsInside(const proto::TilePoint& point) {
+// Points that are left out lie at most this far from the line without them: an eighth of a pixel.
+constexpr std::int64_t kTolerance = 2;
+
+// Away from the edges, where neighbouring tiles need the same points.
+bool IsAwayFromEdges(const proto::TilePoint& point) {
   constexpr int kNear = kContourBuffer * kUnits;
   const auto is_inside = [](std::int32_t at) { return at > kNear && at < proto::kVectorTileExtent - kNear; };
   return is_inside(point.x) && is_inside(point.y);
 }
 
-// Whether b can be left out between a and c: the line does not change.
-bool IsBetween(const proto::TilePoint& a, const proto::TilePoint& b, const proto::TilePoint& c) {
-  if (!IsInside(a) || !IsInside(b) || !IsInside(c)) return false;
-  const std::int64_t x = b.x - a.x, y = b.y - a.y, to_x = c.x - b.x, to_y = c.y - b.y;
-  return x * to_y == y * to_x && x * to_x + y * to_y > 0;
+// The square of a point's distance from a piece of line, times the square of the piece's length, if that is not 0.
+std::int64_t ScaledDistance(const proto::TilePoint& a, const proto::TilePoint& b, const proto::TilePoint& point) {
+  const std::int64_t x = b.x - a.x, y = b.y - a.y, to_x = point.x - a.x, to_y = point.y - a.y;
+  const std::int64_t length = x * x + y * y, along = x * to_x + y * to_y;
+  if (length == 0) return to_x * to_x + to_y * to_y;
+  if (along <= 0) return (to_x * to_x + to_y * to_y) * length;
+  if (along >= length) return ((to_x - x) * (to_x - x) + (to_y - y) * (to_y - y)) * length;
+  const std::int64_t cross = x * to_y - y * to_x;
+  return cross * cross;
+}
+
+// Douglas and Peucker 1973, on whole numbers: marks the points between two kept ones that must stay. Coordinates differ
+// by at most 2^13, so numbers stay below 2^56.
+void MarkKept(const std::vector<proto::TilePoint>& line, std::size_t first, std::size_t last,
+              std::vector<bool>& keeps) {
+  std::vector<std::pair<std::size_t, std::size_t>> open = {{first, last}};
+  while (!open.empty()) {
+    const auto [from, to] = open.back();
+    open.pop_back();
+    const proto::TilePoint &a = line[from], &b = line[to];
+    const std::int64_t x = b.x - a.x, y = b.y - a.y, length = std::max<std::int64_t>(x * x + y * y, 1);
+    std::int64_t farthest = kTolerance * kTolerance * length;
+    std::size_t at = 0;
+    for (std::size_t i = from + 1; i < to; ++i) {
+      const std::int64_t distance = ScaledDistance(a, b, line[i]);
+      if (distance <= farthest) continue;
+      farthest = distance;
+      at = i;
+    }
+    if (at == 0) continue;
+    keeps[at] = true;
+    open.emplace_back(from, at);
+    open.emplace_back(at, to);
+  }
+}
+
+// Without points that the line hardly needs.
+std::vector<proto::TilePoint> Simplified(const std::vector<proto::TilePoint>& line) {
+  std::vector<bool> keeps(line.size());
+  std::size_t before = 0;  // the kept point before
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (i > 0 && i + 1 < line.size() && IsAwayFromEdges(line[i])) continue;
+    keeps[i] = true;
+    if (i > before + 1) MarkKept(line, before, i, keeps);
+    before = i;
+  }
+  std::vector<proto::TilePoint> kept;
+  for (std::size_t i = 0; i < line.size(); ++i) {
+    if (keeps[i]) kept.push_back(line[i]);
+  }
+  return kept;
 }
 
 void Append(std::vector<proto::TilePoint>& line, const proto::TilePoint& point) {
-  if (!line.empty() && line.back() == point) return;
-  if (line.size() >= 2 && IsBetween(line[line.size() - 2], line.back(), point)) line.pop_back();
-  line.push_back(point);
+  if (line.empty() || line.back() != point) line.push_back(point);
 }
 
 // The parts of a line in the tile and its buffer.
 void AddParts(const dem::ContourLine& line, std::vector<std::vector<proto::TilePoint>>& lines) {
   std::vector<proto::TilePoint> part;
   const auto finish = [&] {
-    if (part.size() >= 2) lines.push_back(part);
+    if (part.size() >= 2) lines.push_back(Simplified(part));
     part.clear();
   };
   for (std::size_t i = 1; i < line.points.size(); ++i) {

@@ -24,7 +24,8 @@ inline constexpr int kContourMargin = 3;
 inline constexpr int kContourBuffer = 2;
 
 // The lines of a tile of 256 pixels and of kContourBuffer pixels around it. Pieces between two neighbouring pixels are
-// whole, never cut, and depend on these pixels alone: neighbouring tiles have the same pieces at their common edge. If
+// whole, never cut, and depend on these pixels alone: neighbouring tiles have the same pieces at their common edge.
+// Away from edges points are left out that lie within an eighth of a pixel of the line without them. If
 // there were more than dem::kMaxContourCrossings points, the interval is multiplied by kIndexEvery until there are not;
 // the lines that remain are those of neighbouring tiles. kCancelled: stopped. Preconditions: a margin of
 // kContourMargin, an interval above 0.

@@ -177,7 +177,7 @@ TEST_F(TerrainEdits, ShowInMapPixelsAndLeaveTheRestAsItIs) {
   ASSERT_NE(edited, nullptr);
   const int depth = 10;
   const double pixels = 256.0 * 1024;
-  const NodeWindow window{static_cast<std::int64_t>((9.8 + 180) / 360 * pixels), 87'800, 600, 600};
+  const NodeWindow window{static_cast<std::int64_t>((9.8 + 180) / 360 * pixels), 88'400, 600, 600};
   const auto before = plain->ReadMercator(depth, window), after = edited->ReadMercator(depth, window);
   ASSERT_TRUE(before && after);
   for (const HeightDatum datum : {HeightDatum::kEllipsoid, HeightDatum::kSource}) {

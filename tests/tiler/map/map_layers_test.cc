@@ -229,6 +229,40 @@ TEST(Contours, VerticesLieBetweenTheirSamples) {
   EXPECT_GT(vertices, 1000u);
 }
 
+// The lines with all points, from GDAL, against the simplified ones.
+TEST(Contours, PointsThatAreLeftOutLieNearTheLine) {
+  const MapWindow window({12, 1234, 1500}, 256, kContourMargin);
+  const MapHeights heights = HeightsOf(window, [](std::int64_t column, std::int64_t row) {
+    return 200 * std::sin(static_cast<double>(column) / 23) * std::cos(static_cast<double>(row) / 37);
+  });
+  const auto features = ContoursOf(heights, 5000, {});
+  const auto all = dem::TraceContours(heights.heights, heights.side, heights.side, 50, {});
+  ASSERT_TRUE(features && all);
+  std::map<double, std::vector<std::array<proto::TilePoint, 2>>> pieces;
+  std::size_t kept = 0, given = 0;
+  for (const proto::ContourFeature& feature : *features) {
+    for (const auto& line : feature.lines) {
+      kept += line.size();
+      for (std::size_t i = 1; i < line.size(); ++i) pieces[feature.height_m].push_back({line[i - 1], line[i]});
+    }
+  }
+  for (const dem::ContourLine& line : *all) {
+    for (const dem::ContourPoint& point : line.points) {
+      const double x = (point.x - kContourMargin + 0.5) * 16, y = (point.y - kContourMargin + 0.5) * 16;
+      if (x < 0 || y < 0 || x > 4096 || y > 4096) continue;
+      ++given;
+      double nearest = 1e9;
+      for (const auto& [a, b] : pieces[line.height]) {
+        const double dx = b.x - a.x, dy = b.y - a.y;
+        const double share = std::clamp(((x - a.x) * dx + (y - a.y) * dy) / (dx * dx + dy * dy), 0.0, 1.0);
+        nearest = std::min(nearest, std::hypot(x - a.x - share * dx, y - a.y - share * dy));
+      }
+      ASSERT_LE(nearest, 2 + 0.75) << line.height << " at " << x << " " << y;  // and the rounding to units
+    }
+  }
+  EXPECT_LT(kept, given / 2);
+}
+
 TEST(Contours, DoNotTouchPixelsWithoutHeights) {
   const MapWindow window({12, 1234, 1500}, 256, kContourMargin);
   MapHeights heights = HeightsOf(window, Rough);
