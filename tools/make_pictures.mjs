@@ -3,8 +3,8 @@
 //
 //   node tools/make_pictures.mjs BINARY DATA [NAME...]
 //
-// DATA: a folder with srtm3_N46E008_swiss_alps.tif, bluemarble_1920x960.tif and the pair ortho_pair_dtm_2m_byte.tif,
-// ortho_pair_rgb_2m.tif. NAME: only these pictures.
+// DATA: a folder with srtm3_N46E008_swiss_alps.tif and bluemarble_1920x960.tif, both in the public domain. NAME: only these
+// pictures.
 import { spawn } from 'node:child_process';
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
@@ -25,7 +25,6 @@ const datasets = [
   { name: 'earth', sources: [path.join(root, 'config/samples/etopo5.tif')] },
   { name: 'alps', sources: [source('srtm3_N46E008_swiss_alps.tif')], vertical: 'egm96' },
   { name: 'blue', sources: [path.join(root, 'config/samples/etopo5.tif')], imagery: { image: source('bluemarble_1920x960.tif') } },
-  { name: 'somerset', sources: [source('ortho_pair_dtm_2m_byte.tif')], imagery: { image: source('ortho_pair_rgb_2m.tif') } },
 ];
 
 const kAlps = 'camera=8.1,46.22,9500,38,-22';
@@ -45,7 +44,7 @@ const shots = [
   { name: 'evening', strip: true, view: kEvening },
   { name: 'wireframe', strip: true, view: `dataset=alps&fraction=2&${kAlps}&wireframe` },
   { name: 'viewer-edit', view: `dataset=alps&fraction=1&${kAlps}`, tool: 'draft', act: draft },
-  { name: 'viewer-imagery', view: 'dataset=somerset&fraction=0.5&exaggeration=2&imagery' },
+  { name: 'viewer-imagery', view: 'dataset=blue&fraction=0.125&camera=80,8,1700000,8,-42&exaggeration=10&imagery' },
   { name: 'viewer-phone', view: 'dataset=alps&fraction=1', size: { width: 390, height: 844 }, phone: true, tool: 'distance', act: profile },
 ];
 
