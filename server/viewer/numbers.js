@@ -12,10 +12,12 @@ export function formatMetres(metres) {
   return `${formatNumber(Number(metres.toFixed(digits)))} m`;
 }
 
+// Estimates, with four digits.
+const fourDigits = (value) => formatNumber(Number(value.toPrecision(4)));
 export const formatArea = (squareMetres) =>
-  (squareMetres < 1e6 ? `${formatNumber(Math.round(squareMetres))} m²` : `${formatNumber(Number((squareMetres / 1e6).toPrecision(4)))} km²`);
+  (squareMetres < 1e6 ? `${fourDigits(squareMetres)} m²` : `${fourDigits(squareMetres / 1e6)} km²`);
 export const formatVolume = (cubicMetres) =>
-  (cubicMetres < 1e9 ? `${formatNumber(Math.round(cubicMetres))} m³` : `${formatNumber(Number((cubicMetres / 1e9).toPrecision(4)))} km³`);
+  (cubicMetres < 1e9 ? `${fourDigits(cubicMetres)} m³` : `${fourDigits(cubicMetres / 1e9)} km³`);
 
 // Heights are in metres however large they are.
 export const formatHeight = (metres) => `${formatNumber(Number(metres.toFixed(Math.abs(metres) < 10 ? 1 : 0)))} m`;
