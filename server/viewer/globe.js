@@ -117,6 +117,7 @@ export class Globe {
     this.material.uniforms.box = { x, y, z, w };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
     this.widget.terrainProvider = provider;
+    this.shownVersion = dataset.version;
     this.scene.globe.show = true;
     this.widget.useDefaultRenderLoop = true;
     this.adaptToCamera();
