@@ -33,8 +33,10 @@ class DemSource {
   const DemInfo& info() const;
 
   // The deepest level served: the first whose default error is at most a tenth of the finest source's spacing, or at
-  // most `finest_error`.
+  // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
+  // The deepest level without edits. Levels below it have tiles around edits alone.
+  int finest_level() const;
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
@@ -95,14 +97,21 @@ class DemSource {
   //
   // What the edits ask of the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
+  // The same of nodes of a level's lattice. Columns wrap at 360 degrees.
+  MeshDemands DemandsOf(int level, const NodeWindow& window) const;
   // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits.
   // `EditsOfMercator`: of pixels as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsOf(const geo::TileKey& key) const;
   std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
+  // A hash of the tiles below a tile that exist because of edits; 0: there are none.
+  std::uint64_t DeeperTilesOf(const geo::TileKey& key) const;
+  // Availability() as far as it concerns the tile: without levels below finest_level() that have no tile below it.
+  std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
+  static KeptBlocks CountKeptBlocks();
 
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
   // precedence, and every option that changes heights. Copies of the files have the same hash.

@@ -288,7 +288,7 @@ int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& d
     const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
     return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
   }
-  return ErrorStep(requested, level, level == dataset.deepest_level(), dataset.error_fraction);
+  return ErrorStep(requested, level, level >= dataset.finest_level(), dataset.error_fraction);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {

@@ -1,4 +1,4 @@
-// The handlers, one function for each kind of URL (server/routes.cc), and what they answer from.
+// The handlers, one function for each kind of URL (server/routes.cc), and the state that they share.
 #pragma once
 
 #include <chrono>

@@ -78,6 +78,8 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
     entry["urls"]["tiles_json"] = base + "/tiles.json";
     entry["urls"]["heights"] = base + "/heights";
+    entry["urls"]["grid"] = base + "/grid";
+    entry["urls"]["sight"] = base + "/sight";
     entry["urls"]["mesh"] = base + "/mesh";
     if (dataset.edits_of) entry["urls"]["edits"] = base + "/edits.geojson";
     if (!dataset.baked_alone) {

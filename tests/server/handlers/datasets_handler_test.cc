@@ -41,10 +41,9 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"tiles", base + "/{z}/{x}/{y}.terrain?v=0a1b2c3d4e5f"},
                                              {"tiles_json", base + "/tiles.json"},
                                              {"heights", base + "/heights"},
-                                             {"mesh", base + "/mesh"},
-                                             {"hillshade", base + "/hillshade/tiles.json"},
-                                             {"slope", base + "/slope/tiles.json"},
-                                             {"contours", base + "/contours/tiles.json"}}));
+                                             {"grid", base + "/grid"},
+                                             {"sight", base + "/sight"},
+                                             {"mesh", base + "/mesh"}}));
 }
 
 TEST(DatasetsHandler, TellsWhereTheDeepestTilesLie) {
