@@ -165,6 +165,7 @@ constexpr RouteRow kRows[] = {
     {.label = "layer", .pattern = "/{dataset}/layer.json", .handle = Write<DescribeLayer>, .has_templates = true},
     {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
     {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
+    {.label = "edits", .pattern = "/{dataset}/edits.geojson", .handle = Write<DescribeEdits>},
     {.label = "hillshade",
      .pattern = "/{dataset}/hillshade/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,

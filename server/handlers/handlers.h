@@ -142,6 +142,13 @@ std::string WithToken(std::string query, const RequestContext& context);
 // server runs. Null: WithToken adds none.
 const Grant* GrantInQuery(const RequestContext& context);
 
+// GET /{dataset}/edits.geojson: outlines of the dataset's edits. 404: it has none.
+DocumentAnswer DescribeEdits(const Handlers& from, const RequestContext& context);
+// A FeatureCollection of MultiLineStrings, RFC 7946, in the order of the edits. Properties: `op`, `file` without its
+// folder, `feature`, its index in the file, `area`: lines are closed rings. Returns an empty string if a stop was
+// requested.
+std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::stop_token& stop = {});
+
 // GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
 DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.

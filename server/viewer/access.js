@@ -1,5 +1,7 @@
 // The datasets that the server shows to this page, and the token of its requests. The token is stored until the tab is
 // closed. It is sent only in headers, so that no copied address contains it.
+import { take } from "/viewer/begun.js";
+
 const kKey = "terrace.token";
 
 // The server does not know the token.
@@ -43,14 +45,28 @@ export class Access {
     return [401, 403].includes((await fetch(url, { headers: this.headers })).status);
   }
 
+  heightUrl(dataset, longitude, latitude) {
+    return `${dataset.urls.heights}?locations=${latitude},${longitude}`;
+  }
+
   // Metres above the ellipsoid; undefined if the server has no height there.
   async heightAt(dataset, longitude, latitude) {
     try {
-      const reply = await fetch(`${dataset.urls.heights}?locations=${latitude},${longitude}`, { headers: this.headers });
+      const url = this.heightUrl(dataset, longitude, latitude);
+      const reply = await (take(url) ?? fetch(url, { headers: this.headers }));
       return reply.ok ? (await reply.json()).results[0].elevation ?? undefined : undefined;
     } catch {
       return undefined;
     }
+  }
+
+  // Heights at {longitude, latitude}: metres, undefined where the dataset has none.
+  async heights(dataset, places) {
+    const locations = places.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
+    const headers = { ...this.headers, "Content-Type": "application/json" };
+    const reply = await fetch(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
+    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
+    return (await reply.json()).results.map(({ elevation }) => elevation ?? undefined);
   }
 
   // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where

@@ -1,9 +1,10 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
-import { Access, UnknownToken } from "/viewer/access.js";
-import { boxOf, firstRegion, suggestedFraction } from "/viewer/framing.js";
+import { UnknownToken } from "/viewer/access.js";
+import { access, firstList, startOf } from "/viewer/early.js";
+import { boxOf, defaultFraction, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
 import { formatHeight } from "/viewer/numbers.js";
-import { Panel, fractionOfStep, stepOfFraction } from "/viewer/panel.js";
+import { Panel } from "/viewer/panel.js";
 import { fromLocalMeanTime, sunDirection } from "/viewer/sun.js";
 import { onTheme } from "/viewer/theme.js";
 import { TokenCard } from "/viewer/token_card.js";
@@ -14,17 +15,17 @@ import { Watch } from "/viewer/watch.js";
 const kFlightSeconds = 2.5;
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
+const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
 // of the line. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
 // missing. `isGone`: the server has no more this dataset.
 const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
-                wireframe: false, tiles3d: false, right: undefined, colouring: "height", sun: undefined,
+                wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
 
-const access = new Access();
 const panel = new Panel({
   dataset: (name) => choose(name),
   home: () => state.dataset && lookAt(firstRegion(state.dataset), kFlightSeconds),
@@ -37,6 +38,8 @@ const panel = new Panel({
   tiles3d: (on) => { setSwitches({ ...state, tiles3d: on, right: undefined }); return show(); },
   compare: (on) => { setSwitches({ ...state, tiles3d: false, right: on ? coarserThan(state.fraction) : undefined }); return show(); },
   right: (fraction) => { setSwitches({ ...state, right: fraction }); return show(); },
+  edits: (on) => setSwitches({ ...state, edits: on }),
+  imagery: (on) => setSwitches({ ...state, imagery: on }),
   colouring: (name) => setColouring(name),
   sunny: (on) => setSun(on ? `${new Date().getFullYear()}-${kFirstSun}` : undefined),
   sun: (text) => setSun(text),
@@ -69,10 +72,6 @@ function makeGlobe() {
   }
 }
 
-function defaultFraction(dataset) {
-  return fractionOfStep(stepOfFraction(suggestedFraction(firstRegion(dataset))));
-}
-
 function coarserThan(fraction) {
   return fractionOfStep(stepOfFraction(fraction * kCoarser));
 }
@@ -83,9 +82,10 @@ async function show() {
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);
-  traffic.reset();
+  if (state.ready) traffic.reset();
   lightSun();
   try {
+    globe.drape(state.imagery ? dataset : undefined, access.headers);
     await globe.show(dataset, state.fraction, state.right ?? (state.tiles3d ? state.fraction : undefined), access.headers);
     panel.setMessage(undefined);
     state.ready = true;
@@ -172,12 +172,22 @@ function setSun(text) {
   remember();
 }
 
-// Measuring is loaded when it is first used.
+// The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
+  const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
+  if (name === "draft") {
+    const { Draft } = await import("/viewer/draft.js");
+    state.measure?.end();
+    state.draft ??= new Draft(options);
+    return state.draft.toggle();
+  }
   const { Measure } = await import("/viewer/measure.js");
-  state.measure ??= new Measure({ globe, access, dataset: () => state.dataset, onMode: setMode });
-  state.measure.toggle(name);
+  state.draft?.end();
+  state.measure ??= new Measure(options);
+  return state.measure.toggle(name);
 }
+
+const openTool = () => (state.draft?.isOpen ? state.draft : state.measure);
 
 function setMode(name) {
   panel.setTool(name);
@@ -200,9 +210,10 @@ const kKeys = {
   x: () => document.getElementById("compare").click(),
   d: () => useTool("distance"),
   l: () => useTool("sight"),
+  e: () => useTool("draft"),
   Home: () => document.getElementById("home").click(),
-  Escape: () => state.measure?.end(),
-  Backspace: () => state.measure?.undo(),
+  Escape: () => openTool()?.end(),
+  Backspace: () => openTool()?.undo(),
   "?": () => document.getElementById("help").click(),
 };
 
@@ -220,12 +231,32 @@ async function labelContours() {
   if (state.contours) globe.overlay.setLabels(placeLabels(globe.scene, 5 * globe.interval, formatHeight));
 }
 
-function setSwitches({ contours, wireframe, tiles3d, right }) {
-  Object.assign(state, { contours, wireframe, tiles3d, right });
+// Outlines of edits follow the drawn ground. They are read when they are first wanted, and anew for each version.
+async function outlineEdits() {
+  const { dataset } = state;
+  const isWanted = () => state.edits && dataset === state.dataset && Boolean(dataset.urls.edits);
+  if (!isWanted()) return globe.overlay.setLine("edits", undefined);
+  try {
+    const { drawEdits, fetchEdits } = await import("/viewer/edit_outlines.js");
+    const key = `${dataset.name} ${dataset.version}`;
+    if (state.editsOf?.key !== key) state.editsOf = { key, features: fetchEdits(dataset, access.headers) };
+    const features = await state.editsOf.features;
+    if (isWanted()) state.editsInView = drawEdits(globe.overlay, features, globe.viewTest(), (...at) => globe.heightAt(...at));
+  } catch (error) {
+    state.editsOf = undefined;
+    panel.note(`The edits could not be read: ${error.message}.`);
+    setTimeout(() => (state.labelled = undefined), kRetryMs);
+  }
+}
+
+function setSwitches({ contours, wireframe, tiles3d, edits, imagery, right }) {
+  Object.assign(state, { contours, wireframe, tiles3d, edits, imagery, right });
+  globe.drape(imagery ? state.dataset : undefined, access.headers);
   globe.contours = contours;
   globe.wireframe = wireframe;
   globe.adaptToCamera();
   if (!contours) globe.overlay.setLabels([]);
+  if (!edits) globe.overlay.setLine("edits", undefined);
   state.labelled = undefined;
   panel.setSwitches(state);
   remember();
@@ -242,14 +273,13 @@ function remember() {
 async function apply(view) {
   if (state.datasets.length === 0) return;
   state.refreshing ??= setInterval(refresh, 400);
-  const named = state.datasets.find((dataset) => dataset.name === view.dataset);
-  state.wanted = view.dataset && !named ? view : undefined;
-  state.dataset = named ?? state.datasets[0];
-  state.fraction = (named && view.fraction) ?? defaultFraction(state.dataset);
+  const { isNamed, dataset, fraction } = startOf(view, state.datasets);
+  state.wanted = view.dataset && !isNamed ? view : undefined;
+  Object.assign(state, { dataset, fraction });
   globe.exaggeration = view.exaggeration ?? 1;
   panel.setExaggeration(globe.exaggeration);
   panel.splitter.place = globe.split = view.split;
-  if (named && view.camera) globe.camera = view.camera;
+  if (isNamed && view.camera) globe.camera = view.camera;
   else await lookAt(firstRegion(state.dataset), 0);
   setSwitches(view);
   setColouring(view.colouring);
@@ -271,11 +301,15 @@ function refresh() {
   if (globe.loading || view === state.labelled) return;
   state.labelled = view;
   labelContours();
+  outlineEdits();
 }
 
 // Throws UnknownToken.
 async function list(token) {
-  const { datasets, moreWithToken } = await access.list(token);
+  keep(await access.list(token));
+}
+
+function keep({ datasets, moreWithToken }) {
   Object.assign(state, { datasets, moreWithToken });
   panel.setDatasets(datasets, moreWithToken, state.dataset?.name);
 }
@@ -291,17 +325,6 @@ async function useToken(token) {
   card.close();
   panel.setMessage(undefined);
   await apply(state.wanted ?? decodeView(location.hash));
-}
-
-// Uses the token of this tab, if it has a valid one.
-async function listAtStart() {
-  try {
-    await list();
-  } catch (error) {
-    if (!(error instanceof UnknownToken)) throw error;
-    access.token = "";
-    await list();
-  }
 }
 
 async function read(position) {
@@ -320,7 +343,7 @@ async function start() {
   globe.scene.camera.moveEnd.addEventListener(remember);
   addEventListener("hashchange", () => apply(decodeView(location.hash)));
   try {
-    await listAtStart();
+    keep(await firstList);
   } catch (error) {
     complain(`The list of datasets could not be read: ${error.message}. Is the server running?`);
     watch.isLost = true;

@@ -1,7 +1,8 @@
 // The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
-// colours by height and shading. Drag and wheel or arrow keys, plus and minus move it; a click reads a height.
-import { Access } from "/viewer/access.js";
-import { heightColour } from "/viewer/colours.js";
+// colours by height or the dataset's image, shading, and contours. Drag and wheel or arrow keys, plus and minus move it; a
+// click reads a height.
+import { heightColour, niceInterval } from "/viewer/colours.js";
+import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
 
@@ -20,8 +21,9 @@ const toLongitude = (x) => (((x % 1) + 1) % 1) * 360 - 180;
 const toLatitude = (y) => (Math.atan(Math.sinh(Math.PI * (1 - 2 * y))) * 180) / Math.PI;
 
 // Paints colours over the heights of an image, in place. `metres`: size of a pixel on the ground. `isInside(x, y)`: pixels
-// outside the dataset become transparent.
-function paint(pixels, width, heights, metres, isInside) {
+// outside the dataset become transparent. `photo`: pixels of the dataset's image, if any; `interval`: metres between
+// contours, 0: none.
+function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
   const height = new Float32Array(width * width);
   const { data } = pixels;
   for (let i = 0; i < height.length; ++i) {
@@ -36,18 +38,29 @@ function paint(pixels, width, heights, metres, isInside) {
       const [east, north] = [((w - e) / (2 * metres)) * relief, ((s - n) / (2 * metres)) * relief];
       const light = (0.643 + 0.766 * (-0.707 * east + 0.707 * north)) / (0.643 * Math.hypot(east, north, 1));
       const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
-      const colour = heightColour(height[i], heights);
-      for (let k = 0; k < 3; ++k) data[4 * i + k] = colour[k] * shade;
+      const isPhoto = photo?.data[4 * i + 3] > 0;
+      const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : heightColour(height[i], heights);
+      // A line lies between two pixels on both sides of its height.
+      const crossed = interval > 0 ? lineBetween(height[i], [e, s], interval) : undefined;
+      const ink = crossed === undefined ? 1 : crossed % 5 === 0 ? 0.4 : 0.7;
+      for (let k = 0; k < 3; ++k) data[4 * i + k] = colour[k] * (isPhoto ? 0.4 + 0.6 * shade : shade) * ink;
       if (!isInside(x, y)) data[4 * i + 3] = 0;
     }
   }
+}
+
+// The number of the contour between a pixel and one of its neighbours; undefined: there is none.
+function lineBetween(height, neighbours, interval) {
+  const step = Math.floor(height / interval);
+  const other = neighbours.map((value) => Math.floor(value / interval)).find((value) => value !== step);
+  return other === undefined ? undefined : Math.max(step, other);
 }
 
 class FlatMap {
   #tiles = new Map();  // "z/x/y": canvas, or undefined while it is loading and where there is none
 
   constructor(container, access) {
-    this.access = access;
+    Object.assign(this, { access, contours: false, imagery: false });
     this.canvas = document.createElement("canvas");
     container.append(this.canvas);
     container.tabIndex = 0;
@@ -83,7 +96,27 @@ class FlatMap {
     return undefined;
   }
 
+  // The part of the dataset's image for a tile of heights; undefined where there is none.
+  async #photo(z, x, y, width, dataset) {
+    if (!this.imagery || !dataset.urls.imagery || z > dataset.imagery.max_level) return undefined;
+    const url = `${dataset.urls.imagery.replace("tiles.json", `${z}/${x}/${y}.webp`)}?v=${dataset.version}`;
+    const reply = await fetch(url, { headers: this.access.headers });
+    if (!reply.ok) return undefined;  // outside of the image
+    const context = new OffscreenCanvas(width, width).getContext("2d");
+    context.drawImage(await createImageBitmap(await reply.blob()), 0, 0, width, width);
+    return context.getImageData(0, 0, width, width);
+  }
+
+  // Draws anew with other switches.
+  setLook(look) {
+    Object.assign(this, look);
+    this.look = (this.look ?? 0) + 1;
+    this.#tiles.clear();
+    this.draw();
+  }
+
   async #load(key, z, x, y, dataset) {
+    const { look } = this;
     const url = this.template.replace("{z}", z).replace("{x}", x).replace("{y}", y);
     const reply = await fetch(url, { headers: this.access.headers });
     if (!reply.ok) return;
@@ -94,9 +127,13 @@ class FlatMap {
     const pixels = context.getImageData(0, 0, tile.width, tile.height);
     const metres = (40075017 * Math.cos((toLatitude((y + 0.5) / 2 ** z) * Math.PI) / 180)) / 2 ** z / tile.width;
     const share = (of, pixel) => (of + (pixel + 0.5) / tile.width) / 2 ** z;
-    paint(pixels, tile.width, dataset.heights, metres, (i, j) => this.#isInside(share(x, i), share(y, j)));
+    const photo = await this.#photo(z, x, y, tile.width, dataset);
+    if (dataset !== this.dataset || look !== this.look) return;
+    paint(pixels, tile.width, {
+      heights: dataset.heights, metres, isInside: (i, j) => this.#isInside(share(x, i), share(y, j)), photo,
+      interval: this.contours ? niceInterval(metres * 8) : 0,
+    });
     context.putImageData(pixels, 0, 0);
-    if (dataset !== this.dataset) return;
     this.#tiles.set(key, tile);
     this.draw();
   }
@@ -187,14 +224,13 @@ class FlatMap {
 
 export async function startFlatMap() {
   document.body.classList.add("flat");
-  const access = new Access();
   const map = new FlatMap(byId("globe"), access);
   byId("globe").setAttribute("aria-label", "Map. Arrow keys move it, plus and minus zoom, Enter reads the height in the middle.");
   const say = (text) => Object.assign(byId("note"), { textContent: text, hidden: !text });
   const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
   say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
   try {
-    const { datasets } = await access.list();
+    const { datasets } = await firstList;
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
     const show = async (name) => {
@@ -203,10 +239,14 @@ export async function startFlatMap() {
       document.title = `${dataset.name} · terrace`;
       history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
       byId("attribution").textContent = dataset.attribution ?? "";
+      byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
       await map.show(dataset).catch(fail);
     };
     byId("dataset").addEventListener("change", (event) => show(event.target.value));
+    for (const name of ["contours", "imagery"]) {
+      byId(name).addEventListener("change", ({ target }) => map.setLook({ [name]: target.checked }));
+    }
     byId("home").addEventListener("click", () => show(byId("dataset").value));
     map.onPick = async (longitude, latitude) => {
       const height = await access.heightAt(map.dataset, longitude, latitude);

@@ -1,9 +1,16 @@
-// The best view of a dataset: distance of the camera and fineness of the mesh.
-import { Math as CesiumMath } from "/viewer/cesium/index.js";
-
+// The best view of a dataset: distance of the camera and fineness of the mesh. Does not use CesiumJS, so that the first
+// requests begin before it is loaded.
 const kMetresPerDegree = 111320;
 const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
 export const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
+const radians = (degrees) => (degrees * Math.PI) / 180;
+
+// The slider of the mesh error has steps of half powers of two, finer to the right: 4, 2.83, ... 1/32.
+export const kCoarsest = -4;
+export const kFinest = 10;
+export const fractionOfStep = (step) => 2 ** (-step / 2);
+export const stepOfFraction = (fraction) =>
+  Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
 
 // Centre and size of [west, south, east, north] in degrees; east < west means across the antimeridian.
 export function boxOf([west, south, east, north]) {
@@ -17,7 +24,7 @@ export function isGlobal(dataset) {
 
 // The share of the Earth that [west, south, east, north] cover.
 function shareOfEarth(bounds) {
-  const sine = (degrees) => Math.sin(CesiumMath.toRadians(degrees));
+  const sine = (degrees) => Math.sin(radians(degrees));
   return (boxOf(bounds).width / 360) * ((sine(bounds[3]) - sine(bounds[1])) / 2);
 }
 
@@ -32,7 +39,7 @@ export function firstRegion(dataset) {
 // Diagonal of the dataset, metres.
 export function extent(dataset) {
   const { latitude, width, height } = boxOf(dataset.bounds);
-  return Math.hypot(width * Math.cos(CesiumMath.toRadians(latitude)), height) * kMetresPerDegree;
+  return Math.hypot(width * Math.cos(radians(latitude)), height) * kMetresPerDegree;
 }
 
 // Metres between the camera and the centre of a dataset that is completely in view.
@@ -43,7 +50,7 @@ export function viewDistance(dataset) {
 // Pixels of error at which CesiumJS goes a level deeper, for a distance in metres. A whole planet gets more tiles,
 // because colours need them.
 export function pixelTolerance(distance) {
-  return 1.5 - CesiumMath.clamp((Math.log10(distance) - 5.5) / 1.5, 0, 1);
+  return 1.5 - Math.min(1, Math.max(0, (Math.log10(distance) - 5.5) / 1.5));
 }
 
 // The fraction of the level error for a good first view of the dataset: one half, or less if the relief is so small for
@@ -51,4 +58,9 @@ export function pixelTolerance(distance) {
 export function suggestedFraction(dataset) {
   const visible = (dataset.heights.max - dataset.heights.min) / 40;
   return Math.min(0.5, visible / (0.0016 * pixelTolerance(viewDistance(dataset)) * viewDistance(dataset)));
+}
+
+// The fraction that a dataset is first shown at: the slider's step next to the suggested one.
+export function defaultFraction(dataset) {
+  return fractionOfStep(stepOfFraction(suggestedFraction(firstRegion(dataset))));
 }

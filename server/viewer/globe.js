@@ -1,9 +1,10 @@
 // The CesiumJS part of the page: the widget, its terrain, the camera, picking, and statistics of the drawn tiles.
 import {
   BoundingSphere, CameraEventType, Cartesian3, Cartographic, CesiumTerrainProvider, CesiumWidget, Color,
-  HeadingPitchRange, Math as CesiumMath, Resource, ScreenSpaceEventHandler,
-  ScreenSpaceEventType,
+  GeographicTilingScheme, GroundPolylinePrimitive, GroundPrimitive, HeadingPitchRange, Math as CesiumMath,
+  QuantizedMeshTerrainData, Rectangle, Resource, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
+import { layerUrl } from "/viewer/early.js";
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
 import { niceInterval } from "/viewer/colours.js";
@@ -16,15 +17,32 @@ import { Tiles3d } from "/viewer/tiles3d.js";
 const kSoftware = /swiftshader|llvmpipe|software|basic render/i;
 const kWorldMiddle = [82, 18];  // longitude and latitude at the centre of a view of the whole Earth: the highest ground
 
+// The widget fetches a table of the Earth's heights for objects that lie on the ground, which this page does not have.
+for (const primitive of [GroundPrimitive, GroundPolylinePrimitive]) primitive.initializeTerrainHeights = () => Promise.resolve();
+
+// Starts the worker that unpacks tiles, with a tile of one triangle, so that its scripts load while the scene is made.
+function startTileWorker() {
+  const edges = Object.fromEntries(["west", "south", "east", "north"].flatMap((edge) =>
+    [[`${edge}Indices`, [0]], [`${edge}SkirtHeight`, 0]]));
+  const tile = new QuantizedMeshTerrainData({
+    ...edges, minimumHeight: 0, maximumHeight: 0, indices: new Uint16Array([0, 1, 2]),
+    quantizedVertices: new Uint16Array([0, 32767, 0, 0, 0, 32767, 0, 0, 0]),
+    boundingSphere: new BoundingSphere(), horizonOcclusionPoint: new Cartesian3(),
+  });
+  tile.createMesh({ tilingScheme: new GeographicTilingScheme(), x: 0, y: 0, level: 0 })?.catch(() => {});
+}
+
 export class Globe {
   #latest = 0;  // number of the latest show(): of overlapping calls only the latest may set the terrain
 
   // `onError` gets a sentence for the user, `onTileError` one for each tile that could not be read.
   constructor(container, onError, onTileError) {
+    startTileWorker();
     const credits = document.createElement("div");  // the page states the attribution itself
     this.widget = new CesiumWidget(container, {
       baseLayer: false, skyBox: false, creditContainer: credits, creditViewport: credits, showRenderLoopErrors: false,
       requestRenderMode: true, maximumRenderTimeChange: Infinity, useBrowserRecommendedResolution: false,
+      useDefaultRenderLoop: false,  // until there is a dataset: a frame of nothing takes time as well
     });
     this.widget.resolutionScale = Math.min(2, devicePixelRatio) / devicePixelRatio;
     this.scene = this.widget.scene;
@@ -33,12 +51,13 @@ export class Globe {
     this.contours = false;
     this.interval = 0;
     this.#dressScene();
-    this.tiles3d = new Tiles3d(this.scene, this.material.uniforms);
+    this.tiles3d = new Tiles3d(this.scene, this.material);
     this.sky = new Sky(this.scene, this.material.uniforms);
     this.overlay = new Overlay(this.scene, container);
     this.onClick = undefined;  // while set, gets clicked ground instead of onPick's callback
     this.scene.camera.percentageChanged = 0.05;
     this.scene.camera.changed.addEventListener(() => this.adaptToCamera());
+    this.#awaitGround();
     this.scene.renderError.addEventListener((_, error) => onError(`Drawing stopped: ${error.message ?? error}`));
   }
 
@@ -58,8 +77,24 @@ export class Globe {
     globe.material = this.material = makeTerrainMaterial();
   }
 
+  // The air is drawn with the first ground, and the stars when all of it is there: their shaders and images take longer
+  // than the ground's.
+  #awaitGround() {
+    this.hasGround = false;
+    this.#hideAir();
+    const stop = this.scene.postRender.addEventListener(() => {
+      if (this.scene.globe._surface._tilesToRender.length === 0) return;
+      stop();
+      this.hasGround = true;
+      performance.mark("terrace.ground");
+      this.#hideAir();
+      this.scene.requestRender();
+    });
+    this.scene.globe.tileLoadProgressEvent.addEventListener((queued) => queued === 0 && this.hasGround && this.adaptToCamera());
+  }
+
   #renderer() {
-    const gl = document.createElement("canvas").getContext("webgl2");
+    const gl = this.scene.canvas.getContext("webgl2");  // the scene's own
     const names = gl?.getExtension("WEBGL_debug_renderer_info");
     return names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
   }
@@ -67,7 +102,7 @@ export class Globe {
   // Shows `dataset` at `fraction` of the level error, and its 3D Tiles at `compared` unless that is undefined. `headers`
   // go with every request. Throws a readable message if the server does not describe it.
   async show(dataset, fraction, compared, headers) {
-    const url = `${dataset.urls.layer.replace(/layer\.json.*$/, "")}?fraction=${fraction}`;
+    const url = layerUrl(dataset, fraction).replace("layer.json", "");
     const turn = ++this.#latest;
     const provider = await CesiumTerrainProvider.fromUrl(new Resource({ url, headers }), { requestVertexNormals: true });
     // If layer.json is missing, CesiumJS assumes an old server of height maps.
@@ -77,15 +112,35 @@ export class Globe {
 
     this.#drawCurtain();
     const { longitude, latitude, width, height } = boxOf(dataset.bounds);
-    setHeights(this.material, dataset.heights);
+    setHeights(this.material, this.scene.context, dataset.heights);
     const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
     this.material.uniforms.box = { x, y, z, w };
     this.material.uniforms.shading = provider.hasVertexNormals ? 1 : 0;
     this.widget.terrainProvider = provider;
+    this.shownVersion = dataset.version;
     this.scene.globe.show = true;
+    this.widget.useDefaultRenderLoop = true;
     this.adaptToCamera();
     const tileset = `${dataset.urls.tileset}?fraction=${compared}`;
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
+  }
+
+  // Lays the image of `dataset` on the ground; undefined, or without an image: none.
+  async drape(dataset, headers) {
+    const wanted = dataset?.urls.imagery_geodetic;
+    if (this.draped === wanted) return;
+    this.draped = wanted;
+    this.scene.imageryLayers.removeAll();
+    this.material.uniforms.draped = 0;
+    this.scene.requestRender();
+    if (!wanted) return;
+    const { addImagery } = await import("/viewer/imagery.js");
+    if (this.draped !== wanted) return;
+    addImagery(this.scene, wanted, dataset.imagery, headers, this.onTileError);
+    const { longitude, latitude, width, height } = boxOf(dataset.imagery.bounds);
+    const [x, y, z, w] = [longitude, latitude, width / 2, height / 2].map(CesiumMath.toRadians);
+    Object.assign(this.material.uniforms, { draped: 1, imageBox: { x, y, z, w } });
+    this.scene.requestRender();
   }
 
   // 3D Tiles from this resource to the right of the splitter; without one, terrain everywhere.
@@ -97,11 +152,11 @@ export class Globe {
     this.scene.requestRender();
   }
 
-  // Makes the background white where no ground covers it: in wireframe, and on the side of 3D Tiles that are still
-  // loading.
+  // The air makes the background white where no ground covers it: in wireframe, on the side of 3D Tiles that are still
+  // loading, and before there is any ground.
   #hideAir() {
     const { wire, split } = this.material.uniforms;
-    this.scene.skyAtmosphere.show = wire === 0 && split === 0;
+    this.scene.skyAtmosphere.show = this.hasGround && wire === 0 && split === 0;
   }
 
   get split() {
@@ -195,12 +250,7 @@ export class Globe {
 
   // "height", "slope" or "aspect".
   set colouring(name) {
-    setColouring(this.material, name);
-    this.#renderFrames(3);  // CesiumJS uses a new image in the second frame
-  }
-
-  #renderFrames(count) {
-    const stop = this.scene.postRender.addEventListener(() => (--count > 0 ? this.scene.requestRender() : stop()));
+    setColouring(this.material, this.scene.context, name);
     this.scene.requestRender();
   }
 
@@ -222,7 +272,7 @@ export class Globe {
     uniforms.relief = CesiumMath.clamp(Math.pow(distance / 45000, 0.55), 1.15, 14);
     uniforms.farness = CesiumMath.clamp((Math.log10(distance) - 6.2) / 0.8, 0, 1);
     uniforms.hazeDistance = Math.max(150000, distance * 5);
-    this.sky.adapt(distance);
+    if (this.hasGround) this.sky.adapt(distance);
     uniforms.graticule = CesiumMath.toRadians(distance > 3e6 ? 10 : distance > 2e5 ? 1 : 0.1);
     this.scene.requestRender();
   }
@@ -250,6 +300,19 @@ export class Globe {
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
              height: ground.height / this.exaggeration };
+  }
+
+  // Metres above the ellipsoid of the drawn ground; undefined where none is drawn.
+  heightAt(longitude, latitude) {
+    const height = this.scene.globe.getHeight(Cartographic.fromDegrees(longitude, latitude));
+    return height === undefined ? undefined : height / this.exaggeration;
+  }
+
+  // A function that tells whether a place may be in view.
+  viewTest() {
+    const { camera, ellipsoid } = this.scene;
+    const box = camera.computeViewRectangle(ellipsoid);
+    return (longitude, latitude) => !box || Rectangle.contains(box, Cartographic.fromDegrees(longitude, latitude));
   }
 
   get loading() {

@@ -1,4 +1,5 @@
 // The page begins here: the globe if the browser can draw it, else a flat map. Only the one that is needed is loaded.
+import { allBegun } from "/viewer/early.js";
 import { startTheme } from "/viewer/theme.js";
 
 function hasWebGl2() {
@@ -10,9 +11,21 @@ function hasWebGl2() {
 }
 
 startTheme();
-if (hasWebGl2()) {
-  await import("/viewer/app.js");
-} else {
-  const { startFlatMap } = await import("/viewer/flat_map.js");
-  await startFlatMap();
+if (matchMedia("(max-width: 560px)").matches) document.getElementById("panel").open = false;
+if (innerHeight < 760) document.getElementById("costs").open = false;
+// The globe keeps this thread busy: before, the panel is painted and the first tiles are asked for. A page in the background
+// has no frames, and a server may be slow.
+const isReady = Promise.all([allBegun, new Promise(requestAnimationFrame)]);
+await Promise.race([isReady, new Promise((resolve) => setTimeout(resolve, 150))]);
+try {
+  if (hasWebGl2()) {
+    await import("/viewer/app.js");
+  } else {
+    const { startFlatMap } = await import("/viewer/flat_map.js");
+    await startFlatMap();
+  }
+} catch (error) {
+  const message = document.getElementById("message");
+  if (message.hidden) Object.assign(message, { hidden: false, textContent: `The page could not be loaded completely; reload it. (${error.message})` });
+  throw error;
 }

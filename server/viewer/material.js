@@ -1,12 +1,12 @@
 // The material of the globe: colours by height, slope or aspect, shading by the tiles' vertex normals, and contour lines.
 // Without a sun, the light is in the local north-west of every point, as on a printed map, so no hemisphere is dark.
-import { Material } from "/viewer/cesium/index.js";
+import { Material, Sampler, Texture, TextureMagnificationFilter, TextureMinificationFilter } from "/viewer/cesium/index.js";
 import { kColourings, kSteepest, waterline } from "/viewer/colours.js";
 
 export const kRampWidth = 2048;
 
 // Computes the look of a point of the ground from the uniforms below. `tiles`: a point of 3D Tiles, which are drawn to
-// the right of the splitter.
+// the right of the splitter. `painted`: its colour before it is lit; negative: by height, slope or aspect.
 export const kLook = /* glsl */ `
 const vec3 kRadii = vec3(6378137.0, 6378137.0, 6356752.314245);
 const vec3 kShadow = vec3(0.30, 0.33, 0.46);
@@ -42,7 +42,10 @@ vec3 sunlit(vec3 normalENU, vec3 towards) {
   return skylight + direct * strength * facing * 0.62;
 }
 
-vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles) {
+// How much of the ground's own colour is left in the look that terrainColour computed.
+float kept = 1.0;
+
+vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles, vec3 painted) {
   vec3 positionWC = (czm_inverseView * vec4(-positionToEyeEC, 1.0)).xyz;
   vec3 up = normalize(positionWC / kRadii / kRadii * 1e7);
   vec3 east = normalize(vec3(-up.y, up.x, 0.0) + vec3(0.0, 1e-6, 0.0));
@@ -75,9 +78,11 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   }
   normal = normalize(vec3(normal.xy * relief, max(normal.z, 0.02)));
 
+  bool isPainted = painted.x >= 0.0;
   // Bare rock where it is too steep for soil or snow.
   float luminance = dot(colour, vec3(0.299, 0.587, 0.114));
   colour = mix(colour, vec3(0.46, 0.42, 0.39) * (0.5 + luminance), smoothstep(0.18, 0.5, steepness) * (colouring > 0.5 ? 0.0 : 0.55));
+  if (isPainted) colour = painted;
 
   // Most of the light from the north-west, some from its two neighbours so that ridges along it keep their form.
   float light = 0.7 * lit(normal, vec2(-0.707, 0.707)) + 0.15 * lit(normal, vec2(-1.0, 0.0)) +
@@ -85,13 +90,17 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   vec3 shade = mix(kShadow, vec3(1.0), smoothstep(-0.15, 1.05, light)) + kSunlight * 0.28 * max(0.0, light - 1.0);
   if (sunny > 0.5) shade = sunlit(shading > 0.5 ? normal : vec3(0.0, 0.0, 1.0), vec3(dot(sun, east), dot(sun, north), dot(sun, up)));
   else shade = mix(vec3(1.0), shade, shading);
-  shade = mix(shade, mix(vec3(1.0), shade, 0.55), step(0.5, colouring));  // colours with a meaning must stay readable
+  // Colours with a meaning must stay readable, and photographs have shadows of their own.
+  shade = mix(shade, mix(vec3(1.0), shade, 0.55), isPainted ? 1.0 - sunny : step(0.5, colouring));
   colour *= shade;
+  kept = dot(shade, vec3(0.299, 0.587, 0.114));
 
   if (contourInterval > 0.0) {
     float fine = lines(metres / contourInterval, 0.6);
     float index = lines(metres / (5.0 * contourInterval), 1.3);
-    colour = mix(colour, colour * 0.35, max(fine * 0.55, index * 0.85));
+    float ink = mix(1.0, 0.35, max(fine * 0.55, index * 0.85));
+    colour *= ink;
+    kept *= ink;
   }
 
   // Around a regional dataset: slate with a faint graticule.
@@ -105,17 +114,21 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   float grid = max(lines(longitude / graticule, 0.6), lines(latitude / graticule, 0.6));
   vec3 elsewhere = mix(kElsewhere + 0.06 * grid, kPaper - 0.07 * grid, paper);
   colour = mix(colour, elsewhere * mix(vec3(1.0), shade, sunny > 0.5 ? 0.35 : 0.6), outside * (1.0 - wire));
+  kept *= 1.0 - outside * (1.0 - wire);
 
   // From afar the globe is round: lit over the viewer's left shoulder, with a thin bright rim of air. Near the ground
   // the air is between the viewer and the distance.
   vec3 toEye = normalize(czm_viewerPositionWC - positionWC);
   vec3 overShoulder = normalize(czm_inverseViewRotation * vec3(-0.5, 0.5, 0.8));
-  colour *= mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire) * (1.0 - sunny));
+  float roundness = mix(1.0, 0.42 + 0.72 * max(0.0, dot(up, overShoulder)), farness * (1.0 - wire) * (1.0 - sunny));
+  colour *= roundness;
   float rim = pow(1.0 - clamp(dot(up, toEye), 0.0, 1.0), 4.0) * farness;
   float haze = (1.0 - exp(-pow(length(positionToEyeEC) / hazeDistance, 2.0))) * (1.0 - farness);
   float daylight = sunny > 0.5 ? smoothstep(-0.10, 0.25, dot(sun, up)) : 1.0;
   vec3 air = mix(vec3(0.05, 0.07, 0.12), mix(vec3(0.72, 0.50, 0.38), kAir, sunny > 0.5 ? smoothstep(0.05, 0.4, dot(sun, up)) : 1.0), daylight);
-  colour = mix(colour, air, max(rim * 0.8, haze * 0.75) * (1.0 - wire));
+  float veil = max(rim * 0.8, haze * 0.75) * (1.0 - wire);
+  colour = mix(colour, air, veil);
+  kept *= roundness * (1.0 - veil);
 
   return mix(colour, min(vec3(1.0), colour * 1.1 + 0.06), wire);
 }`;
@@ -124,14 +137,23 @@ const kSource = /* glsl */ `
 ${kLook}
 czm_material czm_getMaterial(czm_materialInput materialInput) {
   czm_material material = czm_getDefaultMaterial(materialInput);
-  // CesiumJS gives the height after exaggeration.
-  material.diffuse = terrainColour(materialInput.height / exaggeration, materialInput.positionToEyeEC, materialInput.normalEC, false);
-  material.alpha = 1.0;
+  float metres = materialInput.height / exaggeration;  // CesiumJS gives the height after exaggeration
+  vec3 position = materialInput.positionToEyeEC;
+  vec3 positionWC = (czm_inverseView * vec4(-position, 1.0)).xyz;
+  vec3 up = normalize(positionWC / kRadii / kRadii * 1e7);
+  vec2 offset = vec2(atan(up.y, up.x), asin(clamp(up.z, -1.0, 1.0))) - imageBox.xy;
+  offset.x -= czm_twoPi * floor(offset.x / czm_twoPi + 0.5);
+  bool isImage = draped > 0.5 && all(lessThan(abs(offset), imageBox.zw));
+  vec3 colour = terrainColour(metres, position, materialInput.normalEC, false, isImage ? vec3(0.0) : vec3(-1.0));
+  // CesiumJS blends this over the image: the look of black ground, and the share of the image's own colour.
+  material.alpha = isImage ? 1.0 - clamp(kept, 0.0, 1.0) : 1.0;
+  material.diffuse = colour / max(material.alpha, 1e-3);
   return material;
 }`;
 
+// `strips`: the canvases of `ramp` and `theme`.
 export function makeTerrainMaterial() {
-  return new Material({
+  const material = new Material({
     translucent: false,
     fabric: {
       type: "TerraceTerrain",
@@ -143,6 +165,8 @@ export function makeTerrainMaterial() {
         relief: 1,           // exaggerates slopes for shading
         shading: 1,          // 0 where the tiles have no normals
         box: { x: 0, y: 0, z: 4, w: 4 },  // longitude and latitude of the middle, half width and height, radians
+        draped: 0,           // 1 while an image is below the material
+        imageBox: { x: 0, y: 0, z: 4, w: 4 },  // of the image, as box
         graticule: 0.1745,   // radians between lines
         farness: 0,          // 0 near the ground, 1 with the whole globe in view
         hazeDistance: 1e6,   // metres at which air hides most of the ground
@@ -158,13 +182,23 @@ export function makeTerrainMaterial() {
       source: kSource,
     },
   });
+  return Object.assign(material, { strips: {} });
 }
 
-export function setHeights(material, heights) {
-  const canvas = document.createElement("canvas");
-  canvas.width = kRampWidth;
-  canvas.height = 1;
-  material.uniforms.ramp = kColourings.height.draw(canvas, heights);
+// A strip of colours, drawn by `draw(canvas)`. CesiumJS uses an image only from its second frame on, and white before; a
+// texture it uses at once.
+function setStrip(material, context, name, draw) {
+  const canvas = Object.assign(document.createElement("canvas"), { width: kRampWidth, height: 1 });
+  material.strips[name] = draw(canvas);
+  const sampler = new Sampler({
+    minificationFilter: TextureMinificationFilter.LINEAR, magnificationFilter: TextureMagnificationFilter.LINEAR,
+  });
+  material.uniforms[name] = new Texture({ context, source: canvas, sampler });
+}
+
+// `context`: of the scene that draws the material.
+export function setHeights(material, context, heights) {
+  setStrip(material, context, "ramp", (canvas) => kColourings.height.draw(canvas, heights));
   material.uniforms.water = waterline(heights);
   material.uniforms.heightRange = { x: heights.min, y: Math.max(heights.max, heights.min + 1) };
 }
@@ -172,11 +206,8 @@ export function setHeights(material, heights) {
 const kOrder = Object.keys(kColourings);
 
 // `name`: a key of kColourings.
-export function setColouring(material, name) {
-  const canvas = document.createElement("canvas");
-  canvas.width = kRampWidth;
-  canvas.height = 1;
+export function setColouring(material, context, name) {
   const number = Math.max(0, kOrder.indexOf(name));
-  if (number > 0) material.uniforms.theme = kColourings[name].draw(canvas);
+  if (number > 0) setStrip(material, context, "theme", (canvas) => kColourings[name].draw(canvas));
   material.uniforms.colouring = number;
 }

@@ -12,6 +12,13 @@ export function formatMetres(metres) {
   return `${formatNumber(Number(metres.toFixed(digits)))} m`;
 }
 
+// Estimates, with four digits.
+const fourDigits = (value) => formatNumber(Number(value.toPrecision(4)));
+export const formatArea = (squareMetres) =>
+  (squareMetres < 1e6 ? `${fourDigits(squareMetres)} m²` : `${fourDigits(squareMetres / 1e6)} km²`);
+export const formatVolume = (cubicMetres) =>
+  (cubicMetres < 1e9 ? `${fourDigits(cubicMetres)} m³` : `${fourDigits(cubicMetres / 1e9)} km³`);
+
 // Heights are in metres however large they are.
 export const formatHeight = (metres) => `${formatNumber(Number(metres.toFixed(Math.abs(metres) < 10 ? 1 : 0)))} m`;
 

@@ -1,4 +1,5 @@
 // The controls and the numbers beside the globe. Uses the page's elements, but not CesiumJS.
+import { fractionOfStep, kCoarsest, kFinest, stepOfFraction } from "/viewer/framing.js";
 import { drawLegend } from "/viewer/legend.js";
 import {
   formatBytes, formatCompact, formatFraction, formatHeight, formatMetres, formatNumber, formatPosition,
@@ -6,19 +7,14 @@ import {
 import { Splitter } from "/viewer/splitter.js";
 import { kPhases } from "/viewer/traffic.js";
 
-// The slider has steps of half powers of two, finer to the right: 4, 2.83, ... 1/32.
-const kCoarsest = -4;
-const kFinest = 10;
-export const fractionOfStep = (step) => 2 ** (-step / 2);
-export const stepOfFraction = (fraction) =>
-  Math.min(kFinest, Math.max(kCoarsest, Math.round(-2 * Math.log2(fraction))));
-
 const byId = (id) => document.getElementById(id);
-const kSwitches = ["contours", "wireframe", "tiles3d", "compare", "sunny"];
+const kSwitches = ["contours", "wireframe", "tiles3d", "compare", "sunny", "edits", "imagery"];
+const kTools = ["distance", "sight", "draft"];
 
 export class Panel {
   // `actions`: dataset(name), home(), whole(), token(), fraction(value), right(value), exaggeration(value), colouring(name),
-  // contours(on), wireframe(on), tiles3d(on), compare(on), sunny(on), sun(text), split(share), tool(name), link().
+  // contours(on), wireframe(on), tiles3d(on), compare(on), sunny(on), edits(on), imagery(on), sun(text), split(share),
+  // tool(name), link().
   constructor(actions) {
     byId("dataset").addEventListener("change", (event) => actions.dataset(event.target.value));
     byId("home").addEventListener("click", actions.home);
@@ -40,15 +36,13 @@ export class Panel {
     });
     byId("colouring").addEventListener("change", (event) => actions.colouring(event.target.value));
     for (const id of ["sun-date", "sun-hour"]) byId(id).addEventListener("input", () => this.#readSun(actions));
-    for (const tool of ["distance", "sight"]) byId(`tool-${tool}`).addEventListener("click", () => actions.tool(tool));
+    for (const tool of kTools) byId(`tool-${tool}`).addEventListener("click", () => actions.tool(tool));
     byId("link").addEventListener("click", actions.link);
     byId("help").addEventListener("click", () => byId("keys").showModal());
     for (const name of kSwitches) {
       byId(name).addEventListener("change", (event) => actions[name](event.target.checked));
     }
     this.splitter = new Splitter(byId("splitter"), actions.split);
-    if (matchMedia("(max-width: 560px)").matches) byId("panel").open = false;
-    if (innerHeight < 760) byId("costs").open = false;
   }
 
   #readSun(actions) {
@@ -70,7 +64,7 @@ export class Panel {
   }
 
   setTool(name) {
-    for (const tool of ["distance", "sight"]) byId(`tool-${tool}`).setAttribute("aria-pressed", String(tool === name));
+    for (const tool of kTools) byId(`tool-${tool}`).setAttribute("aria-pressed", String(tool === name));
   }
 
   // A passing remark.
@@ -92,13 +86,15 @@ export class Panel {
   }
 
   // `hasPart`: the first view shows a part of the dataset.
-  setDataset({ name, heights, attribution }, hasPart) {
+  setDataset({ name, heights, attribution, urls, imagery }, hasPart) {
+    byId("edits").parentElement.hidden = !urls.edits;
+    byId("imagery").parentElement.hidden = !urls.imagery_geodetic;
     byId("dataset").value = name;
     byId("whole").hidden = !hasPart;
     document.title = `${name} · terrace`;
     this.heights = heights;
     this.setColouring(byId("colouring").value);
-    byId("attribution").textContent = [attribution, "drawn with CesiumJS"].filter(Boolean).join(" · ");
+    byId("attribution").textContent = [attribution, imagery?.attribution, "drawn with CesiumJS"].filter(Boolean).join(" · ");
   }
 
   setColouring(name) {
@@ -119,7 +115,9 @@ export class Panel {
     byId("exaggeration-value").textContent = factor === 1 ? "true to scale" : `${factor} ×`;
   }
 
-  setSwitches({ contours, wireframe, tiles3d, fraction, right }) {
+  setSwitches({ contours, wireframe, tiles3d, edits, imagery, fraction, right }) {
+    byId("edits").checked = edits;
+    byId("imagery").checked = imagery;
     byId("contours").checked = contours;
     byId("wireframe").checked = wireframe;
     byId("tiles3d").checked = tiles3d;

@@ -21,7 +21,8 @@ void fragmentMain(FragmentInput fsInput, inout czm_modelMaterial material) {
   vec3 offset = fromCamera / kRadii;
   float f = cameraLevel + dot(offset, 2.0 * camera + offset);
   float height = f / (sqrt(1.0 + f) + 1.0) * sqrt(1.0 + f) / length((camera + offset) / kRadii);
-  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true);
+  vec3 colour = terrainColour(height / exaggeration, -positionEC, normalize(fsInput.attributes.normalEC), true,
+                              draped > 0.5 ? czm_linearToSrgb(material.diffuse) : vec3(-1.0));
   material.diffuse = czm_srgbToLinear(colour);
 }`;
 
@@ -29,7 +30,7 @@ const kTypes = {
   heightRange: UniformType.VEC2, box: UniformType.VEC4, water: UniformType.FLOAT, contourInterval: UniformType.FLOAT,
   relief: UniformType.FLOAT, shading: UniformType.FLOAT, graticule: UniformType.FLOAT, farness: UniformType.FLOAT,
   hazeDistance: UniformType.FLOAT, wire: UniformType.FLOAT, split: UniformType.FLOAT, paper: UniformType.FLOAT,
-  exaggeration: UniformType.FLOAT, colouring: UniformType.FLOAT, sunny: UniformType.FLOAT, sun: UniformType.VEC3,
+  exaggeration: UniformType.FLOAT, colouring: UniformType.FLOAT, draped: UniformType.FLOAT, sunny: UniformType.FLOAT, sun: UniformType.VEC3,
 };
 const kStrips = ["ramp", "theme"];
 
@@ -58,9 +59,9 @@ function makeShader() {
 export class Tiles3d {
   #latest = 0;  // number of the latest show() or hide(): of overlapping loads only the latest may enter the scene
 
-  // `look`: the uniforms of the terrain's material, which the tiles use in every frame.
-  constructor(scene, look) {
-    Object.assign(this, { scene, look, tileset: undefined, pending: false, wireframe: false });
+  // `material`: the terrain's; the tiles use its uniforms in every frame.
+  constructor(scene, material) {
+    Object.assign(this, { scene, strips: material.strips, look: material.uniforms, tileset: undefined, pending: false, wireframe: false });
     scene.preUpdate.addEventListener(() => this.tileset && this.#follow());
   }
 
@@ -117,10 +118,9 @@ export class Tiles3d {
 
   // Copies a strip of colours where the terrain's material has a new one.
   #copyStrip(name) {
-    const canvas = this.look[name];
-    if (this.copied[name] === canvas) return;
+    const canvas = this.strips[name];
+    if (!canvas || this.copied[name] === canvas) return;
     this.copied[name] = canvas;
-    if (canvas.width !== kRampWidth) return;  // not drawn yet
     const pixels = canvas.getContext("2d").getImageData(0, 0, kRampWidth, 1).data;
     const typedArray = new Uint8Array(pixels.buffer);
     this.shader.setUniform(name, new TextureUniform({ typedArray, width: kRampWidth, height: 1 }));

@@ -1,5 +1,6 @@
 // Statistics of loaded tiles by format, from the browser's resource timing: bytes, cache hits, and the server's time by
 // stage.
+import { take } from "/viewer/begun.js";
 import { Resource } from "/viewer/cesium/index.js";
 
 export const kPhases = ["read", "refine", "encode", "compress"];
@@ -8,8 +9,9 @@ export class Traffic {
   constructor() {
     this.reset();
     const observer = new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry)));
-    observer.observe({ type: "resource" });
-    this.#watchErrorHeader();
+    observer.observe({ type: "resource", buffered: true });
+    this.since = 0;  // requests that began before this page's code count
+    this.#watchRequests();
   }
 
   reset() {
@@ -46,17 +48,32 @@ export class Traffic {
     return errors.length > 0 ? Math.max(...errors) : undefined;
   }
 
-  // Resource timing has no response headers, so this reads them from the requests of CesiumJS.
-  #watchErrorHeader() {
+  // Resource timing has no response headers, so this reads them from the requests of CesiumJS. Requests that have begun
+  // already are not sent again.
+  #watchRequests() {
     const load = Resource._Implementations.loadWithXhr;
-    Resource._Implementations.loadWithXhr = (url, ...rest) => {
+    const note = (url, header) => {
+      const error = Number.parseFloat(header);
+      const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url) ?? /3dtiles\/(\S+)\.glb/.exec(url);
+      if (error >= 0 && tile) this.errors.set(tile[1], error);
+    };
+    const send = (url, ...rest) => {
       const request = load(url, ...rest);
-      request?.addEventListener?.("load", () => {
-        const error = Number.parseFloat(request.getResponseHeader("Terrain-Max-Error"));
-        const tile = /(\d+\/\d+\/\d+)\.terrain/.exec(url) ?? /3dtiles\/(\S+)\.glb/.exec(url);
-        if (error >= 0 && tile) this.errors.set(tile[1], error);
-      });
+      request?.addEventListener?.("load", () => note(url, request.getResponseHeader("Terrain-Max-Error")));
       return request;
+    };
+    Resource._Implementations.loadWithXhr = (url, responseType, method, data, headers, deferred, mimeType) => {
+      const again = () => send(url, responseType, method, data, headers, deferred, mimeType);
+      const begun = method === "GET" ? take(url) : undefined;
+      if (!begun) return again();
+      const read = async (response) => {
+        if (!response.ok) return again();  // CesiumJS handles failures of its own requests
+        const body = await (responseType === "arraybuffer" ? response.arrayBuffer() : response.text());
+        note(url, response.headers.get("Terrain-Max-Error"));
+        deferred.resolve(body);
+      };
+      begun.then(read).catch(again);
+      return undefined;
     };
   }
 }

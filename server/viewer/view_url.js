@@ -1,7 +1,7 @@
 // A view as the page's URL fragment: #dataset=maui&fraction=0.25&camera=-156.2,20.6,9000,30,-25&contours&wireframe
 // With another error to the right of the line it also has &right=2, with 3D Tiles &tiles3d, and &split=0.4 if the line was
 // moved. &colours=slope, &sun=2026-06-21T18:30 in the dataset's local mean time.
-const kSwitches = ["contours", "wireframe", "tiles3d"];
+const kSwitches = ["contours", "wireframe", "tiles3d", "edits", "imagery"];
 const kColourings = ["height", "slope", "aspect"];
 
 export function encodeView({ dataset, fraction, exaggeration, camera, split, right, colouring, sun, ...switches }) {

@@ -164,7 +164,7 @@ describe('features of the viewer', () => {
     const version = await page.evaluate(() => terrace.state.dataset.version);
     write({ ...dataset, error_fraction: 0.9 });
     process.kill(server.pid, 'SIGHUP');
-    await page.waitForFunction((old) => terrace.state.dataset.version !== old, version, kWait);
+    await page.waitForFunction((old) => ![old, undefined].includes(terrace.globe.shownVersion), version, kWait);
     await settled();
     write({ ...dataset, name: 'others' });
     process.kill(server.pid, 'SIGHUP');

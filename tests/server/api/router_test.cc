@@ -33,6 +33,7 @@ TEST(Router, FindsEveryUrl) {
       {"/maui/0/1/0.glb", "tile"},
       {"/maui/0/0/0.png", "tile"},
       {"/maui/tiles.json", "tilejson"},
+      {"/maui/edits.geojson", "edits"},
       {"/maui/heights?locations=1,2", "heights"},
       {"/maui/mesh?bbox=0,0,1,1&error=5", "mesh"},
       {"http://example.test/maui/0/1/0.terrain", "tile"},

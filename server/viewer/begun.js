@@ -1,0 +1,17 @@
+// Requests that begin before the code that reads their replies is loaded.
+const begun = new Map();  // absolute URL: promise of a Response
+const absolute = (url) => new URL(url, location.href).href;
+
+export function begin(url, headers) {
+  const reply = fetch(url, { headers });
+  reply.catch(() => {});  // who takes it hears of it
+  begun.set(absolute(url), reply);
+  return reply.then((response) => response.clone());
+}
+
+// The promise of the Response to a request that has begun, once; undefined: there is none.
+export function take(url) {
+  const reply = begun.get(absolute(url));
+  begun.delete(absolute(url));
+  return reply;
+}

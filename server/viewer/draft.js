@@ -1,0 +1,168 @@
+// A draft of an edit: a polygon drawn on the globe, what flattening it would do, and the file that the server takes. Only
+// the operator of a server can edit its terrain: the page sends nothing.
+import {
+  Cartesian3, Color, ColorGeometryInstanceAttribute, GeometryInstance, PerInstanceColorAppearance, PolygonGeometry,
+  PolygonHierarchy, Primitive,
+} from "/viewer/cesium/index.js";
+import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from "/viewer/edit_shapes.js";
+import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
+
+const kSamples = 400;
+const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
+const byId = (id) => document.getElementById(id);
+
+export class Draft {
+  #turn = 0;  // of overlapping requests only the latest is shown
+  #markers = 0;
+
+  // `access`: the server. `dataset()`: the shown dataset. `onMode(name)`: "draft" begins, or undefined: it ends.
+  constructor({ globe, access, dataset, onMode }) {
+    Object.assign(this, { globe, access, dataset, onMode, isOpen: false, corners: [], isHeightChosen: false });
+    byId("draft-close").addEventListener("click", () => this.end());
+    byId("draft-undo").addEventListener("click", () => this.undo());
+    byId("draft-save").addEventListener("click", () => this.#save());
+    byId("draft-height").addEventListener("input", () => {
+      this.isHeightChosen = true;
+      this.#show();
+    });
+    byId("draft-blend").addEventListener("input", () => this.#show());
+  }
+
+  toggle() {
+    if (this.isOpen) return this.end();
+    this.isOpen = true;
+    this.globe.scene.globe.depthTestAgainstTerrain = true;  // ground hides what is below it
+    this.globe.overlay.setMarker("picked", undefined);
+    this.globe.onClick = (ground) => ground && this.add(ground);
+    byId("draft").hidden = false;
+    this.onMode("draft");
+    this.#change();
+  }
+
+  end() {
+    if (!this.isOpen) return;
+    this.isOpen = false;
+    this.globe.scene.globe.depthTestAgainstTerrain = false;
+    this.globe.onClick = undefined;
+    this.corners = [];
+    this.isHeightChosen = false;
+    this.#change();
+    byId("draft").hidden = true;
+    this.onMode(undefined);
+  }
+
+  add(ground) {
+    this.corners.push(ground);
+    return this.#change();
+  }
+
+  undo() {
+    this.corners.pop();
+    return this.#change();
+  }
+
+  get height() {
+    return byId("draft-height").valueAsNumber || 0;
+  }
+
+  get blend() {
+    return Math.max(0, byId("draft-blend").valueAsNumber || 0);
+  }
+
+  get #isPolygon() {
+    return this.corners.length > 2 && !crossesItself(this.corners);
+  }
+
+  // The corners have changed: their ground is read anew.
+  async #change() {
+    const turn = ++this.#turn;
+    const { corners } = this;
+    this.ground = undefined;
+    if (corners.length > 0 && !this.isHeightChosen) {
+      const mean = corners.reduce((sum, { height }) => sum + height, 0) / corners.length;
+      byId("draft-height").value = mean.toFixed(1);
+    }
+    this.#show();
+    if (!this.#isPolygon) return;
+    try {
+      const ground = await this.access.heights(this.dataset(), placesInside(corners, kSamples));
+      if (turn !== this.#turn) return;
+      this.ground = ground;
+      this.#describe();
+    } catch (error) {
+      if (turn === this.#turn) byId("draft-text").textContent = `The heights could not be read: ${error.message}.`;
+    }
+  }
+
+  #show() {
+    this.#drawOutline();
+    this.#drawSurface();
+    this.#describe();
+  }
+
+  #drawOutline() {
+    const { overlay } = this.globe;
+    const { corners } = this;
+    for (; this.#markers > corners.length; --this.#markers) overlay.setMarker(`corner-${this.#markers - 1}`, undefined);
+    corners.forEach((corner, i) => overlay.setMarker(`corner-${i}`, corner));
+    this.#markers = corners.length;
+    if (corners.length < 2) return overlay.setLine("draft", undefined);
+    const ring = corners.length > 2 ? [...corners, corners[0]] : corners;
+    const isWrong = corners.length > 2 && !this.#isPolygon;
+    const pieces = [{ className: isWrong ? "unseen" : "draft", points: ring }];
+    if (!isWrong && corners.length > 2) {
+      const raise = (corner) => ({ ...corner, height: this.height });
+      pieces.push({ className: "draft level", points: ring.map(raise) });
+      for (const corner of corners) pieces.push({ className: "draft level", points: [corner, raise(corner)] });
+    }
+    return overlay.setLine("draft", pieces);
+  }
+
+  // The chosen height as a surface, which the ground hides where it is higher.
+  #drawSurface() {
+    const { scene } = this.globe;
+    if (this.surface) scene.primitives.remove(this.surface);  // which destroys it
+    this.surface = undefined;
+    if (this.#isPolygon) {
+      const positions = this.corners.map(({ longitude, latitude }) => Cartesian3.fromDegrees(longitude, latitude));
+      const geometry = new PolygonGeometry({
+        polygonHierarchy: new PolygonHierarchy(positions), height: this.height * this.globe.exaggeration,
+        vertexFormat: PerInstanceColorAppearance.FLAT_VERTEX_FORMAT,
+      });
+      const attributes = { color: ColorGeometryInstanceAttribute.fromColor(kSurface) };
+      this.surface = scene.primitives.add(new Primitive({
+        geometryInstances: new GeometryInstance({ geometry, attributes }), asynchronous: false,
+        appearance: new PerInstanceColorAppearance({ flat: true, translucent: true }),
+      }));
+    }
+    scene.requestRender();
+  }
+
+  #describe() {
+    byId("draft-undo").hidden = this.corners.length === 0;
+    byId("draft-save").disabled = !this.#isPolygon;
+    byId("draft-text").textContent = this.#text();
+  }
+
+  #text() {
+    const { corners, ground } = this;
+    if (corners.length === 0) return "Click the ground to set the first corner of a polygon.";
+    if (corners.length < 3) return "Click the next corner.";
+    if (!this.#isPolygon) return "The outline crosses itself: remove the last corner.";
+    const area = Math.abs(signedArea(corners));
+    const size = formatArea(area);
+    if (!ground) return `${size}.`;
+    const { samples, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
+    if (samples === 0) return `${size}; no heights there.`;
+    return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${formatVolume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${formatVolume(cut)}.`;
+  }
+
+  #save() {
+    const text = JSON.stringify(flattenGeoJson(this.corners, this.height, this.blend), undefined, 1);
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([text], { type: "application/geo+json" }));
+    link.download = `${this.dataset().name}-edits.geojson`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+}

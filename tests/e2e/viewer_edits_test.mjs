@@ -1,0 +1,144 @@
+// Edits in the viewer: outlines of a dataset's edits, and a polygon that is drawn, downloaded and served.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { chromium } from 'playwright-core';
+import { json, request, run, samples, serve } from './harness.mjs';
+import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
+
+const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+                '--disable-background-networking', '--no-first-run'];
+const kWait = { timeout: 120000, polling: 200 };
+const hills = path.join(samples, 'jacksboro.tif');
+const at = (longitude, latitude) => ({ longitude, latitude });
+
+describe('shapes of edits', () => {
+  const square = [at(-84.3, 36.3), at(-84.3, 36.31), at(-84.29, 36.31), at(-84.29, 36.3)];
+
+  it('have an area and a direction', () => {
+    const side = 0.01 * 111320;
+    assert.ok(Math.abs(signedArea(square) + side * side * Math.cos((36.3 * Math.PI) / 180)) < 1000, 'clockwise');
+    assert.ok(signedArea([...square].reverse()) > 0);
+  });
+
+  it('may not cross themselves', () => {
+    assert.ok(!crossesItself(square));
+    assert.ok(!crossesItself(square.slice(1)));
+    assert.ok(crossesItself([square[0], square[2], square[1], square[3]]));
+  });
+
+  it('contain places', () => {
+    const places = placesInside(square.slice(1), 400);
+    assert.ok(places.length > 150 && places.length < 250, `half of the box: ${places.length}`);
+    assert.ok(places.every(({ longitude, latitude }) => longitude - -84.3 > 36.31 - latitude - 1e-9));
+  });
+
+  it('move ground', () => {
+    assert.deepEqual(earthwork([10, 20, undefined, 30, 40], 25, 400), { samples: 4, raised: 15, lowered: 15, fill: 2000, cut: 2000 });
+  });
+
+  it('are closed and counterclockwise in the file', () => {
+    const { features: [{ geometry, properties }] } = flattenGeoJson(square, 500.12345, 0);
+    const [ring] = geometry.coordinates;
+    assert.deepEqual(ring, [[-84.29, 36.3], [-84.29, 36.31], [-84.3, 36.31], [-84.3, 36.3], [-84.29, 36.3]]);
+    assert.deepEqual(properties.terrain, { op: 'flatten', height: 500.123 });
+  });
+});
+
+describe('edits in the viewer', () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-edits-'));
+  const config = path.join(folder, 'terrace.json');
+  const edits = path.join(folder, 'quarry.geojson');
+  let server, browser, page;
+
+  before(async () => {
+    const corners = [at(-84.27, 36.28), at(-84.23, 36.28), at(-84.23, 36.32), at(-84.27, 36.32)];
+    const file = flattenGeoJson(corners, 400, 100);
+    file.features.unshift({ type: 'Feature', properties: { name: 'not an edit' }, geometry: null });
+    fs.writeFileSync(edits, JSON.stringify(file));
+    fs.writeFileSync(config, JSON.stringify({ datasets: [
+      { name: 'hills', sources: [hills], edits: [edits] }, { name: 'plain', sources: [hills] },
+    ] }));
+    server = await serve('--config', config);
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    page = await browser.newPage({ viewport: { width: 700, height: 420 }, acceptDownloads: true });
+    page.wrongs = [];
+    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+    fs.rmSync(folder, { recursive: true });
+  });
+
+  it('are offered as GeoJSON, where there are any', async () => {
+    const { datasets } = await json(`${server.url}/datasets`);
+    assert.deepEqual(datasets.map(({ urls }) => urls.edits), ['/hills/edits.geojson', undefined]);
+    const reply = await request(`${server.url}/hills/edits.geojson`);
+    assert.equal(reply.headers['content-type'], 'application/geo+json');
+    assert.equal(reply.headers['cache-control'], 'no-cache');
+    const { features: [{ properties, geometry }, ...others] } = JSON.parse(reply.body);
+    assert.deepEqual([properties, others], [{ op: 'flatten', file: 'quarry.geojson', feature: 1, area: true }, []]);
+    assert.equal(geometry.type, 'MultiLineString');
+    assert.deepEqual(geometry.coordinates, [[[-84.27, 36.28], [-84.23, 36.28], [-84.23, 36.32], [-84.27, 36.32], [-84.27, 36.28]]]);
+    assert.equal((await request(`${server.url}/plain/edits.geojson`)).status, 404);
+    assert.equal((await request(`${server.url}/hills/edits.geojson?z=1`)).status, 400);
+  });
+
+  it('are outlined on the globe', async () => {
+    await page.goto(`${server.url}/#dataset=hills&fraction=4`);
+    await page.waitForFunction(() => window.terrace?.state.ready && !terrace.globe.loading && terrace.globe.drawn().tiles > 1, undefined, kWait);
+    assert.ok(await page.locator('#edits').isVisible());
+    await page.locator('#edits').check();
+    await page.waitForFunction(() => /^M.*L/.test(document.querySelector('.overlay .line.edit.flatten')?.getAttribute('d') ?? ''), undefined, kWait);
+    assert.match(page.url(), /&edits/);
+    const height = await page.evaluate(() => terrace.globe.heightAt(-84.25, 36.3));
+    assert.ok(Math.abs(height - 400) < 60, `on the flat ground, at this error: ${height} m`);
+    await page.locator('#edits').uncheck();
+    assert.equal(await page.locator('.overlay .line.edit').count(), 0);
+  });
+
+  it('are drawn, downloaded, and taken by terrace', async () => {
+    await page.locator('#tool-draft').click();
+    await page.waitForFunction(() => terrace.state.draft?.isOpen, undefined, kWait);
+    assert.ok(await page.locator('#draft-save').isDisabled(), 'three corners make a polygon');
+    const places = [[400, 200], [590, 205], [470, 130]];  // below the horizon, beside the panels
+    for (const [i, [x, y]] of places.entries()) {
+      await page.mouse.click(x, y);
+      await page.waitForFunction((count) => terrace.state.draft.corners.length === count, i + 1, kWait);
+      await page.waitForTimeout(400);  // two clicks at once are a double click
+    }
+    await page.locator('#draft-height').fill('512.5');
+    await page.locator('#draft-blend').fill('30');
+    await page.waitForFunction(() => /Raises the ground by up to .* lowers it/.test(document.getElementById('draft-text').textContent), undefined, kWait);
+    assert.ok(await page.evaluate(() => terrace.globe.scene.primitives.contains(terrace.state.draft.surface)));
+    const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#draft-save').click()]);
+    assert.equal(download.suggestedFilename(), 'hills-edits.geojson');
+    const drawn = path.join(folder, 'drawn.geojson');
+    await download.saveAs(drawn);
+    const info = run('info', hills, '--edits', drawn);
+    assert.equal(info.code, 0, info.err);
+    assert.match(info.out, /edits\s+1: 1 flatten/);
+
+    const other = await serve(hills, '--edits', drawn);
+    const [ring] = JSON.parse(fs.readFileSync(drawn)).features[0].geometry.coordinates;
+    const middle = [1, 0].map((axis) => ring.slice(0, 3).reduce((sum, corner) => sum + corner[axis], 0) / 3);
+    const { results } = await json(`${other.url}/jacksboro/heights?locations=${middle}`);
+    await other.stop();
+    assert.equal(results[0].elevation, 512.5);
+  });
+
+  it('stay drafts: undo, and the end of drawing', async () => {
+    await page.evaluate(() => terrace.state.draft.add({ ...terrace.state.draft.corners[0], latitude: 36.2 }));
+    await page.locator('#draft-undo').click();
+    await page.locator('#draft-undo').click();
+    await page.waitForFunction(() => !terrace.state.draft.surface && document.getElementById('draft-save').disabled, undefined, kWait);
+    await page.locator('#draft-close').click();
+    assert.equal(await page.locator('.overlay .line.draft, .overlay .marker').count(), 0);
+    assert.deepEqual(page.wrongs, []);
+  });
+});
