@@ -144,6 +144,31 @@ describe('the pages of examples/', () => {
         return [height - error, height + error];
       }),
     },
+    itowns: {
+      ready: 'window.view?.tileLayer && view.mainLoop.scheduler.commandsWaitingExecutionCount() + view.mainLoop.scheduler.commandsRunningCount() === 0' +
+        ' && view.mainLoop.renderingState === 0 && view.pickTerrainCoordinates({ x: 165, y: 132 })',
+      check: async (page, dataset) => {
+        if (dataset === 'jacksboro') {  // from so near that the deepest tiles are drawn
+          await page.evaluate(() => itowns.CameraUtils.transformCameraToLookAtTarget(view, view.camera.camera3D,
+            { coord: new itowns.Coordinates('EPSG:4326', -84.25, 36.3, 600), range: 2000, tilt: 40 }));
+          await settle(page, pages.itowns.ready);
+        }
+        const place = await click(page, 0.5, 0.6);
+        // The drawn tile, and the height of its geometry there by the depth buffer.
+        const { zoom, altitude } = await page.evaluate(({ latitude, longitude }) => ({
+          zoom: itowns.DEMUtils.getTerrainObjectAt(view.tileLayer, new itowns.Coordinates('EPSG:4326', longitude, latitude)).texture.extent.zoom,
+          altitude: view.pickTerrainCoordinates({ x: 165, y: 132 }).as('EPSG:4326').altitude,
+        }), place);
+        const span = 180 / 2 ** zoom, column = Math.floor((place.longitude + 180) / span), row = Math.floor((place.latitude + 90) / span);
+        const error = await certified(`${server.url}/${dataset}/${zoom}/${column}/${row}.terrain`), texel = span / 256 * 111320;
+        const where = `itowns, ${dataset}, level ${zoom} at ${place.latitude}, ${place.longitude}`, [low, high] = await range(dataset, place, texel);
+        within(place.height, [low - error, high + error], where);
+        if (dataset === 'earth') return;  // from space the depth buffer is too coarse
+        // iTowns draws 17 x 17 vertices of a tile.
+        const [lowest, highest] = await range(dataset, place, 16 * texel);
+        within(altitude, [lowest - error, highest + error], `${where}, as drawn`);
+      },
+    },
     deck: {
       ready: "window.example?.layerManager?.getLayers({layerIds: ['terrain']})[0]?.isLoaded",
       check: async (page, dataset) => {
