@@ -1,13 +1,14 @@
 // Runs each page of examples/ in a real browser, with libraries from node_modules instead of the CDN, and each script,
 // against the real server with the sample data. Heights that a client shows are compared with /heights.
 import assert from 'node:assert/strict';
-import { execFile } from 'node:child_process';
+import { execFile, spawn } from 'node:child_process';
+import { once } from 'node:events';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { promisify } from 'node:util';
-import { json, request, samples, serve } from '../e2e/harness.mjs';
+import { binary, json, request, samples, serve } from '../e2e/harness.mjs';
 import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, pixels, servePages, settle, typeOf } from './pages.mjs';
 
 const run = promisify(execFile);
@@ -225,6 +226,29 @@ describe('the pages of examples/', () => {
       });
     }
   }
+
+  it('cesium-terrain draws a baked folder on a plain file server', async () => {
+    const site = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace-site-'));
+    // As docs/baking.md says, on any free port.
+    await run(binary, ['bake', path.join(samples, 'jacksboro.tif'), '--form', 'folder', '--no-gzip', '--levels', '0-10', '--out', path.join(site, 'hills')]);
+    fs.copyFileSync(path.join(kExamples, 'cesium-terrain.html'), path.join(site, 'index.html'));
+    const host = spawn('python3', ['-u', '-m', 'http.server', '--directory', site, '--bind', '127.0.0.1', '0'], { stdio: ['ignore', 'pipe', 'ignore'] });
+    try {
+      const [, port] = (await once(host.stdout, 'data')).toString().match(/port (\d+)/);
+      const page = await openPage(browser, `http://127.0.0.1:${port}/index.html?terrain=hills`);
+      await settle(page, pages['cesium-terrain'].ready);
+      assert.match(await line(page), /^jacksboro of hills as quantized-mesh terrain, levels 0 to 10/);
+      const place = await click(page, 0.5, 0.55);
+      const [low, high] = await range('jacksboro', place, 200);
+      within(place.height, [low - 60, high + 60], 'cesium-terrain, baked');
+      assert.ok(await colours(page) > 100);
+      assert.deepEqual(page.wrongs, []);
+      await page.close();
+    } finally {
+      host.kill();
+      fs.rmSync(site, { recursive: true });
+    }
+  });
 
   it('a page says what is wrong', async () => {
     for (const [query, said] of [[`server=${server.url}&dataset=mars`, /no dataset mars; it has earth, jacksboro/],
