@@ -39,6 +39,9 @@ class Help(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
             self.assertIn("terrace: unknown command serv; did you mean serve?\n", result.stderr)
 
+    def test_a_file_in_place_of_a_command_is_served(self):
+        self.assertIn(f"terrace: unknown command {__file__}; did you mean terrace serve {__file__}?\n", run(__file__).stderr)
+
     def test_lines_fit_a_terminal(self):
         for command in ([], ["serve"], ["mesh"], ["info"]):
             for line in run(*command, "--help").stdout.splitlines():
