@@ -1,5 +1,7 @@
 #include "server/routes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -76,10 +78,28 @@ bool ReadTile(const Segments& segments, Route& route) {
   std::string_view row = segments[3];
   route.format = CutSuffix(row);
   if (route.format == nullptr) return false;
-  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator);
+  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator());
   if (!key) return false;
   route.key = *key;
   return true;
+}
+
+// RouteRow::read of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
+template <std::size_t kAt>
+bool ReadTileInFolder(const Segments& segments, Route& route) {
+  std::string_view row = segments[kAt + 2];
+  const std::string folder = kAt == 2 ? std::string(segments[1]) : fmt::format("{}/{}", segments[1], segments[2]);
+  route.format = CutSuffix(row, folder);
+  if (route.format == nullptr) return false;
+  const auto key = ParseTileKey(segments[kAt], segments[kAt + 1], row, route.format->is_mercator());
+  if (!key) return false;
+  route.key = *key;
+  return true;
+}
+
+bool ReadMapLayer(const Segments& segments, Route& route) {
+  route.format = FirstFormatIn(segments[1]);
+  return route.format != nullptr;
 }
 
 bool ReadImplicitTile(const Segments& segments, Route& route) {
@@ -145,6 +165,46 @@ constexpr RouteRow kRows[] = {
     {.label = "layer", .pattern = "/{dataset}/layer.json", .handle = Write<DescribeLayer>, .has_templates = true},
     {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
     {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
+    {.label = "hillshade",
+     .pattern = "/{dataset}/hillshade/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "slope",
+     .pattern = "/{dataset}/slope/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "contours",
+     .pattern = "/{dataset}/contours/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/geodetic/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<3>},
+    {.label = "hillshade",
+     .pattern = "/{dataset}/hillshade/tiles.json",
+     .handle = AnswerMapTileJson,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "slope",
+     .pattern = "/{dataset}/slope/tiles.json",
+     .handle = AnswerMapTileJson,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "contours",
+     .pattern = "/{dataset}/contours/tiles.json",
+     .handle = AnswerMapTileJson,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/tiles.json",
+     .handle = AnswerMapTileJson,
+     .read = ReadMapLayer,
+     .has_templates = true},
     {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
     {.label = "grid", .pattern = "/{dataset}/grid", .handle = AnswerGrid},
     {.label = "sight", .pattern = "/{dataset}/sight", .handle = AnswerSight, .max_body_bytes = MaxRaysBytes},

@@ -14,6 +14,7 @@
 #include "engine/geo/error_ladder.h"
 #include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
+#include "server/api/map_parameters.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -89,11 +90,34 @@ std::string_view QuantizedMeshVary(const TileRequest&) { return "Accept, Accept-
 std::string_view GlbVary(const TileRequest& tile) { return CodingHelps(tile) ? "Accept-Encoding" : ""; }
 std::string_view PngVary(const TileRequest&) { return ""; }
 
+Result<void> ReadPicture(std::string_view query, const RequestFields&, const DatasetView& dataset, TileRequest& tile) {
+  return ReadMapTile(query, dataset, tile);
+}
+Result<void> ReadContours(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
+                          TileRequest& tile) {
+  tile.coding = NegotiateCoding(fields.accept_encoding);
+  return ReadMapTile(query, dataset, tile);
+}
+std::string_view ContoursVary(const TileRequest&) { return "Accept-Encoding"; }
+
+using tiler::TileFormat::kContours, tiler::TileFormat::kGeodeticImagery, tiler::TileFormat::kHillshade,
+    tiler::TileFormat::kImagery, tiler::TileFormat::kSlope;
+constexpr proto::PictureFormat kPng = proto::PictureFormat::kPng, kWebp = proto::PictureFormat::kWebp,
+                               kJpeg = proto::PictureFormat::kJpeg;
+
 constexpr TileFormat kFormats[] = {
-    {tiler::TileFormat::kQuantizedMesh, ".terrain", /*is_mercator=*/false, QuantizedMeshType, QuantizedMeshVary,
-     ReadQuantizedMesh},
-    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, GlbType, GlbVary, ReadGlb},
-    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng},
+    {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh},
+    {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb},
+    {tiler::TileFormat::kHeightPng, "", ".png", PngType, PngVary, ReadHeightPng},
+    {kHillshade, "hillshade", ".png", MapTileType, PngVary, ReadPicture, kPng},
+    {kHillshade, "hillshade", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
+    {kSlope, "slope", ".png", MapTileType, PngVary, ReadPicture, kPng},
+    {kSlope, "slope", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
+    {kContours, "contours", ".mvt", MapTileType, ContoursVary, ReadContours},
+    {kImagery, "imagery", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
+    {kImagery, "imagery", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg},
+    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
+    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg},
 };
 
 // If `repeatable`, a parameter may be repeated with the same value.
@@ -264,7 +288,7 @@ int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& d
     const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
     return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
   }
-  return ErrorStep(requested, level, level == dataset.deepest_level(), dataset.error_fraction);
+  return ErrorStep(requested, level, level >= dataset.finest_level(), dataset.error_fraction);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
@@ -274,7 +298,7 @@ Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format
   const auto* const row = std::ranges::find(kFormats, format, &TileFormat::format);
   TERRACE_CHECK(row != std::end(kFormats));
   return MakeError(ErrorCode::kNotFound, "the dataset is an archive of finished tiles alone, which has no {} tiles",
-                   row->suffix);
+                   row->folder.empty() ? row->suffix : row->folder);
 }
 
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
@@ -284,13 +308,24 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
   return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
 
-const TileFormat* CutSuffix(std::string_view& name) {
+const TileFormat* CutSuffix(std::string_view& name, std::string_view folder) {
   for (const TileFormat& row : kFormats) {
-    if (!name.ends_with(row.suffix)) continue;
+    if (row.folder != folder || !name.ends_with(row.suffix)) continue;
     name.remove_suffix(row.suffix.size());
     return &row;
   }
   return nullptr;
+}
+
+const TileFormat* FirstFormatIn(std::string_view folder) {
+  const auto* const row = std::ranges::find(kFormats, folder, &TileFormat::folder);
+  return row == std::end(kFormats) ? nullptr : row;
+}
+
+const TileFormat* FormatWith(tiler::TileFormat format, proto::PictureFormat picture) {
+  const auto* const row = std::ranges::find_if(
+      kFormats, [&](const TileFormat& of) { return of.format == format && of.picture == picture; });
+  return row == std::end(kFormats) ? nullptr : row;
 }
 
 Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets) {
@@ -304,6 +339,7 @@ Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const
   tile.dataset = *dataset;
   tile.key = route.key;
   tile.format = route.format->format;
+  tile.map.picture = route.format->picture;
   if (Result<void> read = route.format->read(route.query, *context.request->fields, datasets[*dataset], tile); !read) {
     return tl::unexpected(std::move(read.error()));
   }
@@ -322,7 +358,7 @@ tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::Enco
   put("Content-Length", tile.bytes.size());
   head.body_bytes = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
-  put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
+  if (!tiler::IsForMaps(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {
     put("Terrain-Certified-Error", proto::FormatErrorUp(*tile.certified_error_m));
   }
