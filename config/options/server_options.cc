@@ -327,8 +327,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "max_mesh_samples",
        .value = "N",
        .section = "load",
-       .help = "Largest number of height samples of one mesh of an area",
-       .details = "Larger areas get 400. Meshing takes up to 300 bytes of memory a sample",
+       .help = "Largest number of height samples of one mesh of an area, and of nodes of one grid",
+       .details =
+           "Larger ones get 400. Meshing takes up to 300 bytes of memory a sample. A grid of 1009 x 1009 needs 1018081",
        .codec = Integer(&Config::max_mesh_samples, 4, 100'000'000),
        .is_live = true},
       {.key = "request_deadline_s",

@@ -1,13 +1,14 @@
 // Runs each page of examples/ in a real browser, with libraries from node_modules instead of the CDN, and each script,
 // against the real server with the sample data. Heights that a client shows are compared with /heights.
 import assert from 'node:assert/strict';
-import { execFile } from 'node:child_process';
+import { execFile, spawn } from 'node:child_process';
+import { once } from 'node:events';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { promisify } from 'node:util';
-import { json, request, samples, serve } from '../e2e/harness.mjs';
+import { binary, json, request, samples, serve } from '../e2e/harness.mjs';
 import { VectorTile } from './node_modules/@mapbox/vector-tile/index.js';
 import Pbf from './node_modules/pbf/index.js';
 import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, pixels, servePages, settle, typeOf } from './pages.mjs';
@@ -146,6 +147,31 @@ describe('the pages of examples/', () => {
         return [height - error, height + error];
       }),
     },
+    itowns: {
+      ready: 'window.view?.tileLayer && view.mainLoop.scheduler.commandsWaitingExecutionCount() + view.mainLoop.scheduler.commandsRunningCount() === 0' +
+        ' && view.mainLoop.renderingState === 0 && view.pickTerrainCoordinates({ x: 165, y: 132 })',
+      check: async (page, dataset) => {
+        if (dataset === 'jacksboro') {  // from so near that the deepest tiles are drawn
+          await page.evaluate(() => itowns.CameraUtils.transformCameraToLookAtTarget(view, view.camera.camera3D,
+            { coord: new itowns.Coordinates('EPSG:4326', -84.25, 36.3, 600), range: 2000, tilt: 40 }));
+          await settle(page, pages.itowns.ready);
+        }
+        const place = await click(page, 0.5, 0.6);
+        // The drawn tile, and the height of its geometry there by the depth buffer.
+        const { zoom, altitude } = await page.evaluate(({ latitude, longitude }) => ({
+          zoom: itowns.DEMUtils.getTerrainObjectAt(view.tileLayer, new itowns.Coordinates('EPSG:4326', longitude, latitude)).texture.extent.zoom,
+          altitude: view.pickTerrainCoordinates({ x: 165, y: 132 }).as('EPSG:4326').altitude,
+        }), place);
+        const span = 180 / 2 ** zoom, column = Math.floor((place.longitude + 180) / span), row = Math.floor((place.latitude + 90) / span);
+        const error = await certified(`${server.url}/${dataset}/${zoom}/${column}/${row}.terrain`), texel = span / 256 * 111320;
+        const where = `itowns, ${dataset}, level ${zoom} at ${place.latitude}, ${place.longitude}`, [low, high] = await range(dataset, place, texel);
+        within(place.height, [low - error, high + error], where);
+        if (dataset === 'earth') return;  // from space the depth buffer is too coarse
+        // iTowns draws 17 x 17 vertices of a tile.
+        const [lowest, highest] = await range(dataset, place, 16 * texel);
+        within(altitude, [lowest - error, highest + error], `${where}, as drawn`);
+      },
+    },
     deck: {
       ready: "window.example?.layerManager?.getLayers({layerIds: ['terrain']})[0]?.isLoaded",
       check: async (page, dataset) => {
@@ -250,6 +276,29 @@ describe('the pages of examples/', () => {
       });
     }
   }
+
+  it('cesium-terrain draws a baked folder on a plain file server', async () => {
+    const site = fs.mkdtempSync(path.join(os.tmpdir(), 'terrace-site-'));
+    // As docs/baking.md says, on any free port.
+    await run(binary, ['bake', path.join(samples, 'jacksboro.tif'), '--form', 'folder', '--no-gzip', '--levels', '0-10', '--out', path.join(site, 'hills')]);
+    fs.copyFileSync(path.join(kExamples, 'cesium-terrain.html'), path.join(site, 'index.html'));
+    const host = spawn('python3', ['-u', '-m', 'http.server', '--directory', site, '--bind', '127.0.0.1', '0'], { stdio: ['ignore', 'pipe', 'ignore'] });
+    try {
+      const [, port] = (await once(host.stdout, 'data')).toString().match(/port (\d+)/);
+      const page = await openPage(browser, `http://127.0.0.1:${port}/index.html?terrain=hills`);
+      await settle(page, pages['cesium-terrain'].ready);
+      assert.match(await line(page), /^jacksboro of hills as quantized-mesh terrain, levels 0 to 10/);
+      const place = await click(page, 0.5, 0.55);
+      const [low, high] = await range('jacksboro', place, 200);
+      within(place.height, [low - 60, high + 60], 'cesium-terrain, baked');
+      assert.ok(await colours(page) > 100);
+      assert.deepEqual(page.wrongs, []);
+      await page.close();
+    } finally {
+      host.kill();
+      fs.rmSync(site, { recursive: true });
+    }
+  });
 
   it('a page says what is wrong', async () => {
     for (const [query, said] of [[`server=${server.url}&dataset=mars`, /no dataset mars; it has earth, jacksboro/],

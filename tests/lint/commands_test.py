@@ -19,7 +19,7 @@ import urllib.request
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 COMMAND = re.compile(r"(?<![\w-])terrace (serve|mesh|info|bake status|bake|fly)\b([^\n`#]*)")
 URL = re.compile(r"https?://(?:127\.0\.0\.1|localhost):8080(/[^\s`'\"{}<>)]*)")
-EXPECTED = {"/earth": 404, "/nope/layer.json": 404, "/jacksboro/9/272/359.terrain?error=0": 400}
+EXPECTED = {"/earth": 404, "/jacksboro": 404, "/jacksboro/heights": 400, "/nope/layer.json": 404, "/jacksboro/9/272/359.terrain?error=0": 400}
 OTHER_DATA = re.compile(r"^/(andes|alps|maui|dem|NAME|DATASET)\b")
 
 

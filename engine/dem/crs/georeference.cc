@@ -117,7 +117,7 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
     return MakeError(
         ErrorCode::kInvalidArgument,
         "{}: has no georeference; if you know where it lies, add one with `gdal_translate -a_srs EPSG:XXXX "
-        "-a_ullr west north east south in out`",
+        "-a_ullr west north east south in out`; `terrace mesh` needs none",
         path);
   }
   if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());

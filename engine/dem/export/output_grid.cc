@@ -74,10 +74,10 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
   constexpr std::int64_t kLongestSide = 65536;
   const double nodes = static_cast<double>(grid.columns) * static_cast<double>(grid.rows);
   if (nodes > static_cast<double>(max_nodes) || std::max(grid.columns, grid.rows) > kLongestSide) {
-    return Invalid(
-        fmt::format("the grid has {} x {} nodes, more than max_mesh_samples of this server ({}) or than {} on "
-                    "a side; ask for fewer, or for a smaller bbox",
-                    grid.columns, grid.rows, max_nodes, kLongestSide));
+    return Invalid(fmt::format(
+        "the grid has {} x {} nodes, more than max_mesh_samples of this server ({}) or than {} on "
+        "a side; ask for fewer, ask for parts of the area, or start the server with a larger --max-mesh-samples",
+        grid.columns, grid.rows, max_nodes, kLongestSide));
   }
   if (request.spacing) {
     grid.east = grid.west + spacing * static_cast<double>(grid.columns - 1);

@@ -4,8 +4,10 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <string_view>
+#include <system_error>
 
 #include "config/common/nearest_name.h"
 #include "config/options/options.h"
@@ -22,6 +24,8 @@ std::string ExplainCommand(const CLI::App& program, const std::string& word) {
   for (const CLI::App* command : program.get_subcommands({})) known.push_back({command->get_name()});
   std::vector<std::string> meant;
   for (const std::string_view name : config::NearestNames(word, known)) meant.emplace_back(name);
+  std::error_code ignored;
+  if (meant.empty() && std::filesystem::exists(word, ignored)) meant.push_back("terrace serve " + word);
   return "unknown command " + word + DidYouMean(meant);
 }
 
@@ -87,9 +91,9 @@ std::string ExplainFlag(const CLI::App& command, const CLI::App& program, const 
   if (!meant.empty()) return unknown + DidYouMean(meant);
   std::vector<std::string> elsewhere;
   for (const CLI::App* other : others) {
-    const std::vector<std::string> meant = NearestFlags(*other, flag);
-    if (!meant.empty()) {
-      elsewhere.push_back(fmt::format("{} of 'terrace {}'", config::Alternatives(meant), other->get_name()));
+    const std::vector<std::string> theirs = NearestFlags(*other, flag);
+    if (!theirs.empty()) {
+      elsewhere.push_back(fmt::format("{} of 'terrace {}'", config::Alternatives(theirs), other->get_name()));
     }
   }
   return unknown + DidYouMean(elsewhere);

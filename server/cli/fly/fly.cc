@@ -79,7 +79,7 @@ int RunFly(const FlyArguments& arguments) {
 
 void AddFly(CLI::App& app, int& exit_code) {
   auto arguments = std::make_shared<FlyArguments>();
-  CLI::App* fly = app.add_subcommand("fly", "Flies over a served dataset as a client, and reports what it saw.");
+  CLI::App* fly = app.add_subcommand("fly", "Flies over a served dataset as a client, and reports what it saw");
   fly->group(kCommands);
   fly->footer(
       "Loads the tiles that cesium-native would load on this way, in real time, and prints a line each second.\n"

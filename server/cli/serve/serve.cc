@@ -118,6 +118,32 @@ std::vector<config::ConfigError> FindSameNames(const config::Config& config, con
   return errors;
 }
 
+// What an argument is that is no DEM: a configuration, a file of an archive, baked tiles; empty for everything else.
+// `path` is `written` as an absolute path.
+std::string ExplainOtherThanDem(const std::string& written, const std::string& path) {
+  const std::filesystem::path place(path);
+  std::error_code ignored;
+  if (place.filename() == "manifest.json" && IsArchive(place.parent_path().string())) {
+    const std::string folder = std::filesystem::path(written).parent_path().string();
+    return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
+                       folder.empty() ? "." : folder);
+  }
+  if (written.ends_with(".json")) {
+    return fmt::format("{} looks like a configuration: terrace serve --config {}", written, written);
+  }
+  for (const auto& [document, tiles] :
+       {std::pair{"layer.json", "0"}, {"tiles.json", "0"}, {"tileset.json", "3dtiles"}}) {
+    if (std::filesystem::exists(place / document, ignored) && std::filesystem::is_directory(place / tiles, ignored)) {
+      return fmt::format(
+          "{} has tiles of 'terrace bake --form folder', which any file server serves: docs/baking.md, \"A static "
+          "host\"; "
+          "terrace serve needs the chunks of a bake without --form",
+          written);
+    }
+  }
+  return {};
+}
+
 // Applies the file's options, then the flags, then adds a dataset per DEM of the command line. Collects all errors.
 config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
   config::Config config;
@@ -151,11 +177,11 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
       errors.push_back({"", "a DEM on the command line has an empty name"});
       continue;
     }
-    if (written.ends_with(".json")) {
-      errors.push_back({"", fmt::format("{} looks like a configuration: terrace serve --config {}", written, written)});
+    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
+    if (std::string other = ExplainOtherThanDem(written, dem); !other.empty()) {
+      errors.push_back({"", std::move(other)});
       continue;
     }
-    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
     if (std::filesystem::path(dem).is_relative()) {
       errors.push_back({written, config::kNoWorkingDirectory});
       continue;

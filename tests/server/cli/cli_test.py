@@ -39,6 +39,20 @@ class Help(unittest.TestCase):
             self.assertEqual((result.returncode, result.stdout), (2, ""), arguments)
             self.assertIn("terrace: unknown command serv; did you mean serve?\n", result.stderr)
 
+    def test_baked_tiles_in_place_of_a_dem_say_what_serves_them(self):
+        with tempfile.TemporaryDirectory() as place:
+            folder = pathlib.Path(place)
+            (folder / "0").mkdir()
+            (folder / "layer.json").write_text("{}")
+            result = run("serve", place)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("which any file server serves", result.stderr)
+            (folder / "manifest.json").write_text("{}")
+            self.assertIn(f"name its folder: terrace serve {place}\n", run("serve", str(folder / "manifest.json")).stderr)
+
+    def test_a_file_in_place_of_a_command_is_served(self):
+        self.assertIn(f"terrace: unknown command {__file__}; did you mean terrace serve {__file__}?\n", run(__file__).stderr)
+
     def test_lines_fit_a_terminal(self):
         for command in ([], ["serve"], ["mesh"], ["info"]):
             for line in run(*command, "--help").stdout.splitlines():
