@@ -15,6 +15,7 @@
 #include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
 #include "server/http/text.h"
+#include "server/openapi/operations.h"
 
 namespace terrace::server {
 namespace {
@@ -91,9 +92,10 @@ std::string_view PngVary(const TileRequest&) { return ""; }
 
 constexpr TileFormat kFormats[] = {
     {tiler::TileFormat::kQuantizedMesh, ".terrain", /*is_mercator=*/false, QuantizedMeshType, QuantizedMeshVary,
-     ReadQuantizedMesh},
-    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, GlbType, GlbVary, ReadGlb},
-    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng},
+     ReadQuantizedMesh, &kTerrainTileOperation},
+    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, GlbType, GlbVary, ReadGlb, &kGlbTileOperation},
+    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng,
+     &kHeightTileOperation},
 };
 
 // If `repeatable`, a parameter may be repeated with the same value.
@@ -283,6 +285,8 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
   }
   return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
+
+std::span<const TileFormat> TileFormats() { return kFormats; }
 
 const TileFormat* CutSuffix(std::string_view& name) {
   for (const TileFormat& row : kFormats) {

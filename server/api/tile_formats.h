@@ -56,7 +56,11 @@ struct TileFormat {
   // dataset has no such tile. kInvalidArgument: see ParseTileParameters and ParseHeightTileParameters.
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                        tiler::TileRequest& tile);
+  const Operation* operation = nullptr;  // what /openapi.json says about its URLs
 };
+
+// All formats.
+std::span<const TileFormat> TileFormats();
 
 // Removes the suffix of a tile's URL from its last segment, and returns the row of the format; null if no suffix
 // matches.
