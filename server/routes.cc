@@ -245,7 +245,7 @@ DocumentAnswer DescribeUrls(const Handlers&, const RequestContext& context) {
 }  // namespace
 
 std::vector<DocumentedUrl> DocumentedUrls() {
-  constexpr std::string_view kSuffix = ".{suffix}";
+  constexpr std::string_view kSuffix = ".{suffix}", kMore = "...";
   std::vector<DocumentedUrl> urls;
   for (const RouteRow& row : kRows) {
     DocumentedUrl url{.pattern = std::string(row.pattern),
@@ -254,6 +254,7 @@ std::vector<DocumentedUrl> DocumentedUrls() {
                       .takes_any_query = row.takes_any_query,
                       .is_probe = row.is_probe,
                       .needs_grant = row.scope != DatasetScope::kNothing};
+    if (row.pattern.ends_with(kMore)) url.pattern.resize(url.pattern.size() - kMore.size());
     if (!row.pattern.ends_with(kSuffix)) {
       urls.push_back(std::move(url));
       continue;

@@ -47,7 +47,7 @@ for name in passwd group nsswitch.conf os-release debian_version; do cp -aL "/et
 # Packages own files below /lib or /usr/lib, which are one folder.
 for path in "${files[@]}"; do
   for name in "$path" "/usr$path" "${path#/usr}"; do
-    package=$(dpkg-query -S "$name" 2> /dev/null | head -n 1 | sed 's/[:,].*//') || true
+    package=$(dpkg-query -S "$name" 2> /dev/null | grep -v '^diversion' | head -n 1 | sed 's/[:,].*//') || true
     [[ -z $package ]] || { packages+=("$package"); break; }
   done
 done

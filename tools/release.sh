@@ -2,24 +2,25 @@
 # Builds the files of a release from one commit, in a copy of it: the source, the Debian package, the recipe of the image, the bill of
 # materials and the sums.
 #
-#   tools/release.sh [--commit COMMIT] [--out FOLDER] [--work FOLDER] [--ccache]
+#   tools/release.sh [--commit COMMIT] [--out FOLDER] [--work FOLDER] [--rehearsal]
 #
 # COMMIT is HEAD by default, FOLDER build/release-files. --work keeps the copy and its build there. Two runs of one commit on one
 # Debian 12 give the same bytes, wherever they work: time stamps are those of the commit, and the compiler replaces the folder's
-# name. Without --ccache everything is compiled anew. Needs tools/install_deps.sh --test.
+# name. --rehearsal takes objects from ccache, so it is fast, but its program contains
+# the names of folders. Needs tools/install_deps.sh --test.
 set -euo pipefail
 export LC_ALL=C.UTF-8 TZ=UTC
 umask 022
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
-commit=HEAD out=$root/build/release-files work="" launcher=(-DTERRACE_CCACHE=)
+commit=HEAD out=$root/build/release-files work="" launcher=(-DTERRACE_CCACHE=) rehearsal=false
 die() { echo "release: $*" >&2; exit 1; }
 while [[ $# -gt 0 ]]; do
   case $1 in
     --commit) commit=$2; shift 2 ;;
     --out) out=$(realpath -m "$2"); shift 2 ;;
     --work) work=$(realpath -m "$2"); shift 2 ;;
-    --ccache) launcher=(); shift ;;
-    *) echo "release: unknown option '$1'; it takes --commit, --out, --work and --ccache" >&2; exit 2 ;;
+    --rehearsal) launcher=() rehearsal=true; shift ;;
+    *) echo "release: unknown option '$1'; it takes --commit, --out, --work and --rehearsal" >&2; exit 2 ;;
   esac
 done
 [[ -d $root/.deps/boost && -d $root/server/viewer/node_modules ]] || die ".deps or the viewer's modules are missing; run tools/install_deps.sh"
@@ -48,8 +49,10 @@ cp -al "$root/.deps" "$tree/.deps" 2> /dev/null || cp -a "$root/.deps" "$tree/.d
 cp -al "$root/server/viewer/node_modules" "$tree/server/viewer/node_modules" 2> /dev/null ||
   cp -a "$root/server/viewer/node_modules" "$tree/server/viewer/node_modules"
 
+flags=("-ffile-prefix-map=$tree=." -Werror=date-time)
+$rehearsal && flags=()
 cmake -S "$tree" --preset release -DTERRACE_BUILD_TESTS=OFF "${launcher[@]}" --log-level=WARNING \
-  -DCMAKE_CXX_FLAGS="-ffile-prefix-map=$tree=. -Werror=date-time" > "$work/configure.log"
+  -DCMAKE_CXX_FLAGS="${flags[*]}" > "$work/configure.log"
 cmake --build "$tree/build/release" -j "${JOBS:-$(nproc)}" > "$work/build.log" || { tail -n 30 "$work/build.log" >&2; exit 1; }
 stated=$("$tree/build/release/server/cli/terrace" --version)
 [[ $stated == "terrace $version" ]] || die "the program says '$stated', CMakeLists.txt says $version"

@@ -285,8 +285,7 @@ std::string WriteOpenApi(const std::vector<DocumentedUrl>& urls) {
   for (const TagNote& tag : TagNotes()) {
     document["tags"].push_back({{"name", tag.name}, {"description", tag.meaning}});
   }
-  for (DocumentedUrl url : urls) {
-    if (url.pattern.ends_with("...")) url.pattern.resize(url.pattern.size() - 3);
+  for (const DocumentedUrl& url : urls) {
     Json& path = document["paths"][url.pattern];
     path["get"] = OperationOf(url, /*is_post=*/false);
     if (url.takes_post && url.operation != nullptr) path["post"] = OperationOf(url, /*is_post=*/true);

@@ -13,7 +13,7 @@ namespace terrace::server {
 
 // A URL to describe.
 struct DocumentedUrl {
-  std::string pattern;                   // "/{dataset}/{z}/{x}/{y}.terrain"; "..." at its end: more segments
+  std::string pattern;                   // "/{dataset}/{z}/{x}/{y}.terrain"
   const Operation* operation = nullptr;  // null: only its pattern is known
   bool takes_post = false;
   bool takes_any_query = false;

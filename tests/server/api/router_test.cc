@@ -1,8 +1,11 @@
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
+#include <string_view>
 
 #include "server/routes.h"
+#include "server/telemetry/redact.h"
 
 namespace terrace::server {
 namespace {
