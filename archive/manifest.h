@@ -51,7 +51,7 @@ struct BakedDataset {
 };
 
 struct Manifest {
-  std::string product;  // "terrace 0.1.0"
+  std::string product;  // "terrace 1.0.0"
   std::string encoder;  // tiler::EncoderText()
   BakedDataset dataset;
   // What every tile was asked for as: format, coding, extensions, compression, texture, encoding. Its dataset, key and

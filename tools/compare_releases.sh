@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# Builds the release twice in two folders of different names, and compares the files byte by byte: about
-# an hour of processor time.
+# Builds the release twice in two folders of different names, and compares the files byte by byte.
 #
 #   tools/compare_releases.sh
 set -euo pipefail

@@ -59,8 +59,10 @@ constexpr ParameterNote kGridParameters[] = {
     {"format",
      "`f32`, the default: 32-bit floats. `r16`, `png16`: 16-bit integers. `geotiff`: 32-bit floats. `json`: the grid's "
      "description alone.",
-     R"({"type":"string","enum":["f32","r16","png16","json"]})"},
+     R"({"type":"string","enum":["f32","r16","png16","geotiff","json"]})"},
     kDatumNote,
+    {"range", "`min,max`, with `r16`, `png16` and `json`: the heights of 0 and 65535 in metres.",
+     R"({"type":"string"})"},
     kSurfaceNote,
     kSurfaceLevelNote,
     kErrorNote,
@@ -68,7 +70,7 @@ constexpr ParameterNote kGridParameters[] = {
     kAtLeastNote,
 };
 constexpr MediaNote kGridReplies[] = {
-    {"application/octet-stream"}, {"application/json", "Grid"}, {"image/png"}, {"image/jpeg"}};
+    {"application/octet-stream"}, {"application/json", "Grid"}, {"image/png"}, {"image/tiff; application=geotiff"}};
 constexpr ExampleRequest kGridExamples[] = {
     {"/jacksboro/grid?bbox=-84.3,36.2,-84.2,36.3&width=5&height=5&format=json"},
     {"/jacksboro/grid?bbox=-84.3,36.2,-84.2,36.3&width=5&height=5&format=r16&range=0,2000"},
