@@ -6,10 +6,9 @@
 #
 # COMMIT is HEAD by default, FOLDER build/release-files. --work keeps the copy and its build there. Two runs of one commit on one
 # Debian 12 give the same bytes, wherever they work: time stamps are those of the commit, and the compiler replaces the folder's
-# name. --rehearsal takes objects from ccache, so it is fast, but its program contains
-# the names of folders. Needs tools/install_deps.sh --test.
+# name. --rehearsal takes objects from ccache, so it is fast, but its program contains the names of folders. Needs
+# tools/install_deps.sh --test.
 set -euo pipefail
-export LC_ALL=C.UTF-8 TZ=UTC
 umask 022
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 commit=HEAD out=$root/build/release-files work="" launcher=(-DTERRACE_CCACHE=) rehearsal=false
@@ -29,8 +28,6 @@ done
 version=$(git -C "$root" show "$commit:CMakeLists.txt" | sed -n 's/^project(terrace VERSION \([0-9.]*\).*/\1/p')
 [[ -n $version ]] || die "CMakeLists.txt of $commit states no version"
 git -C "$root" show "$commit:CHANGELOG.md" | grep -q "^## \[$version\]" || die "CHANGELOG.md of $commit has no section [$version]"
-SOURCE_DATE_EPOCH=$(git -C "$root" log -1 --format=%ct "$commit")
-export SOURCE_DATE_EPOCH
 if [[ -z $work ]]; then
   work=$(mktemp -d)
   trap 'rm -rf "$work"' EXIT
@@ -54,6 +51,9 @@ $rehearsal && flags=()
 cmake -S "$tree" --preset release -DTERRACE_BUILD_TESTS=OFF "${launcher[@]}" --log-level=WARNING \
   -DCMAKE_CXX_FLAGS="${flags[*]}" > "$work/configure.log"
 cmake --build "$tree/build/release" -j "${JOBS:-$(nproc)}" > "$work/build.log" || { tail -n 30 "$work/build.log" >&2; exit 1; }
+# After the build: ccache would take them for part of what it compiles, and they do not change objects.
+SOURCE_DATE_EPOCH=$(git -C "$root" log -1 --format=%ct "$commit")
+export SOURCE_DATE_EPOCH LC_ALL=C.UTF-8 TZ=UTC
 stated=$("$tree/build/release/server/cli/terrace" --version)
 [[ $stated == "terrace $version" ]] || die "the program says '$stated', CMakeLists.txt says $version"
 "$tree/packaging/build_deb.sh" "$tree/build/release" "$work/deb" > /dev/null
