@@ -24,7 +24,7 @@ struct ArchivedTile {
 
 class Archive {
  public:
-  // Of one archive, at a time.
+  // The largest number of files that one archive keeps open.
   static constexpr std::size_t kMaxOpenFiles = 32;
 
   // `place`: a folder with a manifest, or a file written by WriteSingle; also /vsis3/... where the source policy allows
@@ -45,8 +45,8 @@ class Archive {
   // The range of a tile; nothing as Find, also for errors.
   virtual std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const = 0;
 
-  // Calls `take` for each tile until it fails: unit by unit, in a unit as its file has them. Reads and checks every
-  // byte. Errors: those of `take` and of Find.
+  // Calls `take` for each tile, unit by unit, in the order of each unit's file. Ends when `take` fails. Reads and
+  // checks every byte. Errors: those of `take` and of Find.
   using TakeTile = std::function<Result<void>(const geo::TileKey& key, ArchivedTile tile)>;
   virtual Result<void> ForEach(const TakeTile& take) const = 0;
 };

@@ -64,6 +64,8 @@ std::string SingleMetadata(const Manifest& manifest) {
       json["scheme"] = "tms";
       json["projection"] = "EPSG:4326";
       break;
+    default:  // archives have no others
+      break;
   }
   json["format"] = FormatName(manifest.kind.format);
   json["media_type"] = MediaTypeOf(manifest.kind.format);

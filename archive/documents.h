@@ -1,4 +1,4 @@
-// The documents of archives that are read without a server: what an archive holds, in the words of other programs.
+// The documents that describe an archive to programs that read it without a server.
 #pragma once
 
 #include <string>

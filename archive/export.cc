@@ -28,9 +28,9 @@ dem::GeoBounds HeaderBounds(const Manifest& manifest) {
     bounds.east = 180;
   }
   const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
-  const double most = is_mercator ? geo::kMercatorLatitude : 90;
-  bounds.south = std::clamp(bounds.south, -most, most);
-  bounds.north = std::clamp(bounds.north, -most, most);
+  const double max_latitude = is_mercator ? geo::kMercatorLatitude : 90;
+  bounds.south = std::clamp(bounds.south, -max_latitude, max_latitude);
+  bounds.north = std::clamp(bounds.north, -max_latitude, max_latitude);
   return bounds;
 }
 
@@ -62,8 +62,9 @@ class PartialFolder {
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const std::string& partial() const { return partial_; }
-  // The files were written without fsync, one by one it would take as long as the bake. All of them reach the disk
-  // before the folder has its name, and the name before the caller removes what the folder was made from.
+  // The files were written without fsync, which takes as long for all of them as the bake. Here the files reach the
+  // disk before the folder gets its name, and the name reaches it before the caller removes what the folder was made
+  // from.
   Result<void> Finish() {
     if (Result<void> synced = Sync(partial_, ::syncfs); !synced) return synced;
     std::error_code error;
@@ -79,7 +80,7 @@ class PartialFolder {
     const bool is_synced = descriptor >= 0 && sync(descriptor) == 0;
     const int reason = errno;
     if (descriptor >= 0) ::close(descriptor);
-    // Some file systems do not allow fsync of folders, and need it not.
+    // Some file systems do not allow fsync of folders, and do not need it.
     if (is_synced || (sync == ::fsync && reason == EINVAL)) return {};
     return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", folder,
                      std::generic_category().message(reason));

@@ -46,7 +46,8 @@ struct BakedDataset {
   double floor_m = 0;
   bool has_datum = true;
   int metadata_levels = 0;
-  int max_level = 0;  // of the dataset, also where the archive ends above it
+  int max_level = 0;     // of the dataset, also where the archive ends above it
+  int finest_level = 0;  // without edits (dem::DemSource::finest_level)
   std::uint64_t sources = 1;
 };
 
@@ -54,7 +55,7 @@ struct Manifest {
   std::string product;  // "terrace 1.0.0"
   std::string encoder;  // tiler::EncoderText()
   BakedDataset dataset;
-  // What every tile was asked for as: format, coding, extensions, compression, texture, encoding. Its dataset, key and
+  // The request of every tile: format, coding, extensions, compression, texture, encoding. Its dataset, key and
   // error_step are not used. Its `metadata` is true if tiles that carry metadata have it.
   tiler::TileRequest kind;
   std::vector<int> error_steps;  // by level, 0 .. max_level; empty: 0 at each level
@@ -66,7 +67,7 @@ struct Manifest {
   std::vector<UnitEntry> units;
 };
 
-// Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels roots a further unit.
+// Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels is the root of a further unit.
 inline constexpr int kTopLevels = 7;
 
 // The formats in the order of their folders, and the folders' names.

@@ -94,7 +94,7 @@ constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
 Json DatasetJson(const BakedDataset& dataset) {
   const auto& [name, attribution, generation, error_fraction, glb_compression, bounds, heights, floor_m, has_datum,
-               metadata_levels, max_level, sources] = dataset;
+               metadata_levels, max_level, finest_level, sources] = dataset;
   Json json;
   json["name"] = name;
   json["attribution"] = attribution;
@@ -108,6 +108,7 @@ Json DatasetJson(const BakedDataset& dataset) {
   json["has_datum"] = has_datum;
   json["metadata_levels"] = metadata_levels;
   json["max_level"] = max_level;
+  if (finest_level != max_level) json["finest_level"] = finest_level;
   json["sources"] = sources;
   return json;
 }
@@ -127,6 +128,8 @@ BakedDataset ReadDataset(const Json& json) {
   dataset.has_datum = json.at("has_datum").get<bool>();
   dataset.metadata_levels = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
   dataset.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
+  dataset.finest_level =
+      json.contains("finest_level") ? WholeOf<int>(json.at("finest_level"), 0, dataset.max_level) : dataset.max_level;
   dataset.sources = WholeOf<std::uint64_t>(json.at("sources"), 0, kAnyCount);
   return dataset;
 }
@@ -134,8 +137,9 @@ BakedDataset ReadDataset(const Json& json) {
 Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_steps) {
   // All members are named, so that a new one fails to compile until it is added here.
   const auto& [dataset, key, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, height_size] = kind;
+               height_encoding, height_size, map] = kind;
   static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
+  static_cast<void>(map);  // archives have no tiles for maps
   Json json;
   json["format"] = NameOf(kFormats, format);
   json["coding"] = NameOf(kCodings, coding);

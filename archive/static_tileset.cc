@@ -19,7 +19,7 @@ namespace {
 
 using proto::TreeRoot;
 
-// As the server's tree of a dataset that is this archive alone.
+// The same tree that a server makes of a dataset that has this archive and no sources.
 tiler::TileTree TreeOf(const Archive& archive) {
   const Manifest& manifest = archive.manifest();
   const BakedDataset& dataset = manifest.dataset;
@@ -30,7 +30,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           manifest.available,
           dataset.bounds,
           dataset.error_fraction,
-          dataset.max_level,
+          dataset.finest_level,
           [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all); },
           [&manifest](int level) {
             const auto at = static_cast<std::size_t>(level);
@@ -38,7 +38,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           }};
 }
 
-// Where tiles lie in the trees.
+// The paths of tiles in the trees.
 class Paths {
  public:
   explicit Paths(const std::vector<TreeRoot>& roots) {
@@ -66,8 +66,24 @@ class Paths {
     for (const TreeRoot& root : tree.below) Add(root);
   }
 
-  std::map<Key, int> trees_;  // levels; of a named tile 1
+  std::map<Key, int> trees_;  // by root: the number of levels; 1 if there are further roots below it
 };
+
+// Calls `take` for the subtrees whose roots are the tiles of `block`. `level`: that of the tiles, in the tree.
+// `levels`: of each subtree.
+Result<void> TakeSubtreesOf(const geo::TileRange& block, int level, int levels, const tiler::TileTree& tiles,
+                            const TreeRoot& tree, const TakeFile& take, const std::stop_token& stop) {
+  for (std::int64_t y = block.start_y; y <= block.end_y; ++y) {
+    for (std::int64_t x = block.start_x; x <= block.end_x; ++x) {
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
+      const std::string path =
+          fmt::format("3dtiles/{}/{}/{}/{}.{}.subtree", proto::RootName(tree.tile), level, x, y, levels);
+      const std::string subtree = tiler::SubtreeOf(tiles, proto::TileUnder(tree.tile, level, x, y), levels);
+      if (Result<void> taken = take(path, subtree, /*is_gzip=*/false); !taken) return taken;
+    }
+  }
+  return {};
+}
 
 Result<void> TakeSubtrees(const tiler::TileTree& tiles, const TreeRoot& tree, const TakeFile& take,
                           const std::stop_token& stop) {
@@ -79,15 +95,7 @@ Result<void> TakeSubtrees(const tiler::TileTree& tiles, const TreeRoot& tree, co
   for (int level = 0; level < tree.levels; level += levels) {
     const auto blocks = proto::BlocksBelow(tiles.available, tree.tile, level);
     for (const geo::TileRange& block : blocks.back()) {
-      for (std::int64_t y = block.start_y; y <= block.end_y; ++y) {
-        for (std::int64_t x = block.start_x; x <= block.end_x; ++x) {
-          if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
-          const std::string path =
-              fmt::format("3dtiles/{}/{}/{}/{}.{}.subtree", proto::RootName(tree.tile), level, x, y, levels);
-          const std::string subtree = tiler::SubtreeOf(tiles, proto::TileUnder(tree.tile, level, x, y), levels);
-          if (Result<void> taken = take(path, subtree, /*is_gzip=*/false); !taken) return taken;
-        }
-      }
+      if (Result<void> taken = TakeSubtreesOf(block, level, levels, tiles, tree, take, stop); !taken) return taken;
     }
   }
   return {};

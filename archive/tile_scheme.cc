@@ -56,6 +56,8 @@ std::string_view FormatName(tiler::TileFormat format) {
       return "glb";
     case tiler::TileFormat::kHeightPng:
       return "png";
+    default:  // archives have no others
+      break;
   }
   return "";
 }
@@ -68,6 +70,8 @@ std::string_view MediaTypeOf(tiler::TileFormat format) {
       return "model/gltf-binary";
     case tiler::TileFormat::kHeightPng:
       return "image/png";
+    default:  // archives have no others
+      break;
   }
   return "";
 }

@@ -51,8 +51,8 @@ Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const s
                                                const UnitOptions& options);
 
 // Reads a finished file in full: every checksum, whether its tiles belong to the unit, and whether header and metadata
-// are those that a writer with these options writes. For going on with a bake. kNotFound: no file. kInvalidArgument:
-// another bake's, or damaged: bake it again.
+// are those that a writer with these options writes. A bake that continues uses it. kNotFound: no file.
+// kInvalidArgument: the file is of another bake, or damaged: bake the unit again.
 Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
 
 }  // namespace terrace::archive

@@ -36,7 +36,7 @@ class OpenUnit {
   std::size_t index = 0;  // in the plan
   std::vector<Output> outputs;
   Clock::time_point start = Clock::now();
-  // Of the scheduler's mutex.
+  // Guarded by Run::mutex_.
   std::deque<Part> parts;  // not begun
   int under_way = 0;       // parts
   std::optional<Error> error;
@@ -55,7 +55,7 @@ class Run {
         counters_(counters),
         reports_(plan.units.size()) {}
 
-  std::vector<UnitReport> Do() {
+  std::vector<UnitReport> Execute() {
     {
       const std::stop_callback wake(options_.stop, [this] {
         const std::lock_guard lock(mutex_);
@@ -95,7 +95,7 @@ class Run {
       }
       if (!unit) {
         if (taken.state == UnitQueue::Taken::State::kOver && open_.empty()) return;
-        // A unit may come back from other processes as well, which notify no one here.
+        // A shared queue may hand out units again that other processes gave back; nothing notifies this one.
         constexpr std::chrono::milliseconds kPause{200};
         changed_.wait_for(lock, kPause);
         continue;
@@ -173,7 +173,7 @@ class Run {
     return unit;
   }
 
-  // Disks that are full and file servers that are away may come back.
+  // A full disk or an unreachable file server may recover.
   void WaitBefore(int attempt) {
     if (attempt == 0) return;
     constexpr std::chrono::milliseconds kPause{500};
@@ -275,7 +275,7 @@ class Run {
     }
   }
 
-  // A unit that is handed out anew is done from the beginning, whatever became of it before.
+  // Forgets the reports of an earlier attempt: a unit that is handed out anew is done from the beginning.
   void Forget(std::size_t index) {
     const std::lock_guard lock(mutex_);
     counters_.units -= reports_[index].size();
@@ -353,7 +353,7 @@ std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vec
 
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                              const UnitPlan& plan, UnitQueue& queue, const BakeOptions& options, Counters& counters) {
-  return Run(pipeline, targets, plan, queue, options, counters).Do();
+  return Run(pipeline, targets, plan, queue, options, counters).Execute();
 }
 
 }  // namespace terrace::bake

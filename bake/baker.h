@@ -33,7 +33,7 @@ struct Target {
   std::function<bool(const tiler::TileRequest&)> has = {};
 };
 
-// One process of several that share a bake.
+// The share of one process in a bake that several processes divide.
 struct Shard {
   std::uint32_t index = 0, count = 1;
 
@@ -46,7 +46,7 @@ enum class UnitOutcome : std::uint8_t {
   kKept,    // its file was there already
   kCopied,  // taken from the old archive
   kFailed,
-  kMissing,  // not there, and not to be baked
+  kMissing,  // not there (only_verify)
 };
 
 // A unit of one archive, done or given up.
@@ -58,12 +58,13 @@ struct UnitReport {
   std::string message;  // of a failed unit: why
 };
 
-// What is done so far, for a display. Of all archives.
+// The progress over all archives, for displays.
 struct Counters {
-  std::atomic<std::uint64_t> tiles{0};   // built by this process
-  std::atomic<std::uint64_t> bytes{0};   // of these tiles
-  std::atomic<std::uint64_t> passed{0};  // tiles of units that were kept or copied
-  std::atomic<std::uint64_t> units{0};   // done or given up
+  std::atomic<std::uint64_t> tiles{0};  // built by this process
+  std::atomic<std::uint64_t> bytes{0};  // of these tiles
+  std::atomic<std::uint64_t> passed{
+      0};  // not built: of units that were kept or copied, or because `Target::has` has them
+  std::atomic<std::uint64_t> units{0};  // done or given up
   // Microseconds of all threads, by stage.
   std::atomic<std::uint64_t> read{0}, refine{0}, encode{0}, compress{0};
 };
@@ -76,8 +77,8 @@ struct BakeOptions {
   std::stop_token stop = {};
 };
 
-// Units by the trees that they share: formats with the same scheme and tiles are baked together, so that each tile is
-// read and refined once.
+// The units to bake. Formats with the same scheme and tiles share their units and are baked together, so that each tile
+// is read and refined once.
 struct UnitPlan {
   struct Of {
     Unit unit;
@@ -89,13 +90,13 @@ struct UnitPlan {
   static UnitPlan Make(const std::vector<Target>& targets, const Shard& shard);
 };
 
-// Bakes every unit that is not there yet. A unit that fails is tried again later, and given up after the third time;
-// the others are baked. Returns the reports in the order of the plan. Stopped: the units that were not finished leave
-// no files and have no reports. The files do not depend on the number of threads, nor on interruptions.
+// Bakes every unit that is not there yet. A unit that fails is tried again later, and is given up after three failures;
+// the others are baked nevertheless. Returns the reports in the order of the plan. After a stop, unfinished units have
+// neither files nor reports. The files do not depend on the number of threads or on interruptions.
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                              const UnitPlan& plan, const BakeOptions& options, Counters& counters);
 
-// The same with the units that `queue` hands out: its units are those of the plan. Returns when it is over.
+// The same with the units that `queue` hands out, which are units of the plan. Returns when the queue says kOver.
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                              const UnitPlan& plan, UnitQueue& queue, const BakeOptions& options, Counters& counters);
 

@@ -1,4 +1,4 @@
-// A catalogue of one-degree cells, for planning a bake of sources that are not here.
+// A list of one-degree cells, for planning a bake before its sources are downloaded.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace terrace::bake {
 // The tiles of a mosaic of the cells that a text lists, one a line: "N46E008" is the cell whose south-western corner
 // lies at 46 degrees north, 8 degrees east. Cells have samples of `arc_seconds` from south to north; from west to east
 // they have those of the Copernicus DEM: the same below 50 degrees of latitude, 1.5 times that to 60, then 2, 3, 5 and
-// 10 times. kInvalidArgument: no such list; the message names the line.
+// 10 times. kInvalidArgument: another line, or none; the message names it.
 Result<Pyramid> PlanCatalogue(std::string_view text, double arc_seconds, double error_fraction);
 
 }  // namespace terrace::bake

@@ -9,9 +9,10 @@
 
 namespace terrace::bake {
 
-// Copies a unit's file from one archive's folder to another's, by rename, if it is the file that `entry`, of the old
-// archive's manifest, describes. kNotFound, kInvalidArgument: the old file is missing or another one: bake the unit.
-// kUnavailable: the old file cannot be read, or the new place cannot be written.
+// Copies a unit's file from one archive's folder to another's, if it is the file that `entry`, of the old archive's
+// manifest, describes. The new file appears when it is complete. kNotFound: the old file is missing. kInvalidArgument:
+// it is another file. In both cases bake the unit. kUnavailable: the old file cannot be read, or the new place cannot
+// be written.
 Result<archive::UnitSummary> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry);
 
 }  // namespace terrace::bake

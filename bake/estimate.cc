@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kMillisecondsPerHour = 3600e3;
 
-// The tile at a position of the list of all tiles of a level.
+// The tile with number `at`, from 0, in the list of all tiles of a level.
 geo::TileKey TileAt(const std::vector<geo::TileRange>& ranges, int level, std::uint64_t at) {
   for (const geo::TileRange& range : ranges) {
     const auto cells = static_cast<std::uint64_t>(geo::Cells(range));
@@ -47,7 +47,7 @@ std::vector<geo::TileKey> SamplesOf(const std::vector<geo::TileRange>& ranges, i
   return samples;
 }
 
-// Units of one tile exist so that parents have four children.
+// Units of a single tile exist only so that parents have four children.
 bool ReachesDown(const Unit& unit) { return !unit.root || CountTiles(unit.tiles) > 1; }
 
 Estimate Sum(std::vector<LevelEstimate> levels) {

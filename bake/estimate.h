@@ -1,4 +1,4 @@
-// What a bake will take, from a few tiles of its own.
+// The size and time of a bake, estimated from a few of its tiles.
 #pragma once
 
 #include <cstdint>
@@ -23,8 +23,8 @@ struct LevelEstimate {
 struct Estimate {
   std::vector<LevelEstimate> levels;
   std::uint64_t tiles = 0, files = 0;
-  std::uint64_t subtrees = 0;  // of these the top and those that reach below their first level
-  std::uint64_t sampled = 0;   // tiles that were built for it
+  std::uint64_t subtrees = 0;  // files without those of a single tile
+  std::uint64_t sampled = 0;   // tiles that were built for the estimate
   double bytes = 0, core_hours = 0;
 };
 
@@ -32,7 +32,7 @@ struct Estimate {
 Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                               const UnitPlan& plan, const std::stop_token& stop);
 
-// From figures that are the same for every tile.
+// From assumed sizes and times, the same for every tile.
 Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double milliseconds_per_tile);
 
 }  // namespace terrace::bake

@@ -8,8 +8,8 @@
 
 namespace terrace::bake {
 
-// The indexes of the units of the plan of which a file is absent or has another key. Reads the keys in the files, not
-// the tiles: what is damaged is found when the bake is finished.
+// The indexes of the units of the plan of which a file is absent or has another key. Reads the keys in the files, but
+// not the tiles: damaged tiles are found when the bake is finished.
 std::vector<std::size_t> FindMissing(const tiler::Dataset& dataset, const std::vector<Target>& targets,
                                      const UnitPlan& plan);
 

@@ -19,7 +19,7 @@ namespace {
 
 using Ranges = std::vector<geo::TileRange>;
 
-// All four children of each parent.
+// Extends ranges to all four children of each parent.
 Ranges WithSiblings(Ranges ranges) {
   for (geo::TileRange& range : ranges) {
     range = {range.start_x & ~std::int64_t{1}, range.start_y & ~std::int64_t{1}, range.end_x | 1, range.end_y | 1};
@@ -61,7 +61,7 @@ Ranges HeightTiles(const dem::GeoBounds& bounds, int level) {
   return geo::Disjoint({columns(bounds.west, 180), columns(-180, bounds.east)});
 }
 
-std::string Count(int levels) { return levels == 0 ? "level 0 only" : fmt::format("levels 0 to {}", levels); }
+std::string LevelsTo(int deepest) { return deepest == 0 ? "level 0 only" : fmt::format("levels 0 to {}", deepest); }
 
 Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& order, tiler::TileFormat format) {
   tiler::TileRequest kind;
@@ -101,6 +101,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& or
       if (order.compress && kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
       break;
     case tiler::TileFormat::kHeightPng:
+    default:  // archives have no others
       break;
   }
   return kind;
@@ -120,6 +121,7 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.has_datum = dataset.source->has_datum();
   baked.metadata_levels = dataset.metadata_levels;
   baked.max_level = info.max_level;
+  baked.finest_level = info.finest_level;
   baked.sources = info.sources.size();
   return baked;
 }
@@ -170,7 +172,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     const auto [first, last] = order.levels.value_or(std::pair(0, deepest));
     if (last > deepest) {
       return MakeError(ErrorCode::kInvalidArgument, "--levels {}-{}: dataset {} has {} of {} tiles", first, last,
-                       dataset.name, Count(deepest), archive::FolderOf(format));
+                       dataset.name, LevelsTo(deepest), archive::FolderOf(format));
     }
     if (first > 0 && !is_mercator) {
       return MakeError(ErrorCode::kInvalidArgument,
@@ -194,7 +196,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
       manifest.error_steps.push_back(
-          tiler::ErrorStep(order.requested, level, level == source.max_level(), dataset.error_fraction));
+          tiler::ErrorStep(order.requested, level, level >= source.finest_level(), dataset.error_fraction));
     }
   }
   return manifests;

@@ -27,8 +27,7 @@ struct Order {
 };
 
 // The manifests of the archives, one for each format, without units. `product`: name and version of the program.
-// kInvalidArgument: levels that the dataset does not have, an empty area, extensions that it does not have; the message
-// names what would be right.
+// kInvalidArgument: the dataset does not have the levels, the area or the extensions; the message names valid ones.
 Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const Order& order,
                                                     const std::string& product);
 
@@ -36,7 +35,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
 std::vector<std::vector<geo::TileRange>> TilesWithin(const std::vector<std::vector<geo::TileRange>>& available,
                                                      const dem::GeoBounds& bbox);
 
-// How one tile of an archive is asked for.
+// The request that builds one tile of an archive.
 tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileKey& key);
 
 }  // namespace terrace::bake

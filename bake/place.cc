@@ -42,7 +42,7 @@ std::string ReadText(const fs::path& file) {
 
 std::string WhyOf(int error) { return std::generic_category().message(error); }
 
-// When a process began, in the kernel's ticks: tells a process from a later one with the same number. Empty: unknown.
+// The start of a process in the kernel's ticks. It differs for a later process with the same number. Empty: unknown.
 std::string StartOf(long pid) {
   const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid));
   const std::size_t name_end = stat.rfind(')');
@@ -54,26 +54,26 @@ std::string StartOf(long pid) {
   return field;
 }
 
-// The name of a file of this process that becomes `file`.
+// The name of this process's temporary file, which is renamed to `file`.
 std::string OwnPartial(const std::string& file) {
   return fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
 }
 
-// Names the space of process numbers: those of a container are other than those of its host.
+// Identifies the namespace of process numbers: a container has its own.
 std::string NumberSpace() {
   std::error_code error;
   const std::string space = fs::read_symlink("/proc/self/ns/pid", error).string();
   return error ? "unknown" : space;
 }
 
-// The boot of the kernel.
+// Identifies the boot of the kernel.
 std::string BootOf() {
   std::string boot;
   std::istringstream(ReadText("/proc/sys/kernel/random/boot_id")) >> boot;
   return boot.empty() ? "unknown" : boot;
 }
 
-// The owner as the lock file has it: host, process, its start, boot, space of process numbers.
+// The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers.
 struct Owner {
   std::string host, pid, start, boot, space;
 
@@ -82,7 +82,7 @@ struct Owner {
     std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space;
     return owner;
   }
-  // Whether the process has surely ended. Of other hosts and of other containers nothing is known.
+  // Whether the process has certainly ended. Nothing is known about processes of other hosts and containers.
   bool HasEnded() const {
     if (host != HostName()) return false;
     if (boot != BootOf()) return true;
@@ -114,7 +114,8 @@ Result<void> MakeFolder(const std::string& place) {
   return {};
 }
 
-// Creates a file that does not exist yet, with its content at once, so that no one sees it empty. Returns errno.
+// Creates a file together with its content, so that no process reads it empty. Fails with EEXIST if it exists. Returns
+// errno.
 int CreateFile(const std::string& file, const std::string& content) {
   const std::string own = OwnPartial(file);
   {
@@ -146,15 +147,15 @@ int CreateLock(const std::string& file) {
 
 bool IsLock(const std::string& name) { return name.starts_with("bake") && name.ends_with(".lock"); }
 
-// A file that was not finished, of a lock, an identity, a manifest or a unit.
+// Whether it is an unfinished file of a lock, an identity, a manifest or a unit.
 bool IsPartial(const std::string& name) {
   const bool is_ours = name.starts_with("bake") || name.starts_with(archive::kManifestFile) ||
                        name.find(".pmtiles.") != std::string::npos;
   return is_ours && name.ends_with(".partial");
 }
 
-// A lock in `place` that excludes `own`, of a process that may be running; empty: none. The shards of one division
-// exclude all but one another.
+// A lock in `place` that excludes `own`, and whose process may be running; empty: none. Locks of one division into
+// shards do not exclude one another.
 std::string OtherLock(const std::string& place, const std::string& own) {
   const auto division = [](const std::string& name) {
     const std::size_t of = name.rfind("-of-");
@@ -169,7 +170,7 @@ std::string OtherLock(const std::string& place, const std::string& own) {
   return {};
 }
 
-// A file or folder of tiles.
+// Whether it is a file or folder of tiles.
 bool IsContent(const std::string& name) {
   return name == archive::UnitPath("top") || name == "units" ||
          std::ranges::any_of(archive::kFormatNames, [&](const auto& format) { return format.second == name; });
@@ -180,7 +181,7 @@ bool IsOurs(const std::string& name) {
          IsContent(name) || IsLock(name) || IsPartial(name);
 }
 
-// The differences between a noted identity and this one, as one sentence; empty: none.
+// The differences between a written identity and this one, as one sentence; empty: none.
 std::string Differences(const nlohmann::ordered_json& noted, const BakeIdentity& identity) {
   std::string text;
   for (const auto& [what, value] : identity.fields) {
@@ -245,7 +246,7 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
                        "{}: process {} on host {} is baking there; wait for it, or remove {} if that process has ended",
                        place, owner.pid, owner.host, file);
     }
-    // Another process may have taken it over meanwhile: only the lock that was read is removed.
+    // Removes the lock that was read, but not one with which another process has replaced it meanwhile.
     const std::string stale = OwnPartial(file);
     if (::rename(file.c_str(), stale.c_str()) != 0) continue;
     if (ReadText(stale) != text) ::link(stale.c_str(), file.c_str());
@@ -303,24 +304,49 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   return {};
 }
 
+namespace {
+
+// What processes that were killed have left: unfinished files, and the locks of those that have surely ended. A lock of
+// another host stays, since nobody here knows of its owner.
+void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
+  std::error_code ignored;
+  std::vector<fs::path> leftovers;
+  for (const fs::path& folder : folders) {
+    for (const fs::path& within : {folder, folder / "units"}) {
+      for (const auto& entry : fs::directory_iterator(within, ignored)) {
+        if (IsPartial(entry.path().filename().string())) leftovers.push_back(entry.path());
+      }
+    }
+  }
+  for (const auto& entry : fs::directory_iterator(place, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (IsLock(name) && Owner::Parse(ReadText(entry.path())).HasEnded()) leftovers.push_back(entry.path());
+  }
+  for (const fs::path& file : leftovers) fs::remove(file, ignored);
+}
+
+}  // namespace
+
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::error_code ignored;
+  std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
+    folders.push_back(folder);
     std::set<std::string> wanted;
     for (const archive::UnitEntry& unit : manifest.units) {
       if (unit.tiles > 0) wanted.insert(fs::path(archive::UnitPath(unit.name)).filename().string());
     }
-    std::vector<fs::path> leftovers;
+    std::vector<fs::path> unknown;
     for (const fs::path& within : {folder, folder / "units"}) {
       for (const auto& entry : fs::directory_iterator(within, ignored)) {
         const std::string name = entry.path().filename().string();
-        const bool is_unit = name.ends_with(".pmtiles");
-        if ((is_unit && !wanted.contains(name)) || IsPartial(name)) leftovers.push_back(entry.path());
+        if (name.ends_with(".pmtiles") && !wanted.contains(name)) unknown.push_back(entry.path());
       }
     }
-    for (const fs::path& file : leftovers) fs::remove(file, ignored);
+    for (const fs::path& file : unknown) fs::remove(file, ignored);
   }
+  RemoveLeftovers(place, folders);
   fs::remove(fs::path(place) / kPlaceIdFile, ignored);
   fs::remove(fs::path(place) / kIdentityFile, ignored);
 }
@@ -338,10 +364,12 @@ Result<std::string> PlaceId(const std::string& place) {
 
 bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::error_code ignored;
+  std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
-    const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
-    if (!fs::exists(folder / archive::kManifestFile, ignored)) return false;
+    folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
+    if (!fs::exists(folders.back() / archive::kManifestFile, ignored)) return false;
   }
+  RemoveLeftovers(place, folders);
   fs::remove(fs::path(place) / kPlaceIdFile, ignored);
   fs::remove(fs::path(place) / kIdentityFile, ignored);
   return true;

@@ -14,12 +14,12 @@ namespace terrace::bake {
 // The folder of an archive: the place itself if it is the only one, else archive::FolderOf below it.
 std::string ArchivePlace(const std::string& place, const archive::Manifest& manifest, bool is_only);
 
-// The place is for this process until the object is destroyed.
+// An exclusive lock on a place, held until the object is destroyed.
 class PlaceLock {
  public:
-  // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. kUnavailable: it cannot be
-  // created or written. kOverloaded: another bake works there; the message says which and what to do. The lock of a
-  // process of this host that has ended is taken over.
+  // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. Takes over the lock of a
+  // process of this host that has ended. kUnavailable: the folder cannot be created or written. kOverloaded: another
+  // bake works there; the message says which one and what to do.
   static Result<PlaceLock> Take(const std::string& place, const std::string& shard);
   PlaceLock(PlaceLock&& other) noexcept;
   PlaceLock& operator=(PlaceLock&&) = delete;
@@ -31,7 +31,7 @@ class PlaceLock {
   std::string file_;  // empty: moved away
 };
 
-// What a bake is of, as far as it must not change between its runs. Sources may: their units are made again.
+// The properties of a bake that must not change between its runs. Sources may change: their units are baked again.
 struct BakeIdentity {
   struct Field {
     std::string what, value;
@@ -39,15 +39,16 @@ struct BakeIdentity {
   std::vector<Field> fields;  // "dataset", "format", "levels" ...
 };
 
-// As Manifest::identity.
+// The text of Manifest::identity.
 std::string ToJson(const BakeIdentity& identity);
 
 // Whether the place can take this bake: it is empty, or holds a bake of the same identity, unfinished or, if it is of
-// this `generation`, finished. Notes the identity there. kInvalidArgument: it holds something else, or another bake;
+// this `generation`, finished. Writes the identity there. kInvalidArgument: it holds something else, or another bake;
 // the message says what differs and what to do. kUnavailable: it cannot be read or written.
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
 
-// Removes what only an unfinished bake needs: the identity, and leftovers of units that were interrupted.
+// Removes what only an unfinished bake needs: the identity, and what killed processes have left: unfinished files, and
+// locks of processes of this host that have ended.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.
@@ -55,15 +56,15 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 // A random number that is kept in the place until the bake is finished: workers that have the same one write into the
 // same place, wherever it is mounted. kUnavailable: the place cannot be written.
 Result<std::string> PlaceId(const std::string& place);
-// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted.
+// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted, and what killed
+// processes have left, as TidyPlace does.
 bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
 // Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
 // refused.
 void LeaveEmpty(const std::string& place, const std::string& own_lock);
-// The name of a worker's lock for PlaceLock::Take: the workers of one job exclude all but one another.
+// The name of a worker's lock for PlaceLock::Take. Locks of one job exclude other bakes, but not one another.
 std::string LockOfWorker(const std::string& worker, const std::string& job);
-// Removes the locks that workers of the job have left which were killed. The job is done: what still runs is not waited
-// for.
+// Removes the locks of the job's other workers. The job is done: they were killed, or what they still do is not needed.
 void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker);
 
 }  // namespace terrace::bake

@@ -11,7 +11,7 @@
 namespace terrace::bake {
 namespace {
 
-// A layout of the units' files or of this key that differs from an older one.
+// Raise it with every change of the layout of the units' files or of this key.
 constexpr int kKeyVersion = 1;
 
 void AddRanges(dem::ContentHasher& hasher, const std::vector<geo::TileRange>& ranges) {
@@ -35,7 +35,7 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
 void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source, const geo::TileKey& root) {
   const double tiles = static_cast<double>(std::int64_t{1} << root.level);
   const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / tiles; };
-  // A pixel more on each side, which interpolation may need.
+  // Interpolation may need one more pixel on each side.
   const double slack = 360 / tiles / 256;
   const dem::GeoBounds box{share(root.x) * 360 - 180, std::max(-90.0, geo::MercatorLatitude(share(root.y + 1)) - slack),
                            share(root.x + 1) * 360 - 180, std::min(90.0, geo::MercatorLatitude(share(root.y)) + slack)};
@@ -59,7 +59,9 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   hasher.AddText(manifest.encoder);
   hasher.Add(dataset.options);
   AddKind(hasher, manifest.kind);
-  const int last = static_cast<int>(unit.tiles.size()) - 1;
+  // Without the levels that edits added elsewhere.
+  int last = static_cast<int>(unit.tiles.size()) - 1;
+  while (last > source.finest_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
   for (int level = 0; level <= last; ++level) {
     const auto& ranges = unit.tiles[static_cast<std::size_t>(level)];
     AddRanges(hasher, ranges);
@@ -73,7 +75,8 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
     hasher.Add(source.ContentBelow(*unit.root, last));
     if (manifest.kind.metadata) {
       // Metadata lists the dataset's tiles below a tile.
-      for (int level = unit.root->level; level <= source.max_level(); ++level) {
+      const int deepest = static_cast<int>(source.AvailabilityBelow(*unit.root).size()) - 1;
+      for (int level = unit.root->level; level <= deepest; ++level) {
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;
         for (const geo::TileRange& range : source.Available(level)) {

@@ -1,5 +1,5 @@
-// The units of a bake: "top" with the shallow levels, and one subtree for each tile of level archive::kTopLevels. A
-// unit is what is baked, retried, skipped and replaced.
+// The units of a bake: "top" with the shallow levels, and one subtree for each tile of level archive::kTopLevels. Units
+// are baked, retried, skipped and replaced as a whole.
 #pragma once
 
 #include <cstdint>
@@ -15,7 +15,7 @@ namespace terrace::bake {
 // Tiles by level, from 0, as ranges without overlap. A pyramid may have no tiles on its first levels.
 using Pyramid = std::vector<std::vector<geo::TileRange>>;
 
-// Of all levels.
+// The number of tiles of all levels.
 std::uint64_t CountTiles(const Pyramid& pyramid);
 
 struct Unit {

@@ -153,6 +153,7 @@ inline constexpr std::string_view kDefaultCacheDir = "default";
 struct Config {
   ListenAddress listen{"127.0.0.1", 8080};
   std::optional<ListenAddress> admin_listen;  // of operators; nothing: none
+  unsigned admin_socket_mode = 0600;          // of its file, if it is a path
   std::vector<DatasetConfig> datasets;
   ViewerConfig viewer;
   std::string cache_control = "public, max-age=3600";

@@ -27,7 +27,7 @@ std::string CompressWith(Bound bound, Compress compress, std::string_view bytes,
     void operator()(libdeflate_compressor* compressor) const { libdeflate_free_compressor(compressor); }
   };
   const std::unique_ptr<libdeflate_compressor, Free> compressor(libdeflate_alloc_compressor(level));
-  if (compressor == nullptr) throw std::bad_alloc();  // levels are those that there are
+  if (compressor == nullptr) throw std::bad_alloc();  // the level is valid: only memory can be short
   std::string out(bound(compressor.get(), bytes.size()), '\0');
   const std::size_t size = compress(compressor.get(), bytes.data(), bytes.size(), out.data(), out.size());
   TERRACE_CHECK(size > 0);  // zero would mean that the bound was too small
@@ -52,7 +52,7 @@ std::string GzipByZlib(std::string_view bytes, int level, const std::stop_token&
   z_stream stream{};
   if (::deflateInit2(&stream, std::min(level, kMaxLevel), Z_DEFLATED, kGzipHeader + MAX_WBITS, kMemory,
                      Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw std::bad_alloc();  // levels are those that there are
+    throw std::bad_alloc();  // the level is valid: only memory can be short
   }
   const std::unique_ptr<z_stream, int (*)(z_stream*)> owner(&stream, ::deflateEnd);
   std::string out;

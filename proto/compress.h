@@ -1,4 +1,4 @@
-// Deterministic compression of response bodies and of what lies inside them.
+// Deterministic compression of response bodies and of streams inside them.
 //
 // Up to kCompressedAtOnce bytes are compressed in one call. Larger texts are compressed in parts of kCompressedAtOnce,
 // and the stop token is checked before each part. A function returns the empty text if a stop was requested.
@@ -28,13 +28,13 @@ std::string Gzip(std::string_view bytes, int level = kGzipLevel, const std::stop
 // larger than `max_bytes`. Accepts any bytes. Thread-safe.
 std::optional<std::string> Gunzip(std::string_view bytes, std::size_t max_bytes);
 
-// A member of gzip as what other formats hold: the deflated bytes, and the CRC-32 and length of what they decompress
-// to.
+// The parts of a gzip member that zip files store as well: the deflated bytes, and the CRC-32 and length of the
+// decompressed ones.
 struct GzipMember {
   std::string_view deflated;  // within the member
   std::uint32_t crc32 = 0, size = 0;
 };
-// Nothing: not what Gzip wrote. Does not decompress, and so does not check.
+// Nothing: not written by Gzip. Does not decompress the bytes, and therefore does not check them.
 std::optional<GzipMember> SplitGzip(std::string_view gzip);
 
 // CRC-32 as in gzip and zip. Thread-safe.

@@ -146,8 +146,8 @@ Result<Reply> Connection::Call(const Command& command) {
 }
 
 Error Connection::Refusal(const std::string& command, const ReplyView& error) const {
-  // The first word is the kind. The rest is text of the server, which may repeat arguments: only known kinds are
-  // explained, of others the first word is told.
+  // The first word is the kind. The rest may repeat arguments of the command, which messages must not contain: known
+  // kinds are explained, of others the message has the first word alone.
   const std::string_view text = error.text();
   const std::string_view kind = text.substr(0, text.find(' '));
   const auto starts = [&](std::string_view prefix) { return text.starts_with(prefix); };
@@ -159,6 +159,10 @@ Error Connection::Refusal(const std::string& command, const ReplyView& error) co
   }
   if (starts("ERR AUTH") || starts("ERR Client sent AUTH")) {
     return make(ErrorCode::kInvalidArgument, "has no password, but one was given; leave it out");
+  }
+  if (kind == "DENIED") {
+    return make(ErrorCode::kInvalidArgument,
+                "is in protected mode, and answers its own machine only; give it a password (requirepass)");
   }
   if (kind == "NOAUTH") return make(ErrorCode::kInvalidArgument, "wants a password; give one");
   if (kind == "NOPERM") {

@@ -30,10 +30,10 @@ struct ConnectionOptions {
 // The name and the arguments; bytes, not text.
 using Command = std::vector<std::string>;
 
-// Used by one thread at a time. No message contains user, password or an argument of a command.
+// Used by one thread at a time, but for Interrupt. No message contains user, password or an argument of a command.
 class Connection {
  public:
-  // Connects, authenticates, selects the database. kUnavailable: nobody answers there, or not as Redis does.
+  // Connects, authenticates, selects the database. kUnavailable: there is no server, or it is not a Redis.
   // kInvalidArgument: the password or the database is refused, or ca_file cannot be read.
   static Result<std::unique_ptr<Connection>> Open(const Address& address, const ConnectionOptions& options);
   Connection(const Connection&) = delete;
@@ -46,11 +46,16 @@ class Connection {
   Result<std::vector<Reply>> CallAll(std::span<const Command> commands);
   // A reply that is no error. Errors: as CallAll, and Refusal of the error.
   Result<Reply> Call(const Command& command);
-  // What to tell of an error reply to a command. kInvalidArgument: the password or the user's rights. kOverloaded:
-  // Redis is full. kUnavailable: it is loading, a read-only replica, or anything else.
+  // An error reply to a command as an Error. kInvalidArgument: the password or the user's rights. kOverloaded: Redis is
+  // full. kUnavailable: it is loading, a read-only replica, or anything else.
   Error Refusal(const std::string& command, const ReplyView& error) const;
 
   bool is_open() const { return is_open_; }
+  // Whether the server has closed the connection meanwhile. Of a connection that is silently gone nobody knows. Does
+  // not wait.
+  bool HasEnded() { return !is_open_ || socket_.HasEnded(); }
+  // From any thread: the call that is under way, and all later ones, fail at once with kUnavailable.
+  void Interrupt() const { socket_.Interrupt(); }
 
  private:
   Connection(Socket socket, const Address& address, const ConnectionOptions& options);

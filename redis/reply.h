@@ -10,8 +10,8 @@ struct redisReply;
 
 namespace terrace::redis {
 
-// A reply or an element of one, which must outlive it. Questions that do not fit the kind have empty answers, so that a
-// reply of an unexpected form is handled like one without content.
+// A view of a reply or of an element; the Reply must outlive it. Accessors that do not fit the kind return empty
+// values, so that a reply of an unexpected form is handled like one without content.
 class ReplyView {
  public:
   enum class Kind : std::uint8_t { kNil, kText, kInteger, kArray, kError };
@@ -34,7 +34,7 @@ class ReplyView {
 
 class Reply : public ReplyView {
  public:
-  // Takes it over.
+  // Takes ownership.
   explicit Reply(redisReply* reply) : ReplyView(reply), owned_(reply) {}
 
  private:

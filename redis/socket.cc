@@ -1,6 +1,5 @@
 #include "redis/socket.h"
 
-#include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <openssl/err.h>
@@ -13,8 +12,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <cstddef>
 #include <system_error>
 #include <utility>
+
+#include "redis/resolver.h"
 
 namespace terrace::redis {
 namespace {
@@ -22,6 +24,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 std::string WhyOf(int error) { return std::generic_category().message(error); }
+
+int FamilyOf(const HostAddress& address) {
+  sa_family_t family = AF_UNSPEC;
+  address.copy(reinterpret_cast<char*>(&family), sizeof family, offsetof(sockaddr, sa_family));
+  return family;
+}
 
 // The oldest error of OpenSSL in this thread; empties its list.
 std::string TlsError() {
@@ -54,24 +62,16 @@ tl::unexpected<Error> Socket::Failed(std::string_view why) const {
 }
 
 Result<Socket> Socket::Connect(const Address& address, const std::string& ca_file, Deadline deadline) {
-  addrinfo hints{};
-  hints.ai_socktype = SOCK_STREAM;
-  addrinfo* found = nullptr;
   const std::string name = address.Text();
-  const int unknown = ::getaddrinfo(address.host.c_str(), std::to_string(address.port).c_str(), &hints, &found);
-  if (unknown != 0) {
-    return MakeError(ErrorCode::kUnavailable, "Redis at {}: the host is not known ({}); correct the URL", name,
-                     ::gai_strerror(unknown));
-  }
-  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses(found, ::freeaddrinfo);
+  const auto found = Resolver::OfSystem().Resolve(address.host, address.port, deadline);
+  if (!found) return MakeError(ErrorCode::kUnavailable, "Redis at {}: {}", name, found.error().message);
   std::string why = "the host has no address";
-  int left = 0;
-  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) ++left;
-  for (const addrinfo* one = found; one != nullptr; one = one->ai_next, --left) {
+  auto left = static_cast<int>(found->size());
+  for (auto one = found->begin(); one != found->end(); ++one, --left) {
     // An address that does not answer leaves time for the others.
     const Deadline now = std::chrono::steady_clock::now();
     const Deadline share = now + (deadline - now) / left;
-    const int fd = ::socket(one->ai_family, one->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC, one->ai_protocol);
+    const int fd = ::socket(FamilyOf(*one), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) {
       why = WhyOf(errno);
       continue;
@@ -79,7 +79,9 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
     Socket socket(fd, name);
     const int on = 1;
     ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
-    int error = ::connect(fd, one->ai_addr, one->ai_addrlen) == 0 ? 0 : errno;
+    int error = ::connect(fd, reinterpret_cast<const sockaddr*>(one->data()), static_cast<socklen_t>(one->size())) == 0
+                    ? 0
+                    : errno;
     if (error == EINPROGRESS) {
       if (const auto waited = socket.WaitFor(POLLOUT, share); !waited) {
         why = "does not answer";
@@ -205,5 +207,18 @@ Result<std::size_t> Socket::Read(std::span<char> into, Deadline deadline) {
     }
   }
 }
+
+bool Socket::HasEnded() {
+  char byte = 0;
+  if (tls_) {  // which may have news of its own to read
+    ::ERR_clear_error();
+    const int size = ::SSL_peek(tls_.get(), &byte, 1);
+    return size > 0 || ::SSL_get_error(tls_.get(), size) != SSL_ERROR_WANT_READ;
+  }
+  const ssize_t size = ::recv(fd_, &byte, 1, MSG_PEEK | MSG_DONTWAIT);
+  return size >= 0 || (errno != EAGAIN && errno != EWOULDBLOCK);
+}
+
+void Socket::Interrupt() const { ::shutdown(fd_, SHUT_RDWR); }
 
 }  // namespace terrace::redis

@@ -1,4 +1,4 @@
-// A TCP connection, with TLS or without, of which every operation has a deadline.
+// A TCP connection, with TLS or without. Every operation has a deadline.
 #pragma once
 
 #include <chrono>
@@ -21,18 +21,23 @@ using Deadline = std::chrono::steady_clock::time_point;
 // Used by one thread at a time. With TLS the program must ignore SIGPIPE.
 class Socket {
  public:
-  // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The host's name is looked
-  // up outside of the deadline, with the time-outs of the system's resolver. kUnavailable: nobody listens, the deadline
-  // passed, or the certificate does not fit; kInvalidArgument: the file.
+  // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The deadline includes the
+  // look-up of the host's name (Resolver). kUnavailable: nobody listens, the deadline passed, or the certificate does
+  // not fit; kInvalidArgument: the file.
   static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline);
   Socket(Socket&& other) noexcept;
   Socket& operator=(Socket&&) = delete;
   ~Socket();
 
-  // kUnavailable: the connection ended, or the deadline passed. The socket is of no use then.
+  // kUnavailable: the connection ended, or the deadline passed. The socket cannot be used afterwards.
   Result<void> Write(std::string_view bytes, Deadline deadline);
   // At least one byte.
   Result<std::size_t> Read(std::span<char> into, Deadline deadline);
+
+  // Whether the peer has closed the connection, or has sent something without being asked. Does not wait.
+  bool HasEnded();
+  // From any thread: what waits for the peer, or will, fails.
+  void Interrupt() const;
 
  private:
   Socket(int fd, std::string name);

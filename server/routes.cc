@@ -1,5 +1,7 @@
 #include "server/routes.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -80,10 +82,28 @@ bool ReadTile(const Segments& segments, Route& route) {
   std::string_view row = segments[3];
   route.format = CutSuffix(row);
   if (route.format == nullptr) return false;
-  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator);
+  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator());
   if (!key) return false;
   route.key = *key;
   return true;
+}
+
+// RouteRow::read of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
+template <std::size_t kAt>
+bool ReadTileInFolder(const Segments& segments, Route& route) {
+  std::string_view row = segments[kAt + 2];
+  const std::string folder = kAt == 2 ? std::string(segments[1]) : fmt::format("{}/{}", segments[1], segments[2]);
+  route.format = CutSuffix(row, folder);
+  if (route.format == nullptr) return false;
+  const auto key = ParseTileKey(segments[kAt], segments[kAt + 1], row, route.format->is_mercator());
+  if (!key) return false;
+  route.key = *key;
+  return true;
+}
+
+bool ReadMapLayer(const Segments& segments, Route& route) {
+  route.format = FirstFormatIn(segments[1]);
+  return route.format != nullptr;
 }
 
 bool ReadImplicitTile(const Segments& segments, Route& route) {
@@ -164,6 +184,50 @@ constexpr RouteRow kRows[] = {
      .pattern = "/{dataset}/tiles.json",
      .handle = AnswerTileJson,
      .operation = &kTileJsonOperation,
+     .has_templates = true},
+    {.label = "hillshade",
+     .pattern = "/{dataset}/hillshade/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "slope",
+     .pattern = "/{dataset}/slope/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "contours",
+     .pattern = "/{dataset}/contours/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<2>},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/geodetic/{z}/{x}/{y}.{suffix}",
+     .handle = AnswerTile,
+     .read = ReadTileInFolder<3>},
+    {.label = "hillshade",
+     .pattern = "/{dataset}/hillshade/tiles.json",
+     .handle = AnswerMapTileJson,
+     .operation = &kHillshadeTileJsonOperation,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "slope",
+     .pattern = "/{dataset}/slope/tiles.json",
+     .handle = AnswerMapTileJson,
+     .operation = &kSlopeTileJsonOperation,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "contours",
+     .pattern = "/{dataset}/contours/tiles.json",
+     .handle = AnswerMapTileJson,
+     .operation = &kContoursTileJsonOperation,
+     .read = ReadMapLayer,
+     .has_templates = true},
+    {.label = "imagery",
+     .pattern = "/{dataset}/imagery/tiles.json",
+     .handle = AnswerMapTileJson,
+     .operation = &kImageryTileJsonOperation,
+     .read = ReadMapLayer,
      .has_templates = true},
     {.label = "heights",
      .pattern = "/{dataset}/heights",
@@ -260,7 +324,11 @@ std::vector<DocumentedUrl> DocumentedUrls() {
       continue;
     }
     url.pattern.resize(url.pattern.size() - kSuffix.size());
+    // "/{dataset}/hillshade/{z}/{x}/{y}": the folder of the formats is between the dataset and the level.
+    const std::size_t begin = std::string_view("/{dataset}/").size(), end = url.pattern.find("{z}");
+    const std::string folder = url.pattern.substr(begin, end > begin ? end - 1 - begin : 0);
     for (const TileFormat& format : TileFormats()) {
+      if (format.folder != folder) continue;
       DocumentedUrl of_format = url;
       of_format.pattern.append(format.suffix);
       of_format.operation = format.operation;

@@ -38,6 +38,7 @@ namespace {
 constexpr std::chrono::milliseconds kLastWords{200};
 
 std::string UrlOf(const Listener& listener, bool is_https) {
+  if (listener.is_path()) return "unix:" + listener.path();
   const std::string& host = listener.host();
   const bool bare_v6 = host.find(':') != std::string::npos && !host.starts_with('[');
   return fmt::format("{}://{}:{}/", is_https ? "https" : "http", bare_v6 ? "[" + host + "]" : host, listener.port());
@@ -141,7 +142,9 @@ class RunningServer final : public Server {
   Result<void> OpenAdminListener() {
     const std::optional<config::ListenAddress>& address = options_.config.admin_listen;
     if (!address) return {};
-    auto listener = Listener::Open(io_, address->host, address->port, AdminContext());
+    auto listener = address->path.empty()
+                        ? Listener::Open(io_, address->host, address->port, AdminContext())
+                        : Listener::OpenPath(io_, address->path, options_.config.admin_socket_mode, AdminContext());
     if (!listener) return MakeError(listener.error().code, "admin_listen: {}", listener.error().message);
     admin_listener_ = std::move(*listener);
     spdlog::info("operators: {} answers /admin/purge and /metrics", UrlOf(*admin_listener_, /*is_https=*/false));
@@ -324,7 +327,9 @@ std::vector<Error> Server::CheckStartFiles(const config::Config& config) {
 
 Result<void> Server::CheckAddress(const config::Config& config) {
   if (config.admin_listen) {
-    const Result<void> free = Listener::CheckAddress(config.admin_listen->host, config.admin_listen->port);
+    const config::ListenAddress& address = *config.admin_listen;
+    const Result<void> free =
+        address.path.empty() ? Listener::CheckAddress(address.host, address.port) : CheckSocketPath(address.path);
     if (!free) return MakeError(free.error().code, "admin_listen: {}", free.error().message);
   }
   return Listener::CheckAddress(config.listen.host, config.listen.port);

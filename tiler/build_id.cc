@@ -54,7 +54,7 @@ int Collect(dl_phdr_info* object, std::size_t, void* to) {
 }  // namespace
 
 std::uint64_t BuildId() {
-  static const std::uint64_t version = [] {
+  static const std::uint64_t hash = [] {
     std::vector<std::string> objects;
     dl_iterate_phdr(Collect, &objects);
     std::sort(objects.begin(), objects.end());
@@ -62,7 +62,7 @@ std::uint64_t BuildId() {
     for (const std::string& object : objects) all += object + '\n';
     return XXH3_64bits(all.data(), all.size());
   }();
-  return version;
+  return hash;
 }
 
 }  // namespace terrace::tiler

@@ -6,6 +6,7 @@
 #include "proto/library_versions.h"
 
 namespace terrace::tiler {
+
 std::string EncoderText() {
   return fmt::format("encoder {}, {}, {}", kEncoderVersion, dem::LibraryVersions(), proto::LibraryVersions());
 }

@@ -12,7 +12,24 @@ namespace terrace::tiler {
 struct EncodedTile;   // encoded_tile.h
 struct EncoderInput;  // tile_pipeline.h
 
-enum class TileFormat : std::uint8_t { kQuantizedMesh, kGlb, kHeightPng };
+enum class TileFormat : std::uint8_t {
+  kQuantizedMesh,
+  kGlb,
+  kHeightPng,
+  // Tiles for maps, which archives do not have.
+  kHillshade,
+  kSlope,
+  kContours,
+  kImagery,
+  kGeodeticImagery
+};
+
+// Whether keys are in Web Mercator's XYZ scheme, y from the NORTH; else in TMS geodetic.
+constexpr bool IsMercator(TileFormat format) {
+  return format == TileFormat::kHeightPng || format == TileFormat::kHillshade || format == TileFormat::kSlope ||
+         format == TileFormat::kContours || format == TileFormat::kImagery;
+}
+constexpr bool IsForMaps(TileFormat format) { return format > TileFormat::kHeightPng; }
 
 struct Encoder {
   TileFormat format;
@@ -21,16 +38,27 @@ struct Encoder {
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 
-// encoders/quantized_mesh.cc, glb.cc, height_png.cc. kUnavailable: the source, the water raster or the image cannot be
-// read now. kCancelled: stopped. kNotFound (height tiles): deeper than max_mercator_depth.
+// encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: the source, the water raster or the image cannot be
+// read now. kCancelled: stopped. kNotFound (height tiles and those for maps): deeper than
+// max_mercator_depth; imagery: the dataset has none.
 Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> EncodeContours(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 
 inline constexpr Encoder kEncoders[] = {
     {TileFormat::kQuantizedMesh, /*needs_refinement=*/true, EncodeQuantizedMesh},
     {TileFormat::kGlb, /*needs_refinement=*/true, EncodeGlb},
     {TileFormat::kHeightPng, /*needs_refinement=*/false, EncodeHeightPng},
+    {TileFormat::kHillshade, /*needs_refinement=*/false, EncodeHillshade},
+    {TileFormat::kSlope, /*needs_refinement=*/false, EncodeSlope},
+    {TileFormat::kContours, /*needs_refinement=*/false, EncodeContours},
+    {TileFormat::kImagery, /*needs_refinement=*/false, EncodeImagery},
+    {TileFormat::kGeodeticImagery, /*needs_refinement=*/false, EncodeGeodeticImagery},
 };
 
 }  // namespace terrace::tiler

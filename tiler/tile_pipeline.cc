@@ -9,6 +9,9 @@
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
+#include "tiler/map/contour_tile.h"
+#include "tiler/map/map_heights.h"
+#include "tiler/map/relief.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/strong_etag.h"
 #include "tiler/surface/drawn_sight.h"
@@ -30,16 +33,62 @@ Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request
 
 tl::unexpected<Error> NoSources() {
   return MakeError(ErrorCode::kNotFound,
-                   "the dataset is an archive of finished tiles alone; heights and meshes need its sources");
+                   "the dataset is an archive of finished tiles alone, and has the heights of these tiles alone: "
+                   "ask for surface=served; other heights and meshes need its sources");
+}
+
+// Whether an archive has the tiles that a drawn surface is read from. GLB tiles of archives are not decoded.
+Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface) {
+  if (dataset.source) return {};
+  const std::vector<TileFormat>& formats = dataset.baked->extent().formats;
+  const bool has = std::ranges::find(formats, TileFormat::kQuantizedMesh) != formats.end();
+  if (has && surface.format == TileFormat::kQuantizedMesh) return {};
+  return MakeError(ErrorCode::kNotFound,
+                   "the dataset is an archive of finished tiles alone; heights are read from its tiles of "
+                   "quantized-mesh{}",
+                   has ? ", without format" : ", and it has none");
+}
+
+const std::vector<std::vector<geo::TileRange>>& AvailableIn(const Dataset& dataset) {
+  return dataset.source ? dataset.source->Availability() : dataset.baked->extent().available;
+}
+
+int DeepestOf(const Dataset& dataset) { return static_cast<int>(AvailableIn(dataset).size()) - 1; }
+
+HasTile TilesOf(const Dataset& dataset) {
+  return [&available = AvailableIn(dataset)](const geo::TileKey& key) {
+    return geo::IsValid(key) && key.level < static_cast<int>(available.size()) &&
+           std::ranges::any_of(available[static_cast<std::size_t>(key.level)],
+                               [&](const geo::TileRange& range) { return range.Contains(key); });
+  };
 }
 
 }  // namespace
 
 std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
-  if (request.format != TileFormat::kHeightPng) return source.EditsOf(request.key);
-  const int size = request.height_size, depth = request.key.level + (size == 512 ? 1 : 0);
-  if (depth > source.info().max_mercator_depth) return 0;
-  return source.EditsOfMercator(depth, {request.key.x * size, request.key.y * size, size, size});
+  int size = request.height_size, margin = 0;
+  switch (request.format) {
+    case TileFormat::kQuantizedMesh:
+    case TileFormat::kGlb:
+      if (const std::uint64_t edits = source.EditsOf(request.key); edits != 0 || !request.metadata) return edits;
+      return source.DeeperTilesOf(request.key);
+    case TileFormat::kImagery:
+    case TileFormat::kGeodeticImagery:
+      return 0;
+    case TileFormat::kHeightPng:
+      break;
+    case TileFormat::kHillshade:
+    case TileFormat::kSlope:
+      margin = kReliefMargin;
+      break;
+    case TileFormat::kContours:
+      size = kHeightSizes[0];
+      margin = kContourMargin;
+      break;
+  }
+  const MapWindow window(request.key, size, margin);
+  if (window.depth > source.info().max_mercator_depth) return 0;
+  return source.EditsOfMercator(window.depth, window.nodes);
 }
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
@@ -145,6 +194,15 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   const DrawnMeshKey cache_key{dataset.generation, request.key, request.error_step, is_glb,
                                is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
   if (std::shared_ptr<const DrawnMesh> known = drawn_->Find(cache_key)) return known;
+  if (!dataset.source) {
+    const Result<EncodedTile> baked = TakeBaked(dataset, request);
+    if (!baked) return tl::unexpected(baked.error());
+    Result<DrawnTriangles> decoded = DrawnByBytes(baked->bytes, request.key);
+    if (!decoded) return tl::unexpected(std::move(decoded).error());
+    auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(decoded));
+    drawn_->Insert(cache_key, mesh);
+    return std::shared_ptr<const DrawnMesh>(std::move(mesh));
+  }
   const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
@@ -164,8 +222,12 @@ MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& sur
     TileRequest request;
     request.dataset = dataset;
     request.key = key;
-    const bool is_deepest = key.level == of.source->max_level();
-    request.error_step = ErrorStep(surface.requested, key.level, is_deepest, of.error_fraction);
+    const int finest = of.source ? of.source->finest_level() : of.baked->extent().finest_level;
+    request.error_step = ErrorStep(surface.requested, key.level, key.level >= finest, of.error_fraction);
+    if (!of.source && !surface.requested.error_m && !surface.requested.fraction) {
+      const std::vector<int>& steps = of.baked->extent().error_steps;
+      if (key.level < static_cast<int>(steps.size())) request.error_step = steps[static_cast<std::size_t>(key.level)];
+    }
     request.format = surface.format;
     request.compression = surface.compression;
     return MeshOf(of, request, stop);
@@ -176,11 +238,10 @@ Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const 
                                                    std::span<const dem::GeoPosition> points, bool normals,
                                                    std::stop_token stop) const {
   const Dataset& of = datasets_[dataset];
-  if (!of.source) return NoSources();
-  const int deepest = of.source->max_level();
-  const Result<int> level = LevelOf(surface, deepest, of.error_fraction);
+  if (const Result<void> has = CheckHasSurface(of, surface); !has) return tl::unexpected(has.error());
+  const Result<int> level = LevelOf(surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  return tiler::ReadDrawnPoints(*of.source, *level, points, normals, MeshesOf(dataset, surface, stop), stop);
+  return tiler::ReadDrawnPoints(TilesOf(of), *level, points, normals, MeshesOf(dataset, surface, stop), stop);
 }
 
 Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
@@ -189,14 +250,16 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
                                                               const dem::SightOptions& options,
                                                               std::stop_token stop) const {
   const Dataset& of = datasets_[dataset];
-  if (!of.source) return NoSources();
-  if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded)
-    return tl::unexpected(bounded.error());
-  if (!surface) return of.source->LookAlong(rays, options, std::move(stop));
-  const int deepest = of.source->max_level();
-  const Result<int> level = LevelOf(*surface, deepest, of.error_fraction);
+  if (!of.source && !surface) return NoSources();
+  if (of.source) {
+    if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded)
+      return tl::unexpected(bounded.error());
+    if (!surface) return of.source->LookAlong(rays, options, std::move(stop));
+  }
+  if (const Result<void> has = CheckHasSurface(of, *surface); !has) return tl::unexpected(has.error());
+  const Result<int> level = LevelOf(*surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  return LookAlongDrawn(*of.source, *level, rays, options, MeshesOf(dataset, *surface, stop), stop);
+  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshesOf(dataset, *surface, stop), stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {

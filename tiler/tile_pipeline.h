@@ -56,7 +56,7 @@ struct Dataset {
   proto::GlbOptions glb;                         // compression: for GLB requests that name none
   std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
-  std::vector<std::string> baked_files;          // whose change means another archive
+  std::vector<std::string> baked_files;          // a change of one of them means that the archive was replaced
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
@@ -65,7 +65,7 @@ struct Dataset {
   // stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
-  std::uint64_t options = 0;  // the same without what only heights depend on (DemSource::fingerprint)
+  std::uint64_t options = 0;  // `generation` without the contents and options that DemSource::fingerprint covers
 };
 
 // A hash of the edits that the tile of a request depends on; 0: none.
@@ -139,6 +139,7 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
+  ByteCacheStats drawn_meshes() const { return drawn_->stats(); }
   ByteCacheStats refinements() const { return refinements_->stats(); }
 
  private:

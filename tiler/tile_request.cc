@@ -24,6 +24,13 @@ std::size_t TileRequestHash::operator()(const TileRequest& request) const noexce
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.x));
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.y));
   hash = Mix(hash ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(request.error_step)));
+  if (IsForMaps(request.format)) {
+    const MapParameters& map = request.map;
+    hash = Mix(hash ^ (static_cast<std::uint64_t>(map.interval_cm) << 32 |
+                       static_cast<std::uint64_t>(map.z_factor_hundredths) << 16 | map.azimuth_deg));
+    hash = Mix(hash ^ (static_cast<std::uint64_t>(map.altitude_deg) << 16 |
+                       static_cast<std::uint64_t>(map.slope_style) << 8 | static_cast<std::uint64_t>(map.picture)));
+  }
   return static_cast<std::size_t>(Mix(hash ^ variant));
 }
 

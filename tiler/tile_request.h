@@ -11,10 +11,11 @@
 #include "proto/gltf/texture.h"
 #include "tiler/coding.h"
 #include "tiler/encoders.h"
+#include "tiler/map/map_parameters.h"
 
 namespace terrace::tiler {
 
-// Pixels along an edge of a height tile; the first is the default.
+// Pixels along an edge of a height tile or of a picture for maps; the first is the default.
 inline constexpr std::array<int, 2> kHeightSizes = {256, 512};
 
 struct TileRequest {
@@ -30,9 +31,10 @@ struct TileRequest {
   bool normals = false;
   bool water_mask = false;
   bool metadata = false;
-  // kHeightPng: `key` is a tile of Web Mercator's XYZ scheme, y from the NORTH, of height_size * height_size pixels.
+  // Tiles of IsMercator(format), and kGeodeticImagery: height_size * height_size pixels.
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
   int height_size = kHeightSizes[0];
+  MapParameters map;  // IsForMaps(format)
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };

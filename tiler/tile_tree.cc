@@ -15,7 +15,7 @@ namespace terrace::tiler {
 namespace {
 
 double SkirtDepth(const TileTree& tree, int level) {
-  const bool is_deepest = level == tree.deepest_level;
+  const bool is_deepest = level >= tree.deepest_level;
   return proto::SkirtDepth(level, proto::SkirtError(level, tree.error_step(level), is_deepest, tree.error_fraction));
 }
 

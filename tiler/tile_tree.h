@@ -1,4 +1,4 @@
-// The 3D Tiles documents of a dataset's GLB tiles: what a tileset and its subtrees say, whoever holds the tiles.
+// The 3D Tiles documents of a dataset's GLB tiles: tileset and subtrees. The server and exports of archives use them.
 #pragma once
 
 #include <functional>
@@ -18,7 +18,7 @@ struct TileTree {
   const std::vector<std::vector<geo::TileRange>>& available;  // by level, from 0
   dem::GeoBounds bounds;                                      // of the data; west > east: across the antimeridian
   double error_fraction = 0.5;
-  int deepest_level = 0;                                       // of the sources; skirts depend on it
+  int deepest_level = 0;                                       // of the sources, without edits; skirts depend on it
   std::function<dem::HeightRange(const geo::TileKey&)> range;  // contains all samples of a tile
   std::function<int(int level)> error_step;                    // of a level's tiles on its ladder
 };

@@ -20,7 +20,7 @@ import uuid
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 # Their code is inside the program, so the package does not depend on them.
-HEADER_ONLY = ["nlohmann-json3-dev", "libcli11-dev", "libexpected-dev"]
+HEADER_ONLY = ["nlohmann-json3-dev", "libcli11-dev", "libexpected-dev", "libprotozero-dev"]
 SPECIFICATION = "1.5"
 
 

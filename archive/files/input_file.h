@@ -15,7 +15,7 @@ class InputFile {
   static Result<std::unique_ptr<const InputFile>> Open(const std::string& path);
   virtual ~InputFile() = default;
 
-  // At the time of opening.
+  // The size in bytes when the file was opened.
   virtual std::uint64_t size() const = 0;
   // All of the bytes. kUnavailable: the file is shorter, or cannot be read.
   virtual Result<std::string> Read(std::uint64_t offset, std::size_t size) const = 0;

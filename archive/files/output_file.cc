@@ -103,12 +103,19 @@ Result<void> OutputFile::Write(std::string_view bytes) {
   return impl_->Flush();
 }
 
+Result<void> OutputFile::Skip(std::uint64_t bytes) {
+  if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
+  if (::lseek(impl_->descriptor, static_cast<off_t>(bytes), SEEK_CUR) < 0) return CannotWrite(impl_->partial, errno);
+  impl_->size += bytes;
+  return {};
+}
+
 Result<void> OutputFile::Finish() {
   if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
   if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);
   if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
   ::close(std::exchange(impl_->descriptor, -1));
-  // The new name must be on the disk as well. Some file systems do not allow this for folders, and need it not.
+  // The new name must be on the disk as well. Some file systems do not allow fsync of folders, and do not need it.
   const int folder = ::open(ParentOf(impl_->path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return {};
   ::fsync(folder);

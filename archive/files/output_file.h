@@ -23,6 +23,8 @@ class OutputFile {
   OutputFile& operator=(OutputFile&&) = delete;
 
   Result<void> Write(std::string_view bytes);
+  // Leaves a hole of zeros, which takes no space on most disks. Not part of xxh3().
+  Result<void> Skip(std::uint64_t bytes);
   // Waits until the bytes are on the disk, and renames the file.
   Result<void> Finish();
 

@@ -36,9 +36,12 @@ Md5 Md5Of(std::string_view text) {
 
 }  // namespace
 
-Result<ZipWriter> ZipWriter::Create(const std::string& path) {
+Result<ZipWriter> ZipWriter::Create(const std::string& path, std::uint64_t start) {
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));
+  if (start > 0) {
+    if (Result<void> skipped = out->Skip(start); !skipped) return tl::unexpected(std::move(skipped.error()));
+  }
   Result<SpoolFile> directory = SpoolFile::Create(path);
   if (!directory) return tl::unexpected(std::move(directory.error()));
   return ZipWriter(*std::move(out), *std::move(directory));

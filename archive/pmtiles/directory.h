@@ -50,8 +50,8 @@ struct DirectoryEntry {
 
 // Compressed. Precondition: at least one entry, in the order of their ids.
 std::string EncodeDirectory(const std::vector<DirectoryEntry>& entries);
-// Ids rise, runs do not overlap, lengths are above 0, and every entry lies within `leaves` or `data` bytes, as its run
-// says. kInvalidArgument: otherwise.
+// Checks that ids rise, runs do not overlap, and lengths are above 0. Leaf directories (run 0) must lie within `leaves`
+// bytes, tiles within `data` bytes. kInvalidArgument: one of these does not hold.
 Result<std::vector<DirectoryEntry>> DecodeDirectory(std::string_view compressed, std::uint64_t leaves,
                                                     std::uint64_t data);
 

@@ -69,7 +69,7 @@ Result<PmtilesFile::LeafPtr> PmtilesFile::ReadLeaf(const DirectoryEntry& leaf) c
   for (const DirectoryEntry& entry : *entries) {
     made->rows_before.push_back(rows);
     rows += entry.run;
-    // A leaf in a leaf could be a circle.
+    // A leaf in a leaf could be a cycle.
     if (entry.run == 0 || rows > max_rows) return tl::unexpected(Damaged("a directory is not one of terrace"));
   }
   if (entries->front().tile_id != leaf.tile_id) return tl::unexpected(Damaged("a directory is at a wrong place"));

@@ -13,9 +13,6 @@ namespace {
 
 constexpr std::array<const char*, 6> kKeys = {"job", "units", "dead", "taken", "done", "errors"};
 
-// A Redis that replies a second late is slow but works.
-constexpr std::chrono::seconds kTimeout{10};
-
 int NumberOf(std::string_view text) {
   int number = 0;
   std::from_chars(text.data(), text.data() + text.size(), number);
@@ -60,7 +57,7 @@ Result<void> CheckJobName(const std::string& name) {
 
 Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place) {
   redis::ConnectionOptions options;
-  options.connect_timeout = options.command_timeout = kTimeout;
+  options.connect_timeout = options.command_timeout = place.timeout;
   options.ca_file = place.ca_file;
   auto connection = redis::Connection::Open(place.address, options);
   if (!connection) return connection;

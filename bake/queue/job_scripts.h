@@ -101,9 +101,19 @@ end
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, id, unit, worker, seconds.
+// ARGV: incarnation, id, unit, worker, seconds. The unit may have been given up meanwhile, because its worker was not
+// heard of: it is there now, so it is dead no more.
 inline constexpr const char* kDone = R"lua(
-if remove(ARGV[2], ARGV[3]) then
+local is_new = remove(ARGV[2], ARGV[3])
+for _, entry in ipairs(redis.call('XRANGE', dead, '-', '+')) do
+  for i = 1, #entry[2], 2 do
+    if entry[2][i] == 'unit' and entry[2][i + 1] == ARGV[3] then
+      redis.call('XDEL', dead, entry[1])
+      is_new = true
+    end
+  end
+end
+if is_new then
   redis.call('HDEL', errors, ARGV[3])
   redis.pcall('XADD', done, 'MAXLEN', '~', 1000, '*', 'unit', ARGV[3], 'worker', ARGV[4], 'seconds', ARGV[5])
 end

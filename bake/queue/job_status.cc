@@ -47,6 +47,32 @@ double RateOf(const redis::ReplyView& done, std::int64_t now_ms) {
   return static_cast<double>(count - first - 1) / elapsed_ms * 3.6e6;
 }
 
+// The units that workers bake now, by worker and unit. `pending`: reply of XPENDING; `taken`: the hash of taken units.
+std::vector<JobStatus::Running> RunningUnits(const redis::ReplyView& pending, const redis::ReplyView& taken,
+                                             std::int64_t now_ms) {
+  struct Pending {
+    std::string worker;
+    std::int64_t idle_ms = 0, deliveries = 1;
+  };
+  std::map<std::string, Pending, std::less<>> by_id;
+  for (std::size_t i = 0; i < pending.size(); ++i) {
+    const redis::ReplyView one = pending[i];
+    if (one[1].text() == scripts::kNobody) continue;
+    by_id.emplace(one[0].text(), Pending{std::string(one[1].text()), one[2].integer(), one[3].integer()});
+  }
+  std::vector<JobStatus::Running> running;
+  for (std::size_t i = 0; i + 1 < taken.size(); i += 2) {
+    const auto [id, worker, since] = WordsOf(taken[i + 1].text());
+    const auto found = by_id.find(id);
+    if (found == by_id.end()) continue;
+    running.push_back({std::string(taken[i].text()), found->second.worker,
+                       static_cast<double>(std::max<std::int64_t>(now_ms - Int64Of(since), 0)) / 1000,
+                       static_cast<double>(found->second.idle_ms) / 1000, static_cast<int>(found->second.deliveries)});
+  }
+  std::ranges::sort(running, {}, [](const JobStatus::Running& one) { return std::tie(one.worker, one.unit); });
+  return running;
+}
+
 }  // namespace
 
 Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& place) {
@@ -59,6 +85,7 @@ Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& p
                      place.address.Text(), place.name);
   }
   const std::string units = place.Key("units");
+  enum Reply : std::size_t { kTime, kQueued, kPending, kTaken, kDone, kState };
   const std::array<redis::Command, 6> commands = {{{"TIME"},
                                                    {"XLEN", units},
                                                    {"XPENDING", units, "bakers", "-", "+", "100000"},
@@ -75,44 +102,23 @@ Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& p
 
   JobStatus status;
   status.dead = *std::move(dead);
-  status.state = (*replies)[5].text();
+  status.state = (*replies)[kState].text();
   for (const auto& field : *job) {
     if (!IsOfQueue(field.first)) status.identity.push_back(field);
   }
   status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(Int64Of(FieldOf(*job, "units")), 0));
   status.lease_seconds = static_cast<double>(Int64Of(FieldOf(*job, "lease_ms"))) / 1000;
-  const std::int64_t now_ms = Int64Of((*replies)[0][0].text()) * 1000 + Int64Of((*replies)[0][1].text()) / 1000;
-
-  struct Pending {
-    std::string worker;
-    std::int64_t idle_ms = 0, deliveries = 1;
-  };
-  std::map<std::string, Pending, std::less<>> pending;  // by id
-  for (std::size_t i = 0; i < (*replies)[2].size(); ++i) {
-    const redis::ReplyView one = (*replies)[2][i];
-    if (one[1].text() == scripts::kNobody) continue;
-    pending.emplace(one[0].text(), Pending{std::string(one[1].text()), one[2].integer(), one[3].integer()});
-  }
-  bool is_finishing = false;
-  const redis::ReplyView taken = (*replies)[3];
-  for (std::size_t i = 0; i + 1 < taken.size(); i += 2) {
-    const auto [id, worker, since] = WordsOf(taken[i + 1].text());
-    const auto found = pending.find(id);
-    if (found == pending.end()) continue;
-    is_finishing |= taken[i].text() == scripts::kFinishUnit;
-    status.running.push_back({std::string(taken[i].text()), found->second.worker,
-                              static_cast<double>(std::max<std::int64_t>(now_ms - Int64Of(since), 0)) / 1000,
-                              static_cast<double>(found->second.idle_ms) / 1000,
-                              static_cast<int>(found->second.deliveries)});
-  }
-  std::ranges::sort(status.running, {}, [](const JobStatus::Running& one) { return std::tie(one.worker, one.unit); });
-  const auto queued = static_cast<std::uint64_t>((*replies)[1].integer()) - (is_finishing ? 1U : 0U);
+  const std::int64_t now_ms = Int64Of((*replies)[kTime][0].text()) * 1000 + Int64Of((*replies)[kTime][1].text()) / 1000;
+  status.running = RunningUnits((*replies)[kPending], (*replies)[kTaken], now_ms);
+  const bool is_finishing = std::ranges::any_of(
+      status.running, [](const JobStatus::Running& one) { return one.unit == scripts::kFinishUnit; });
+  const auto queued = static_cast<std::uint64_t>((*replies)[kQueued].integer()) - (is_finishing ? 1U : 0U);
   status.done = status.units - std::min<std::uint64_t>(status.units, queued + status.dead.size());
   const std::uint64_t running = status.running.size() - (is_finishing ? 1U : 0U);
   status.waiting = queued - std::min(queued, running);
   if (status.state == "baking" && is_finishing) status.state = "finishing";
   if (status.state == "baking" && queued == 0 && !status.dead.empty()) status.state = "incomplete";
-  status.units_per_hour = RateOf((*replies)[4], now_ms);
+  status.units_per_hour = RateOf((*replies)[kDone], now_ms);
   if (status.units_per_hour > 0 && status.state == "baking") {
     status.seconds_left = static_cast<double>(queued) / status.units_per_hour * 3600;
   }

@@ -23,8 +23,8 @@ class LocalQueue : public UnitQueue {
  private:
   std::mutex mutex_;
   std::deque<std::size_t> pending_;
-  std::vector<int> attempts_;  // by unit, that failed
-  std::size_t taken_ = 0;      // and not given back
+  std::vector<int> attempts_;  // that failed, by unit
+  std::size_t taken_ = 0;      // units that were taken and not given back
 };
 
 }  // namespace terrace::bake

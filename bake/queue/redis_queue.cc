@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <condition_variable>
+#include <iterator>
 #include <random>
 #include <utility>
 
@@ -28,27 +29,12 @@ std::string Millis(milliseconds time) { return std::to_string(std::max<milliseco
 Result<std::unique_ptr<RedisQueue>> RedisQueue::Join(RedisQueueOptions options) {
   std::unique_ptr<RedisQueue> queue(new RedisQueue(std::move(options)));
   {
-    const std::lock_guard lock(queue->mutex_);
+    const std::lock_guard calls(queue->calls_);
     if (auto connected = queue->Connect(); !connected) return tl::unexpected(connected.error());
     if (auto entered = queue->Enter(false); !entered) return tl::unexpected(entered.error());
     if (auto revived = queue->Revive(); !revived) return tl::unexpected(revived.error());
   }
-  RedisQueue* const self = queue.get();
-  queue->beat_ = std::jthread([self](const std::stop_token& stop) {
-    std::mutex mutex;
-    std::unique_lock lock(mutex);
-    std::condition_variable_any ended;
-    while (true) {
-      milliseconds pause;
-      {
-        const std::lock_guard of_queue(self->mutex_);
-        pause = self->lease_ / 3;
-      }
-      if (ended.wait_for(lock, stop, pause, [&stop] { return stop.stop_requested(); })) return;
-      const std::lock_guard of_queue(self->mutex_);
-      self->Beat();
-    }
-  });
+  queue->beat_ = std::jthread([self = queue.get()](const std::stop_token& stop) { self->KeepBeating(stop); });
   return queue;
 }
 
@@ -64,10 +50,13 @@ RedisQueue::~RedisQueue() {
     for (const auto& [unit, held] : held_) left.push_back(unit);
   }
   for (const std::size_t unit : left) Return(unit);
-  const std::lock_guard lock(mutex_);
-  if (finish_) {
-    Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
+  {
+    const std::lock_guard lock(mutex_);
+    if (finish_) {
+      Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
+    }
   }
+  const std::lock_guard calls(calls_);
   Flush();
 }
 
@@ -87,12 +76,11 @@ Result<void> RedisQueue::Enter(bool is_emptied) {
     const std::string incarnation = FieldOf(*job, "incarnation");
     if (FieldOf(*job, "state") == "baking") {
       if (auto same = CheckIdentity(*job); !same) return same;
-      if (!is_emptied || incarnation != incarnation_) {
-        incarnation_ = incarnation;
+      if (!is_emptied || incarnation != Incarnation()) {
         const std::string lease = FieldOf(*job, "lease_ms");
         milliseconds::rep number = 0;
         std::from_chars(lease.data(), lease.data() + lease.size(), number);
-        if (number > 0) lease_ = milliseconds(number);
+        SetJob(incarnation, milliseconds(number > 0 ? number : options_.lease.count()));
         return {};
       }
     }
@@ -135,8 +123,7 @@ Result<bool> RedisQueue::Fill(const std::string& incarnation) {
   const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kFill, std::move(arguments)));
   if (!reply) return tl::unexpected(reply.error());
   if ((*reply)[0].text() != "ok") return false;
-  incarnation_ = mine;
-  lease_ = options_.lease;
+  SetJob(mine, options_.lease);
   return true;
 }
 
@@ -144,13 +131,24 @@ Result<void> RedisQueue::Revive() {
   const auto dead = ReadDead(*connection_, options_.place);
   if (!dead) return tl::unexpected(dead.error());
   if (dead->empty()) return {};
-  std::vector<std::string> arguments = {incarnation_};
+  std::vector<std::string> arguments = {Incarnation()};
   for (const DeadUnit& unit : *dead) {
     if (index_.contains(unit.unit)) arguments.push_back(unit.unit);
   }
   const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kRevive, std::move(arguments)));
   if (!reply) return tl::unexpected(reply.error());
   return {};
+}
+
+void RedisQueue::SetJob(const std::string& incarnation, milliseconds lease) {
+  const std::lock_guard lock(mutex_);
+  incarnation_ = incarnation;
+  lease_ = lease;
+}
+
+std::string RedisQueue::Incarnation() const {
+  const std::lock_guard lock(mutex_);
+  return incarnation_;
 }
 
 void RedisQueue::NoteAway(const Error& why) {
@@ -163,9 +161,7 @@ void RedisQueue::NoteAway(const Error& why) {
       options_.on_message(fmt::format("{}; waiting for it up to {} s", why.message, options_.patience.count() / 1000));
     }
   }
-  if (now - *away_since_ < options_.patience || end_ != End::kNone) return;
-  end_ = End::kLost;
-  why_ = why;
+  if (now - *away_since_ >= options_.patience) EndBecause(End::kLost, why);
 }
 
 void RedisQueue::NoteBack() {
@@ -183,16 +179,22 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
     if (Clock::now() < next_connect_) return MakeError(ErrorCode::kUnavailable, "Redis is away");
     if (auto connected = Connect(); !connected) return fail(connected.error());
   }
-  std::vector<redis::Command> commands(outbox_.begin(), outbox_.end());
+  std::vector<redis::Command> commands;
+  {
+    const std::lock_guard lock(mutex_);
+    commands.assign(std::make_move_iterator(outbox_.begin()), std::make_move_iterator(outbox_.end()));
+    outbox_.clear();
+  }
   commands.push_back(command);
   auto replies = connection_->CallAll(commands);
-  if (!replies) return fail(replies.error());
-  // What Redis refuses now, because it is a replica, say, is sent again.
-  std::deque<redis::Command> left;
-  for (std::size_t i = 0; i + 1 < commands.size(); ++i) {
-    if ((*replies)[i].is_error()) left.push_back(std::move(commands[i]));
+  {
+    // What Redis refuses now, because it is a replica, say, is sent again, before what was added meanwhile.
+    const std::lock_guard lock(mutex_);
+    for (std::size_t i = commands.size() - 1; i-- > 0;) {
+      if (!replies || (*replies)[i].is_error()) outbox_.push_front(std::move(commands[i]));
+    }
   }
-  outbox_ = std::move(left);
+  if (!replies) return fail(replies.error());
   redis::Reply last = std::move(replies->back());
   if (!last.is_error() || last.text().find("NOGROUP") != std::string_view::npos) {
     NoteBack();
@@ -202,7 +204,7 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
 }
 
 UnitQueue::Taken RedisQueue::Take() {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard calls(calls_);
   constexpr int kTries = 100;  // units of others, and units that are in hand, are not counted
   for (int i = 0; i < kTries; ++i) {
     if (const auto taken = TakeOnce()) return *taken;
@@ -210,32 +212,44 @@ UnitQueue::Taken RedisQueue::Take() {
   return {Taken::State::kWait};
 }
 
+UnitQueue::Taken RedisQueue::WaitOrOver() {
+  const std::lock_guard lock(mutex_);
+  next_take_ = Clock::now() + std::min(kPauseWithoutUnits, lease_ / 4);
+  return {end_ == End::kNone ? Taken::State::kWait : Taken::State::kOver};
+}
+
+// The first reason is kept.
+void RedisQueue::EndBecause(End end, const Error& why) {
+  const std::lock_guard lock(mutex_);
+  if (end_ != End::kNone) return;
+  end_ = end;
+  why_ = why;
+}
+
 // Nothing: ask again.
 std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
-  if (end_ != End::kNone) return Taken{Taken::State::kOver};
+  if (end() != End::kNone) return Taken{Taken::State::kOver};
   if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
-  const auto reply =
-      Exchange(ScriptCommand(options_.place, scripts::kTake, {incarnation_, options_.worker, Millis(lease_)}));
-  const auto wait = [&] {
-    next_take_ = Clock::now() + std::min(kPauseWithoutUnits, lease_ / 4);
-    return Taken{end_ == End::kNone ? Taken::State::kWait : Taken::State::kOver};
-  };
-  if (!reply) return wait();
+  std::vector<std::string> arguments;
+  {
+    const std::lock_guard lock(mutex_);
+    arguments = {incarnation_, options_.worker, Millis(lease_)};
+  }
+  const auto reply = Exchange(ScriptCommand(options_.place, scripts::kTake, std::move(arguments)));
+  if (!reply) return WaitOrOver();
   const std::string_view what = (*reply)[0].text();
   if (what == "unit") return Accept(*reply);
-  if (what == "incomplete") end_ = End::kIncomplete;
-  if (what == "finished") end_ = End::kFinished;
-  if (end_ != End::kNone) return Taken{Taken::State::kOver};
-  if (what == "wait") return wait();
+  if (what == "incomplete") EndBecause(End::kIncomplete, {});
+  if (what == "finished") EndBecause(End::kFinished, {});
+  if (what == "wait" || end() != End::kNone) return WaitOrOver();
   // The job is gone, or its stream.
   if (const auto entered = Enter(what != "gone"); !entered) {
     if (entered.error().code == ErrorCode::kInvalidArgument) {
-      end_ = End::kLost;
-      why_ = entered.error();
+      EndBecause(End::kLost, entered.error());
     } else {
       NoteAway(entered.error());
     }
-    return wait();
+    return WaitOrOver();
   }
   return std::nullopt;
 }
@@ -243,6 +257,7 @@ std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
 std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply) {
   const std::string name(reply[2].text());
   const int deliveries = static_cast<int>(reply[3].integer());
+  const std::lock_guard lock(mutex_);
   const Held held{incarnation_, std::string(reply[1].text()), deliveries, Clock::now()};
   const bool is_finish = name == scripts::kFinishUnit;
   const auto found = index_.find(name);
@@ -305,16 +320,53 @@ bool RedisQueue::Fail(std::size_t unit, const Error& why) {
   return true;
 }
 
+void RedisQueue::KeepBeating(const std::stop_token& stop) {
+  std::mutex mutex;
+  std::unique_lock lock(mutex);
+  std::condition_variable_any ended;
+  Clock::time_point last = Clock::now();
+  while (true) {
+    const Clock::time_point next = last + Lease() / 3;
+    if (ended.wait_until(lock, stop, next, [&stop] { return stop.stop_requested(); })) return;
+    last = Clock::now();
+    Beat();
+  }
+}
+
 void RedisQueue::Beat() {
-  if (held_.empty() && !finish_ && outbox_.empty()) return;
-  std::vector<std::string> arguments = {incarnation_, options_.worker};
-  for (const auto& [unit, held] : held_) arguments.push_back(held.id);
-  if (finish_) arguments.push_back(finish_->id);
-  (void)Exchange(ScriptCommand(options_.place, scripts::kBeat, std::move(arguments)));
+  std::vector<std::string> arguments;
+  {
+    const std::lock_guard lock(mutex_);
+    if (held_.empty() && !finish_) return;
+    arguments = {incarnation_, options_.worker};
+    for (const auto& [unit, held] : held_) arguments.push_back(held.id);
+    if (finish_) arguments.push_back(finish_->id);
+  }
+  // A call that takes longer is given up, so that the next one comes in time. Whether Redis is away is told by Take.
+  constexpr milliseconds kMinTimeout{500};
+  if (!beat_connection_ || beat_connection_->HasEnded()) {
+    JobPlace place = options_.place;
+    place.timeout = std::min(place.timeout, std::max(Lease() / 3, kMinTimeout));
+    auto connection = ConnectToJob(place);
+    if (!connection) return;
+    beat_connection_ = *std::move(connection);
+  }
+  if (!beat_connection_->Call(ScriptCommand(options_.place, scripts::kBeat, std::move(arguments)))) {
+    beat_connection_ = nullptr;
+  }
 }
 
 void RedisQueue::Flush() {
-  if (!outbox_.empty()) (void)Exchange({"PING"});
+  const bool is_empty = [&] {
+    const std::lock_guard lock(mutex_);
+    return outbox_.empty();
+  }();
+  if (!is_empty) (void)Exchange({"PING"});
+}
+
+milliseconds RedisQueue::Lease() const {
+  const std::lock_guard lock(mutex_);
+  return lease_;
 }
 
 RedisQueue::End RedisQueue::end() const {
@@ -328,7 +380,7 @@ Error RedisQueue::Why() const {
 }
 
 Result<std::vector<DeadUnit>> RedisQueue::Dead() {
-  const std::lock_guard lock(mutex_);
+  const std::lock_guard calls(calls_);
   Flush();
   if (!connection_) {
     if (auto connected = Connect(); !connected) return tl::unexpected(connected.error());
@@ -337,10 +389,13 @@ Result<std::vector<DeadUnit>> RedisQueue::Dead() {
 }
 
 void RedisQueue::Finished() {
-  const std::lock_guard lock(mutex_);
-  if (finish_) Send(*finish_, scripts::kFinished, {});
-  finish_.reset();
-  end_ = End::kFinished;
+  const std::lock_guard calls(calls_);
+  {
+    const std::lock_guard lock(mutex_);
+    if (finish_) Send(*finish_, scripts::kFinished, {});
+    finish_.reset();
+    end_ = End::kFinished;
+  }
   Flush();
 }
 

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <unordered_map>
@@ -29,10 +30,10 @@ struct RedisQueueOptions {
   std::vector<std::string> units;  // the names of the units of the plan, by index
   // The indexes of the units that have no file with the right key. Called whenever the queue is filled.
   std::function<std::vector<std::size_t>()> find_missing;
-  // Another worker inherits a unit whose worker was not heard of for so long. Counts when the queue is filled.
+  // A unit whose worker was silent for so long goes to another worker. The worker that fills the queue sets it for all.
   std::chrono::milliseconds lease{30'000};
-  std::chrono::milliseconds patience{600'000};  // how long a Redis that is away is waited for
-  // Told when Redis is away, and when it is back. May be empty. Called by any thread.
+  std::chrono::milliseconds patience{600'000};  // how long an unreachable Redis is waited for
+  // Receives a message when Redis becomes unreachable, and when it is back. May be empty. Called by any thread.
   std::function<void(const std::string&)> on_message = {};
 };
 
@@ -42,7 +43,7 @@ class RedisQueue : public UnitQueue {
   // tries them again. kInvalidArgument: the job bakes something else; the message says what differs. Errors of
   // ConnectToJob.
   static Result<std::unique_ptr<RedisQueue>> Join(RedisQueueOptions options);
-  // Gives back what was not done.
+  // Gives back the units that were not done.
   ~RedisQueue() override;
 
   Taken Take() override;
@@ -56,15 +57,15 @@ class RedisQueue : public UnitQueue {
     kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
     kFinished,    // another worker has done that
     kIncomplete,  // units were given up: Dead
-    kLost,        // Redis is away for too long, or the job is another one now: Why
+    kLost,        // Redis was unreachable for too long, or the job is another one now: Why
   };
   End end() const;
   Error Why() const;
   // The units that were given up.
   Result<std::vector<DeadUnit>> Dead();
-  // Of kFinish. The manifest is written.
+  // After kFinish: the manifest is written.
   void Finished();
-  // Units that are not there although they were done: the job goes on with them.
+  // After kFinish: these units are absent although they were done. The job continues with them.
   void AddMissing(const std::vector<std::size_t>& units);
 
  private:
@@ -76,7 +77,7 @@ class RedisQueue : public UnitQueue {
   };
 
   explicit RedisQueue(RedisQueueOptions options);
-  // All below: the mutex is held.
+  // `calls_` is held by the caller of these, `mutex_` is not.
   Result<void> Enter(bool is_emptied);
   Result<void> CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const;
   Result<bool> Fill(const std::string& incarnation);
@@ -88,16 +89,30 @@ class RedisQueue : public UnitQueue {
   void NoteBack();
   std::optional<Taken> TakeOnce();
   std::optional<Taken> Accept(const redis::ReplyView& reply);
-  // Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
-  void Send(const Held& held, const char* script, std::vector<std::string> arguments);
-  void Beat();
+  Taken WaitOrOver();
+  void EndBecause(End end, const Error& why);
   void Flush();
+  // As it is in Redis.
+  void SetJob(const std::string& incarnation, std::chrono::milliseconds lease);
+  std::string Incarnation() const;
+  std::chrono::milliseconds Lease() const;
+  // `mutex_` is held. Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
+  void Send(const Held& held, const char* script, std::vector<std::string> arguments);
+
+  // Of the thread of the heartbeat, which has a connection of its own: a call that Redis answers late, or a search for
+  // what is missing, must not cost the units in hand.
+  void KeepBeating(const std::stop_token& stop);
+  void Beat();
 
   const RedisQueueOptions options_;
   std::unordered_map<std::string, std::size_t> index_;  // of units_
 
-  mutable std::mutex mutex_;
+  std::mutex calls_;  // held while Redis is waited for; taken before mutex_
   std::unique_ptr<redis::Connection> connection_;
+  Clock::time_point next_take_{}, next_connect_{};
+  std::optional<Clock::time_point> away_since_;
+
+  mutable std::mutex mutex_;  // of what follows; never held while Redis is waited for
   std::string incarnation_;
   std::chrono::milliseconds lease_;
   std::map<std::size_t, Held> held_;
@@ -105,8 +120,8 @@ class RedisQueue : public UnitQueue {
   std::deque<redis::Command> outbox_;  // to be sent before the next command
   End end_ = End::kNone;
   Error why_;
-  std::optional<Clock::time_point> away_since_;
-  Clock::time_point next_take_{}, next_connect_{};
+
+  std::unique_ptr<redis::Connection> beat_connection_;
   std::jthread beat_;
 };
 

@@ -1,6 +1,7 @@
 #include "config/common/listen_address.h"
 
 #include <arpa/inet.h>
+#include <sys/un.h>
 
 #include <algorithm>
 #include <charconv>
@@ -10,6 +11,9 @@ namespace terrace::config {
 namespace {
 
 constexpr std::string_view kExamples = "HOST:PORT such as 127.0.0.1:8080, 0.0.0.0:8080 or [::1]:8080";
+
+constexpr std::string_view kUnix = "unix:";
+constexpr std::size_t kMaxPath = sizeof(sockaddr_un::sun_path) - 1;
 
 bool IsIpAddress(int family, const std::string& host) {
   if (host.find('\0') != std::string::npos) return false;  // inet_pton would not read past it
@@ -62,7 +66,20 @@ Result<ListenAddress> ParseListenAddress(std::string_view text) {
   return ListenAddress{std::move(host), *port};
 }
 
+Result<ListenAddress> ParseListenAddressOrPath(std::string_view text) {
+  if (!text.starts_with(kUnix)) return ParseListenAddress(text);
+  ListenAddress address;
+  address.path = text.substr(kUnix.size());
+  const bool is_path = address.path.size() > 1 && address.path.front() == '/' && address.path.back() != '/' &&
+                       address.path.find('\0') == std::string::npos && address.path.size() <= kMaxPath;
+  if (is_path) return address;
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "what follows unix: must be an absolute path of at most {} bytes, as in unix:/run/terrace/admin.sock", kMaxPath);
+}
+
 std::string ToString(const ListenAddress& address) {
+  if (!address.path.empty()) return std::string(kUnix) + address.path;
   const bool is_ipv6 = address.host.find(':') != std::string::npos;
   return is_ipv6 ? fmt::format("[{}]:{}", address.host, address.port)
                  : fmt::format("{}:{}", address.host, address.port);

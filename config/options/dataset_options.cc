@@ -155,7 +155,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .codec = WaterCodec()},
       {.key = "imagery",
        .value = "FILE",
-       .help = "Image from which the textures of GLB tiles are made",
+       .help = "Image for imagery tiles and for the textures of GLB tiles",
        .details = "In the file `{\"image\": \"photo.tif\"}`, relative to its folder; as a flag the path alone. "
                   "[More](#imagery)",
        .codec = ImageryCodec(),

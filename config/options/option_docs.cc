@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "config/common/nearest_name.h"
 #include "config/options/option_table.h"
 #include "config/options/options.h"
 
@@ -50,13 +51,6 @@ std::vector<std::string> ValuesOf(const Json& schema) {
   if (type == "boolean") return {"`true`", "`false`"};
   if (type == "string") return {"text"};
   return {type == "array" ? "list" : type};
-}
-
-std::string Alternatives(std::vector<std::string> values) {
-  if (values.size() < 2) return fmt::format("{}", fmt::join(values, ""));
-  const std::string last = std::move(values.back());
-  values.pop_back();
-  return fmt::format("{} or {}", fmt::join(values, ", "), last);
 }
 
 // The placeholder of the value in the help states its unit.

@@ -30,15 +30,23 @@ constexpr const char* kListenSchema = R"({
 Json WriteAddress(const ListenAddress& address) { return ToString(address); }
 Json WriteAddress(const std::optional<ListenAddress>& address) { return address ? WriteAddress(*address) : Json(); }
 
+// A path of at most 107 bytes, or as above.
+constexpr const char* kListenOrPathSchema = R"({
+  "type": "string",
+  "pattern": "^(unix:/.{0,105}[^/]|(\\[[0-9A-Fa-f:.]+\\]|[A-Za-z0-9][A-Za-z0-9.-]{0,252}):0*([0-9]{1,4}|[1-5][0-9]{4}|6[0-4][0-9]{3}|65[0-4][0-9]{2}|655[0-2][0-9]|6553[0-5]))$",
+  "examples": ["127.0.0.1:9090", "unix:/run/terrace/admin.sock"]
+})";
+
 template <typename Member>
-Codec<Config> Address(Member Config::*member) {
+Codec<Config> Address(Member Config::*member, Result<ListenAddress> (*parse)(std::string_view) = ParseListenAddress,
+                      const char* schema = kListenSchema) {
   return {[=](const Json& value, const ConfigLocation& place, Config& config) {
             if (!value.is_string()) return place.Expected("text such as \"127.0.0.1:8080\"");
-            Result<ListenAddress> address = ParseListenAddress(value.get_ref<const std::string&>());
+            Result<ListenAddress> address = parse(value.get_ref<const std::string&>());
             if (!address) return place.Fail(address.error().message);
             config.*member = *std::move(address);
           },
-          [=](const Config& config) { return WriteAddress(config.*member); }, TextToJson, Json::parse(kListenSchema)};
+          [=](const Config& config) { return WriteAddress(config.*member); }, TextToJson, Json::parse(schema)};
 }
 
 Codec<Config> Viewer() {
@@ -126,13 +134,22 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .other_words = "max_age",
        .is_live = true},
       {.key = "admin_listen",
-       .value = "HOST:PORT",
+       .value = "HOST:PORT|unix:PATH",
        .section = "listening",
        .help = "A second address, for operators: POST /admin/purge and /metrics",
-       .details = "Plain HTTP without tokens: whoever reaches it may use it, so take a loopback address or one of a "
-                  "closed network ([operations](operations.md#purging-caches))",
-       .codec = Address(&Config::admin_listen),
+       .details = "Plain HTTP without tokens: whoever reaches it may use it, so take the path of a Unix socket, a "
+                  "loopback address or one of a closed network ([operations](operations.md#purging-caches))",
+       .codec = Address(&Config::admin_listen, ParseListenAddressOrPath, kListenOrPathSchema),
        .other_words = "management control"},
+      {.key = "admin_socket_mode",
+       .value = "MODE",
+       .section = "listening",
+       .help = "Who may connect to the Unix socket of admin_listen",
+       .details =
+           "0600: the user that the server runs as; 0660: also its group; 0666: everybody who may enter the folder",
+       .codec = Choice(&Config::admin_socket_mode,
+                       std::vector<std::pair<Json, unsigned>>{{"0600", 0600}, {"0660", 0660}, {"0666", 0666}}),
+       .other_words = "socket_mode permissions"},
       {.key = "io_threads",
        .value = "N",
        .section = "load",

@@ -37,7 +37,7 @@ std::vector<std::string> Quoted(const std::vector<std::string_view>& names) {
 
 }  // namespace
 
-// The object itself is one of the kinds. It has no key of this name, and its similar keys come first.
+// The order: kinds that have the key itself, then similar keys of this object, then similar keys of the other kinds.
 std::string ExplainKey(std::string_view key, std::span<const KnownName> known) {
   std::string name;
   std::vector<std::string> places;

@@ -61,7 +61,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
        .missing = ": the path of an image"},
       {.key = "attribution",
        .value = "TEXT",
-       .help = "Attribution of the image, stored in textured tiles",
+       .help = "Attribution of the image, for maps and in textured tiles",
        .details = "One line. It is the `asset.copyright` of these tiles; CesiumJS can show it",
        .codec = OneLine(&ImageryConfig::attribution)},
       {.key = "texture",
@@ -79,7 +79,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
                        {{Json(64), 64}, {Json(128), 128}, {Json(256), 256}, {Json(512), 512}, {Json(1024), 1024}})},
       {.key = "quality",
        .value = "N",
-       .help = "Quality of textures: 1 is smallest, 100 best",
+       .help = "Quality of textures and imagery tiles: 1 is smallest, 100 best",
        .codec = Integer(&ImageryConfig::quality, 1, 100)},
   };
   return table;

@@ -14,7 +14,7 @@ namespace terrace {
 
 // The kind of a failure. server/http/http_error.cc maps it to HTTP status codes.
 enum class ErrorCode {
-  kInvalidArgument,  // the request makes no sense
+  kInvalidArgument,  // the request is invalid
   kNotFound,         // it does not exist
   kUnavailable,      // a source or a resource does not respond now; a retry may succeed
   kChanged,          // a source file has changed since it was opened; reopening it may succeed

@@ -12,7 +12,7 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
   TERRACE_CHECK(geo::IsValid(top) && top.level <= deepest && deepest <= geo::kMaxLevel);
   ContentHasher hasher;
   hasher.Add(impl_->floor);
-  hasher.Add(max_level());
+  hasher.Add(finest_level());
   for (int level = top.level; level <= deepest; ++level) hasher.Add(impl_->LatticeOf(level).cells);
   for (const std::size_t i : impl_->GridsNear(top)) {
     const RasterGrid& grid = impl_->grids[i];

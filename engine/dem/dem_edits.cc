@@ -86,9 +86,22 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
                                     is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "")));
       continue;
     }
+    if (edit.datum == EditDatum::kOrthometric) {
+      auto wrong = AddUndulations(edit);
+      if (!wrong) return tl::unexpected(std::move(wrong).error());
+      if (!wrong->empty()) {
+        faults.push_back(FaultOf(edit, *std::move(wrong)));
+        continue;
+      }
+    }
     if (edit.op == EditOp::kFlatten && edit.flat != FlatHeight::kGiven) {
-      auto heights = PointsUnedited(PositionsInside(edit), HeightDatum::kEllipsoid, options.stop);
+      const std::vector<GeoPosition> inside = PositionsInside(edit);
+      auto heights = PointsUnedited(inside, HeightDatum::kEllipsoid, options.stop);
       if (!heights) return tl::unexpected(std::move(heights).error());
+      for (std::size_t k = 0; k < inside.size() && edit.undulations != nullptr; ++k) {
+        const PlanPoint at{edit.plane.X(inside[k].longitude), edit.plane.Y(inside[k].latitude)};
+        (*heights)[k] -= static_cast<float>(edit.undulations->At(at));
+      }
       const auto height = FlatHeightOf(edit.flat, *std::move(heights));
       if (!height) {
         faults.push_back(FaultOf(edit, "there are no heights inside it to take the mean or median of; give a height"));
@@ -139,6 +152,7 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
     return {edit.low_m, edit.high_m};
   });
   info.edits = edits->edits().size();
+  AddDeeperLevels(options.error_fraction);
   return {};
 }
 
@@ -287,6 +301,14 @@ MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells + 1, lattice.cells + 1};
   // With the halo: a line beside the edge passes nodes of the edge, and both neighbours must find it.
   const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
+  if (which.empty()) return {};
+  return impl_->edits->DemandsOf(lattice, window, which);
+}
+
+MeshDemands DemSource::DemandsOf(int level, const NodeWindow& window) const {
+  if (impl_->edits == nullptr) return {};
+  const geo::Lattice& lattice = impl_->LatticeOf(level);
+  const auto which = impl_->EditsAt(lattice, {window.column - 1, window.row - 1, window.columns + 2, window.rows + 2});
   if (which.empty()) return {};
   return impl_->edits->DemandsOf(lattice, window, which);
 }

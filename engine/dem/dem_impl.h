@@ -55,6 +55,9 @@ class DemSource::Impl {
 
   // Of dem_edits.cc. ApplyEdits: to heights above the ellipsoid. `error_m`: EditSet::Apply.
   Result<void> OpenEdits(const DemOptions& options);
+  void AddDeeperLevels(double error_fraction);
+  // Of an edit with orthometric heights. Returns what is wrong with it; empty: nothing.
+  Result<std::string> AddUndulations(Edit& edit) const;
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
@@ -73,7 +76,8 @@ class DemSource::Impl {
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
-  float floor = 0;  // above the ellipsoid
+  std::vector<std::vector<geo::TileRange>> available_unedited;  // empty: the same
+  float floor = 0;                                              // above the ellipsoid
   // For the whole Earth, of the last raster grid that refers to a geoid; or null.
   std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;

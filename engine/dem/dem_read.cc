@@ -306,6 +306,40 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
   return heights;
 }
 
+Result<std::vector<float>> DemSource::ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
+                                                        std::stop_token stop) const {
+  TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
+  TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
+  const geo::MercatorGrid grid{depth};
+  const auto read = [&](HeightDatum of) {
+    return impl_->ReadGrids(grid, window, of, fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
+  };
+  auto known = read(datum);
+  if (!known) return known;
+  const auto which = impl_->EditsAt(grid, window);
+  if (which.empty()) return known;
+  std::vector<float> unedited = *known;
+  if (datum != HeightDatum::kEllipsoid) {
+    auto ellipsoidal = read(HeightDatum::kEllipsoid);
+    if (!ellipsoidal) return ellipsoidal;
+    unedited = *std::move(ellipsoidal);
+  }
+  std::vector<float> edited = unedited;
+  std::ranges::replace_if(edited, IsVoid, impl_->floor);
+  if (const auto done = impl_->ApplyEdits(grid, window, which, edited, stop); !done) {
+    return tl::unexpected(done.error());
+  }
+  for (std::size_t i = 0; i < edited.size(); ++i) {
+    if (IsVoid(unedited[i])) {
+      // No source tells how far apart the datums are there.
+      if (edited[i] != static_cast<float>(impl_->floor)) (*known)[i] = edited[i];
+    } else if (edited[i] != unedited[i]) {
+      (*known)[i] = datum == HeightDatum::kEllipsoid ? edited[i] : (*known)[i] + (edited[i] - unedited[i]);
+    }
+  }
+  return known;
+}
+
 Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                                  std::stop_token stop, std::span<std::uint8_t> filled) const {
   auto heights = impl_->PointsUnedited(points, datum, stop, filled);

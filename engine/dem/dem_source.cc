@@ -17,6 +17,7 @@
 #include "engine/dem/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/dem/mosaic/availability.h"
+#include "engine/dem/mosaic/point_blocks.h"
 #include "engine/dem/sources/open_rasters.h"
 #include "engine/dem/sources/raster_source.h"
 #include "engine/dem/statistics/cache_folder.h"
@@ -239,6 +240,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
   impl->info.left_out = std::move(left_out);
   impl->available = AvailableTiles(SourceExtentsOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
+  impl->info.finest_level = impl->info.max_level;
   impl->lattices = PlanLattices(finest->spacing(), impl->info.max_level);
   impl->floor = static_cast<float>(impl->info.floor);
   for (const RasterGrid& grid : impl->grids) {
@@ -260,6 +262,7 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, c
 
 const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
+int DemSource::finest_level() const { return impl_->info.finest_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 
@@ -315,6 +318,11 @@ SampleCounts DemSource::CountSamples() const {
     sum.voids += counts.voids;
   }
   return sum;
+}
+
+KeptBlocks DemSource::CountKeptBlocks() {
+  const PointBlockCache& cache = PointBlockCache::Shared();
+  return {cache.count(), cache.bytes()};
 }
 
 bool DemSource::has_datum() const {

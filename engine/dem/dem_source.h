@@ -33,8 +33,10 @@ class DemSource {
   const DemInfo& info() const;
 
   // The deepest level served: the first whose default error is at most a tenth of the finest source's spacing, or at
-  // most `finest_error`.
+  // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
+  // The deepest level without edits. Levels below it have tiles around edits alone.
+  int finest_level() const;
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
@@ -67,6 +69,11 @@ class DemSource {
   // source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
+  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
+  // kEllipsoid, or kSource for what a map calls elevation; an edit changes both by the same difference.
+  Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
+                                               std::stop_token stop = {}) const;
+
   // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
   // sources, in collars, and in holes that are not filled. Voids are filled as in tiles. `filled` has one element for
   // each point, or none; an element becomes 1 where the point lies in the pixel of a void sample. A height does not
@@ -90,14 +97,21 @@ class DemSource {
   //
   // What the edits ask of the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
+  // The same of nodes of a level's lattice. Columns wrap at 360 degrees.
+  MeshDemands DemandsOf(int level, const NodeWindow& window) const;
   // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits.
   // `EditsOfMercator`: of pixels as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsOf(const geo::TileKey& key) const;
   std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
+  // A hash of the tiles below a tile that exist because of edits; 0: there are none.
+  std::uint64_t DeeperTilesOf(const geo::TileKey& key) const;
+  // Availability() as far as it concerns the tile: without levels below finest_level() that have no tile below it.
+  std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
+  static KeptBlocks CountKeptBlocks();
 
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
   // precedence, and every option that changes heights. Copies of the files have the same hash.

@@ -152,10 +152,16 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
+  int finest_level = 0;  // the deepest one without edits; equal to max_level unless `precision` goes deeper
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.
   std::vector<std::string> left_out;
+};
+
+// Blocks of samples with their voids filled that the process keeps for points and lines of sight, of all sources.
+struct KeptBlocks {
+  std::size_t count = 0, bytes = 0;
 };
 
 // Numbers of samples read for tiles, at the resolution that they were read at.

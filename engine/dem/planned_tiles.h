@@ -16,7 +16,7 @@ std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level);
 // The intersection of two boxes: none, one, or two boxes if one of them surrounds the gap of the other.
 std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
 
-// A raster as far as it decides which tiles exist.
+// The properties of a raster that decide which tiles exist.
 struct PlannedRaster {
   GeoBounds bounds;
   double east = 0, north = 0;  // metres on the ground between samples

@@ -106,17 +106,21 @@ Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Cor
 Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, const Corner& b,
                                    const BorderOptions& options, const SampleLimits& limits) {
   const BorderEdge edge(field, a, b);
+  const double of_chord_m = options.rounding * std::abs(edge.h_b - edge.h_a) / (edge.b - edge.a);
   Candidate worst;
   for (int k = edge.a + 1; k < edge.b; ++k) {
     const double misfit =
         std::abs(edge.ChordAt(k) - edge.HeightAt(k)) + options.sagitta_m * (k - edge.a) * (edge.b - k);
     if (std::isnan(misfit)) continue;
-    const double padded = misfit + options.padding_m;
-    const double weighted = std::max(padded * options.weight, padded + options.step_m);
     const int x = edge.along_x ? k : edge.across, y = edge.along_x ? edge.across : k;
     const std::size_t sample =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(x);
-    const double error = options.scale * limits.Counted(sample, std::min(weighted, kMaxBorderWeight * misfit));
+    const bool has_limit = limits.HasLimit(sample);
+    const double padded = misfit + (has_limit ? of_chord_m : options.padding_m);
+    const double weighted = std::max(padded * options.weight, padded + options.step_m);
+    const double error =
+        options.scale *
+        limits.Counted(sample, has_limit && misfit > 0 ? weighted : std::min(weighted, kMaxBorderWeight * misfit));
     if (error > worst.error) worst = {error, edge.SampleAt(k)};
   }
   return worst;

@@ -38,6 +38,9 @@ enum class Side : std::uint8_t {
 // evaluated in double in exactly this form. Its error is
 //   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m).
 // `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts.
+// Samples that have a limit (sample_limits.h) count the rounding of their own chord alone, and in full: with
+// p = rounding |h_b - h_a| / (b - a),
+//   scale max((m + p) weight, m + p + step_m).
 // The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples
 // of this border alone: two fields that share a border with equal heights and options insert the same border vertices,
 // whatever their interiors are.
@@ -45,6 +48,7 @@ struct BorderOptions {
   double weight = 1;
   double padding_m = 0;
   double step_m = 0;
+  double rounding = 0;   // samples that a vertex's position may be off along the border
   double sagitta_m = 0;  // half the second difference of the curved ground along the border
   double scale = 1;      // factor on the error: in a run to the error E the border is refined to E / scale
 };

@@ -30,6 +30,10 @@ struct SampleLimits {
 
   bool empty() const { return weights.empty() && forced.empty(); }
 
+  bool HasLimit(std::size_t sample) const {
+    return !weights.empty() && (weights[sample] > 1 || caps[sample] < std::numeric_limits<float>::infinity());
+  }
+
   // What the error of a sample counts as. `scale`: caps count this many times, and from 1024 on nothing is forced: for
   // runs that may not take more vertices.
   double Counted(std::size_t sample, double error, double scale = 1) const {

@@ -19,6 +19,8 @@ using Json = nlohmann::json;
 constexpr std::uint32_t kMagic = 0x46546C67;      // "glTF"
 constexpr std::uint32_t kJsonChunk = 0x4E4F534A;  // "JSON"
 constexpr std::uint32_t kBinaryChunk = 0x004E4942;
+// Component types of accessors.
+constexpr int kUint16 = 5123, kUint32 = 5125, kFloat32 = 5126;
 
 template <typename... Args>
 tl::unexpected<Error> Damaged(fmt::format_string<Args...> format, Args&&... args) {
@@ -75,10 +77,12 @@ Result<TileContent> DecodeDraco(std::string_view bytes, const Json& accessor_of_
   return content;
 }
 
+std::size_t IndexBytes(int component_type) { return component_type == kUint32 ? 4 : component_type == kUint16 ? 2 : 1; }
+
 std::uint32_t IndexAt(std::string_view bytes, int component_type, std::size_t i) {
-  ByteReader reader(bytes.substr(i * (component_type == 5125 ? 4 : component_type == 5123 ? 2 : 1)));
-  if (component_type == 5125) return reader.Get<std::uint32_t>();
-  return component_type == 5123 ? reader.Get<std::uint16_t>() : reader.Get<std::uint8_t>();
+  ByteReader reader(bytes.substr(i * IndexBytes(component_type)));
+  if (component_type == kUint32) return reader.Get<std::uint32_t>();
+  return component_type == kUint16 ? reader.Get<std::uint16_t>() : reader.Get<std::uint8_t>();
 }
 
 Result<TileContent> DecodePlain(const Json& document, const Json& primitive, std::string_view binary) {
@@ -87,25 +91,25 @@ Result<TileContent> DecodePlain(const Json& document, const Json& primitive, std
   TileContent content;
   content.vertices = positions.at("count").get<std::uint32_t>();
   content.triangles = content.vertices / 3;
-  const auto is_packed = [&](const Json& accessor) {
+  // The only extension of buffer views is EXT_meshopt_compression.
+  const auto is_meshopt = [&](const Json& accessor) {
     const Json& view = document.at("bufferViews").at(accessor.at("bufferView").get<std::size_t>());
     return view.contains("extensions");
   };
-  if (!is_packed(positions)) {
+  if (!is_meshopt(positions)) {
     const auto bytes = BytesOf(document, positions.at("bufferView").get<std::size_t>(), binary);
-    const std::size_t vertex_bytes = positions.at("componentType").get<int>() == 5126 ? 12 : 6;
+    const std::size_t vertex_bytes = positions.at("componentType").get<int>() == kFloat32 ? 12 : 6;
     if (!bytes || bytes->size() / vertex_bytes < content.vertices) return Damaged("cut off in its positions");
   }
   if (!primitive.contains("indices")) return content;
   const Json& indices = accessors.at(primitive.at("indices").get<std::size_t>());
   const auto count = indices.at("count").get<std::size_t>();
   content.triangles = static_cast<std::uint32_t>(count / 3);
-  if (is_packed(indices)) return content;
+  if (is_meshopt(indices)) return content;
   const auto bytes = BytesOf(document, indices.at("bufferView").get<std::size_t>(), binary);
   const int type = indices.at("componentType").get<int>();
   const auto offset = indices.value("byteOffset", std::size_t{0});
-  const std::size_t index_bytes = type == 5125 ? 4 : type == 5123 ? 2 : 1;
-  if (!bytes || offset > bytes->size() || (bytes->size() - offset) / index_bytes < count) {
+  if (!bytes || offset > bytes->size() || (bytes->size() - offset) / IndexBytes(type) < count) {
     return Damaged("cut off in its indices");
   }
   for (std::size_t i = 0; i < count; ++i) {

@@ -9,8 +9,8 @@
 namespace terrace::fly {
 
 // Decodes the meshes of a GLB (glTF 2.0; KHR_draco_mesh_compression by libdraco). Every index must name a vertex. The
-// buffers of meshes with EXT_meshopt_compression are not decoded. kInvalidArgument says what is wrong; any bytes are
-// safe.
+// buffers of meshes with EXT_meshopt_compression are not decoded. Safe for any input. kInvalidArgument says what is
+// wrong.
 Result<TileContent> DecodeGlb(std::string_view bytes);
 
 }  // namespace terrace::fly

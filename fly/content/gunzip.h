@@ -13,7 +13,7 @@ inline constexpr std::size_t kMaxBodyBytes = std::size_t{256} << 20;  // decoded
 
 bool IsGzip(std::string_view bytes);
 
-// kInvalidArgument if the bytes are no single complete gzip stream, or decode to more than kMaxBodyBytes.
+// kInvalidArgument if the bytes are not one complete gzip stream, or decode to more than kMaxBodyBytes.
 Result<std::string> Gunzip(std::string_view bytes);
 
 }  // namespace terrace::fly

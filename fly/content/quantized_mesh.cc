@@ -21,7 +21,7 @@ tl::unexpected<Error> Damaged(std::string_view what) {
 
 std::int32_t FromZigZag(std::uint16_t value) { return (value >> 1) ^ -(value & 1); }
 
-// One of u, v and height for all vertices. False if a value leaves 0 to 32767 or the bytes end.
+// Reads u, v or height of all vertices. False if a value leaves 0 to 32767 or the bytes end.
 bool ReadCoordinates(ByteReader& reader, std::uint32_t count, std::vector<std::int32_t>& values) {
   const std::string_view bytes = reader.GetBytes(std::size_t{count} * 2);
   if (!reader.ok()) return false;
@@ -52,7 +52,7 @@ struct Mesh {
   std::vector<std::uint32_t> triangles;
 };
 
-// High-water-mark coding: a code counts down from the highest index so far, and 0 is a new one.
+// High-water-mark coding: a code is subtracted from the next unused index; 0 uses that index.
 bool ReadTriangles(ByteReader& reader, Mesh& mesh) {
   const auto vertices = static_cast<std::uint32_t>(mesh.u.size());
   IndexReader indices(reader, vertices);

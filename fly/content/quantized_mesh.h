@@ -8,8 +8,8 @@
 
 namespace terrace::fly {
 
-// Reads all of a tile: header, vertices, indices, edges and extensions. kInvalidArgument names the first thing that is
-// wrong; any bytes are safe.
+// Reads all of a tile: header, vertices, indices, edges and extensions. Safe for any input.
+// kInvalidArgument names the first fault.
 Result<TileContent> DecodeQuantizedMesh(std::string_view bytes);
 
 }  // namespace terrace::fly

@@ -15,8 +15,8 @@ struct TileContent {
   std::uint32_t triangles = 0;
   std::uint64_t bytes = 0;            // of positions, normals and indices as a client keeps them
   std::optional<HeightSpan> heights;  // quantized-mesh states them
-  // The share of the tile's rectangle that triangles cover, seen from above: 1 but where the server cut holes. Negative
-  // if unknown (GLB).
+  // The share of the tile's rectangle that triangles cover, seen from above: 1 unless the server cut holes. Negative if
+  // unknown (GLB).
   double covered = -1;
 };
 

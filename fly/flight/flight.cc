@@ -5,7 +5,7 @@
 #include <memory>
 #include <thread>
 
-#include "fly/flight/viewer.h"
+#include "fly/flight/client.h"
 #include "fly/flight/worker_pool.h"
 
 namespace terrace::fly {
@@ -15,8 +15,8 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-// Frames of every `step`-th viewer from `first`, until all have arrived.
-void DrawFrames(const std::vector<std::unique_ptr<Viewer>>& viewers, std::size_t first, std::size_t step,
+// Frames of every `step`-th client from `first`, until all have arrived.
+void DrawFrames(const std::vector<std::unique_ptr<Client>>& clients, std::size_t first, std::size_t step,
                 double frames_per_second, Clock::time_point start, const std::atomic<bool>& stop) {
   const auto period = std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1 / frames_per_second));
   Clock::time_point due = start;
@@ -25,9 +25,9 @@ void DrawFrames(const std::vector<std::unique_ptr<Viewer>>& viewers, std::size_t
     any_flies = false;
     const bool is_late = Clock::now() > due + period;
     if (is_late) due = Clock::now();
-    for (std::size_t i = first; i < viewers.size(); i += step) {
-      if (viewers[i]->phase() == Phase::kDone) continue;
-      viewers[i]->Frame(SecondsSince(start), is_late);
+    for (std::size_t i = first; i < clients.size(); i += step) {
+      if (clients[i]->phase() == Phase::kDone) continue;
+      clients[i]->Frame(SecondsSince(start), is_late);
       any_flies = true;
     }
     due += period;
@@ -46,9 +46,9 @@ void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
   // In this order: replies that arrive at the end still find the workers.
   WorkerPool workers(cores);
   HttpClient http(http_options);
-  std::vector<std::unique_ptr<Viewer>> viewers;
+  std::vector<std::unique_ptr<Client>> clients;
   for (int i = 0; i < options.clients; ++i) {
-    viewers.push_back(std::make_unique<Viewer>(options, i, http, workers, statistics));
+    clients.push_back(std::make_unique<Client>(options, i, http, workers, statistics));
   }
   const Clock::time_point start = Clock::now();
   std::atomic<int> running = std::min(cores, options.clients);
@@ -56,7 +56,7 @@ void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
   std::vector<std::jthread> threads;
   for (std::size_t i = 0; i < step; ++i) {
     threads.emplace_back([&, i] {
-      DrawFrames(viewers, i, step, options.frames_per_second, start, stop);
+      DrawFrames(clients, i, step, options.frames_per_second, start, stop);
       --running;
     });
   }

@@ -26,13 +26,13 @@ struct FlightOptions {
   int clients = 1;                                          // client k of n starts at k / n of the path
   int max_loads = 20;                                       // requests of a client at a time
   std::uint64_t max_tile_bytes = std::uint64_t{512} << 20;  // decoded tiles that a client keeps
-  double first_view_limit_s = 30;                           // then the client takes off with what it has
-  double arrival_limit_s = 10;
-  int max_attempts = 6;  // of a tile that fails in a way that may pass
-  HttpOptions http;      // threads and clients are set from the others
+  double first_view_limit_s = 30;  // a client that has no full first view by then flies without it
+  double arrival_limit_s = 10;     // a client waits so long for a full view at the end
+  int max_attempts = 6;            // requests for a tile whose failures are transient
+  HttpOptions http;                // `threads` and `clients` are ignored
 };
 
-// Flies to the end, or until `stop`. Calls `each_second` with the number of every second that has passed.
+// Returns when all clients have arrived or `stop` is set. Calls `each_second` after each second, with its index from 0.
 void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
          const std::function<void(std::size_t)>& each_second, Statistics& statistics);
 

@@ -113,9 +113,9 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   totals_.frame_worst_px.push_back(static_cast<float>(record.worst_px));
 }
 
-void Statistics::AddAsked(double now_s, const geo::TileKey& key, CacheTier tier) {
+void Statistics::AddLoadedTile(double now_s, const geo::TileKey& key, CacheTier tier) {
   const std::lock_guard lock(mutex_);
-  asked_.push_back({key, now_s, tier});
+  loaded_tiles_.push_back({key, now_s, tier});
 }
 
 void Statistics::AddUrl(std::string url) {
@@ -166,9 +166,9 @@ std::vector<Second> Statistics::seconds() const {
   return seconds_;
 }
 
-std::vector<AskedTile> Statistics::asked() const {
+std::vector<LoadedTile> Statistics::loaded_tiles() const {
   const std::lock_guard lock(mutex_);
-  return asked_;
+  return loaded_tiles_;
 }
 
 std::vector<std::string> Statistics::urls() const {

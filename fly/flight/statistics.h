@@ -23,7 +23,7 @@ enum class Outcome {
   kNoConnection,
   kTimeout,
   kCut,     // closed before the reply was complete
-  kNoHttp,  // bytes that are no HTTP reply, or too many
+  kNoHttp,  // bytes that are not an HTTP reply, or too many
   kDamaged  // a complete reply that does not decode
 };
 inline constexpr std::size_t kOutcomes = 9;
@@ -52,14 +52,14 @@ struct RequestRecord {
 struct FrameRecord {
   Phase phase = Phase::kFlying;
   bool is_refined = false;
-  bool is_loaded = false;  // nothing is wanted any more, preloading included
+  bool is_loaded = false;  // refined, and nothing is left to load ahead
   bool is_mixed = false;   // shows tiles of more than one version
   bool is_late = false;
   double worst_px = 0;         // of the geometric errors of what is drawn
   double worst_stated_px = 0;  // of the errors that the server stated
   std::size_t drawn = 0, wanted = 0, in_flight = 0;
   std::uint64_t triangles = 0;
-  bool is_measured = false;  // the numbers of rays below
+  bool is_measured = false;  // whether this frame counted the rays of Coverage
   int rays = 0, missing = 0, uncovered = 0;
 };
 
@@ -71,11 +71,11 @@ struct Second {
   std::vector<float> latencies_s;  // of replies with tiles
   std::uint32_t frames = 0, refined = 0, flying = 0, flying_refined = 0;
   double worst_px = 0, worst_stated_px = 0;
-  std::size_t drawn = 0, wanted = 0, in_flight = 0;  // most
+  std::size_t drawn = 0, wanted = 0, in_flight = 0;  // maxima over the frames
   double worst_hole = 0;                             // share of the screen
 };
 
-struct AskedTile {
+struct LoadedTile {
   geo::TileKey key;
   double seconds = 0;  // since the start
   CacheTier tier = CacheTier::kUnknown;
@@ -99,7 +99,7 @@ struct Totals {
   double worst_hole = 0;  // share of the screen
   double worst_px = 0, worst_stated_px = 0;
   std::vector<float> latencies_s, frame_worst_px;  // of tiles; of flying frames
-  std::map<std::string, std::uint64_t> messages;   // of what went wrong, at most 50 different ones
+  std::map<std::string, std::uint64_t> messages;   // counts of failure messages, at most 50 different ones
 };
 
 // Thread-safe.
@@ -109,7 +109,7 @@ class Statistics {
 
   void AddRequest(double now_s, const RequestRecord& record);
   void AddFrame(double now_s, const FrameRecord& record);
-  void AddAsked(double now_s, const geo::TileKey& key, CacheTier tier);
+  void AddLoadedTile(double now_s, const geo::TileKey& key, CacheTier tier);
   void AddUrl(std::string url);
   void AddRetry();
   void AddVersionChange(double now_s, const std::string& from, const std::string& to);
@@ -121,7 +121,7 @@ class Statistics {
   Totals totals() const;
   Second second(std::size_t i) const;  // an empty one after the last
   std::vector<Second> seconds() const;
-  std::vector<AskedTile> asked() const;
+  std::vector<LoadedTile> loaded_tiles() const;
   std::vector<std::string> urls() const;
   std::vector<ClientRecord> clients() const;
   std::vector<GeodeticPoint> track() const;
@@ -133,14 +133,14 @@ class Statistics {
   mutable std::mutex mutex_;  // guards everything below
   Totals totals_;
   std::vector<Second> seconds_;
-  std::vector<AskedTile> asked_;
+  std::vector<LoadedTile> loaded_tiles_;
   std::vector<std::string> urls_;
   std::vector<ClientRecord> clients_;
   std::vector<GeodeticPoint> track_;
   std::vector<double> version_changes_;
 };
 
-// The value that a share of 0 to 1 of the values does not exceed; 0 without values.
+// The value with index ceil(share * (n - 1)) of the n values in ascending order, 0 <= share <= 1; 0 without values.
 double Percentile(std::vector<float> values, double share);
 
 }  // namespace terrace::fly

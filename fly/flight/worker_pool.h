@@ -13,11 +13,11 @@ namespace terrace::fly {
 class WorkerPool {
  public:
   explicit WorkerPool(int threads);
-  ~WorkerPool();  // drops what has not begun
+  ~WorkerPool();  // drops jobs that have not begun, waits for the others
   WorkerPool(const WorkerPool&) = delete;
   WorkerPool& operator=(const WorkerPool&) = delete;
 
-  void Post(std::function<void()> job);  // any thread
+  void Post(std::function<void()> job);  // thread-safe
 
  private:
   void Run();

@@ -34,7 +34,7 @@ constexpr auto kAwait = asio::as_tuple(asio::use_awaitable);
 
 struct Connection {
   beast::flat_buffer buffer;
-  std::unique_ptr<beast::tcp_stream> plain;  // one of both
+  std::unique_ptr<beast::tcp_stream> plain;  // either this or `tls` is set
   std::unique_ptr<TlsStream> tls;
 
   beast::tcp_stream& lowest() { return plain ? *plain : tls->next_layer(); }
@@ -203,7 +203,7 @@ class HttpClient::Impl {
       } else {
         keeps = co_await Exchange(*connection->plain, *connection, *call, reply, answered);
       }
-      // The server may close an idle connection at any time; such a request was never seen.
+      // The server closed an idle connection and has not seen the request: repeat it on another one.
       if (is_reused && reply.failure == Failure::kCut && !answered) continue;
       if (keeps) {
         connection->lowest().expires_never();
@@ -228,7 +228,7 @@ class HttpClient::Impl {
   const HttpOptions options_;
   asio::ssl::context tls_;
   std::mutex mutex_;  // guards idle_
-  // Before what holds its sockets: connections and coroutines end before it does.
+  // Declared before the members that use it: connections and coroutines are destroyed first.
   asio::io_context io_;
   asio::executor_work_guard<asio::io_context::executor_type> work_;
   std::vector<Idle> idle_;  // by client

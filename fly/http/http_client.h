@@ -24,7 +24,7 @@ enum class Failure {
   kConnect,    // no connection: refused, unknown host, TLS
   kTimeout,    // no complete reply in time
   kCut,        // closed before the reply was complete
-  kMalformed,  // no HTTP
+  kMalformed,  // not HTTP
   kTooLarge,
 };
 
@@ -36,14 +36,14 @@ struct HttpReply {
   bool is_gzip = false;
   std::string server_timing, retry_after, cache_control, max_error;
   std::uint64_t bytes = 0;  // of head and body
-  double seconds = 0;       // from the request to the last byte; of a new connection from connecting
+  double seconds = 0;       // from the call of Get to the last byte, connecting included
   bool opened_connection = false;
 };
 
 class HttpClient {
  public:
   explicit HttpClient(const HttpOptions& options);
-  ~HttpClient();  // breaks off what runs; no callback is called later
+  ~HttpClient();  // aborts open requests; no callback is called afterwards
   HttpClient(const HttpClient&) = delete;
   HttpClient& operator=(const HttpClient&) = delete;
 

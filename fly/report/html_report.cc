@@ -150,7 +150,7 @@ TimePlot RefinedPlot(const std::vector<Second>& seconds) {
   plot.title = "Fully refined frames";
   plot.unit = "%";
   plot.note = "Frames that showed every tile that the view asks for.";
-  plot.least_top = 100;
+  plot.min_top = 100;
   plot.series = {
       {"refined", "var(--c)",
        ValuesOf(seconds, [](const Second& s) { return s.frames == 0 ? kNone : 100.0 * s.refined / s.frames; }),
@@ -199,7 +199,7 @@ TimePlot FailurePlot(const std::vector<Second>& seconds) {
   TimePlot plot;
   plot.title = "Refused and failed requests";
   plot.unit = "a second";
-  plot.note = "Refused ones are asked again when Retry-After says.";
+  plot.note = "Refused ones are tiles again when Retry-After says.";
   plot.series = {{"refused (429, 503)", "var(--b)",
                   ValuesOf(seconds, [](const Second& s) { return double(s.outcomes[1]); }), Series::Shape::kBars},
                  {"failed", "var(--d)",
@@ -213,9 +213,9 @@ TimePlot FailurePlot(const std::vector<Second>& seconds) {
   return plot;
 }
 
-BarPlot LevelPlot(const std::vector<AskedTile>& asked) {
+BarPlot LevelPlot(const std::vector<LoadedTile>& tiles) {
   std::map<int, double> counts;
-  for (const AskedTile& tile : asked) ++counts[tile.key.level];
+  for (const LoadedTile& tile : tiles) ++counts[tile.key.level];
   BarPlot plot;
   plot.title = "Tiles by level";
   plot.unit = "count";
@@ -274,7 +274,7 @@ std::string TablesOf(const Totals& totals) {
 std::string HtmlOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
                    const Statistics& statistics) {
   const std::vector<Second> seconds = statistics.seconds();
-  const std::vector<AskedTile> asked = statistics.asked();
+  const std::vector<LoadedTile> tiles = statistics.loaded_tiles();
   std::string html =
       R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
   html += "<title>Flight over " + EscapeHtml(options.document.Text()) + "</title>" + kStyle + "</head><body><main>";
@@ -285,7 +285,7 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
       options.path.length_m() / 1000, options.duration_s, options.lens.width_px, options.lens.height_px,
       PlainNumber(options.lens.field_of_view), PlainNumber(options.select.max_error_px));
   html += BannerOf(summary, judgements) + CardsOf(summary) + "<h2>The flight</h2>";
-  html += MapOf(asked, statistics.track()) + R"(<div class="plots">)";
+  html += MapOf(tiles, statistics.track()) + R"(<div class="plots">)";
   std::vector<TimePlot> plots = {TilesPlot(seconds),          LatencyPlot(seconds), RefinedPlot(seconds),
                                  ErrorPlot(options, seconds), QueuePlot(seconds),   BytesPlot(seconds)};
   if (summary.errors + summary.totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)] > 0)
@@ -295,7 +295,7 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
     plot.marks_name = "new version of the dataset";
     html += SvgOf(plot);
   }
-  html += SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(asked)) + "</div>";
+  html += SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(tiles)) + "</div>";
   return html + TablesOf(summary.totals) + "</main></body></html>\n";
 }
 

@@ -1,4 +1,5 @@
-// The report of a flight as one HTML page: numbers, plots and a map as SVG, without scripts or other files.
+// The report of a flight as one HTML page: numbers, and plots and a map as SVG. The page needs no scripts and no other
+// files.
 #pragma once
 
 #include <string>

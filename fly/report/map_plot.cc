@@ -23,10 +23,10 @@ constexpr int kShownLevels = 7;  // the deepest ones; shallower tiles only tint 
 struct Frame {
   double longitude = 0, latitude = 0;  // of the middle
   double pixels_per_degree = 1;        // to the north
-  double squeeze = 1;                  // of degrees to the east
+  double east_scale = 1;               // a degree of longitude in degrees of latitude
 
   double X(double lon) const {
-    return kWidth / 2 + std::remainder(lon - longitude, 360.0) * squeeze * pixels_per_degree;
+    return kWidth / 2 + std::remainder(lon - longitude, 360.0) * east_scale * pixels_per_degree;
   }
   double Y(double lat) const { return kHeight / 2 - (lat - latitude) * pixels_per_degree; }
 };
@@ -44,17 +44,18 @@ Frame FrameOf(const std::vector<GeodeticPoint>& track) {
   }
   frame.longitude = track.front().longitude + (west + east) / 2;
   frame.latitude = (south + north) / 2;
-  frame.squeeze = std::max(0.05, std::cos(geo::ToRadians(frame.latitude)));
+  frame.east_scale = std::max(0.05, std::cos(geo::ToRadians(frame.latitude)));
   // Five times the height of the camera on each side: what it sees in detail.
   const double around = std::clamp(height * 5 / 111'000, 0.02, 60.0);
   frame.pixels_per_degree = std::min((kHeight - 2 * kMargin) / (north - south + 2 * around),
-                                     (kWidth - 2 * kMargin) / ((east - west) * frame.squeeze + 2 * around));
+                                     (kWidth - 2 * kMargin) / ((east - west) * frame.east_scale + 2 * around));
   return frame;
 }
 
 void AddTile(const Frame& frame, const geo::TileKey& key, const std::string& color, std::string& svg) {
   const Rectangle r = RectangleOf(key);
-  const double x = frame.X((r.west + r.east) / 2), width = (r.east - r.west) * frame.squeeze * frame.pixels_per_degree;
+  const double x = frame.X((r.west + r.east) / 2),
+               width = (r.east - r.west) * frame.east_scale * frame.pixels_per_degree;
   const double left = std::max(x - width / 2, -5.0), right = std::min(x + width / 2, kWidth + 5);
   const double top = std::max(frame.Y(r.north), -5.0), bottom = std::min(frame.Y(r.south), kHeight + 5);
   if (left >= right || top >= bottom) return;
@@ -75,13 +76,13 @@ void AddScaleBar(const Frame& frame, std::string& svg) {
 }  // namespace
 
 std::string ColorOfLevel(int level, int shallowest, int deepest) {
-  // Samples of the viridis map, which stays readable without colours.
+  // Samples of the colour map viridis, whose brightness ascends: it is readable in greyscale.
   static constexpr std::array<std::array<int, 3>, 6> kMap = {
       {{68, 1, 84}, {65, 68, 135}, {42, 120, 142}, {34, 168, 132}, {122, 209, 81}, {253, 231, 37}}};
-  const double way = deepest <= shallowest
-                         ? 1
-                         : std::clamp(static_cast<double>(level - shallowest) / (deepest - shallowest), 0.0, 1.0);
-  const double at = way * (kMap.size() - 1);
+  const double fraction = deepest <= shallowest
+                              ? 1
+                              : std::clamp(static_cast<double>(level - shallowest) / (deepest - shallowest), 0.0, 1.0);
+  const double at = fraction * (kMap.size() - 1);
   const auto low = std::min(static_cast<std::size_t>(at), kMap.size() - 2);
   const auto mix = [&](std::size_t channel) {
     return kMap[low][channel] + (kMap[low + 1][channel] - kMap[low][channel]) * (at - static_cast<double>(low));
@@ -89,11 +90,11 @@ std::string ColorOfLevel(int level, int shallowest, int deepest) {
   return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mix(0), mix(1), mix(2));
 }
 
-std::string MapOf(const std::vector<AskedTile>& asked, const std::vector<GeodeticPoint>& track) {
-  if (asked.empty() || track.empty()) return {};
+std::string MapOf(const std::vector<LoadedTile>& tiles, const std::vector<GeodeticPoint>& track) {
+  if (tiles.empty() || track.empty()) return {};
   const Frame frame = FrameOf(track);
   std::set<std::tuple<int, std::int64_t, std::int64_t>> keys;  // shallow ones first
-  for (const AskedTile& tile : asked) {
+  for (const LoadedTile& tile : tiles) {
     if (keys.size() < kMaxTiles) keys.insert({tile.key.level, tile.key.x, tile.key.y});
   }
   const int deepest = std::get<0>(*keys.rbegin());

@@ -1,4 +1,4 @@
-// The way of a flight over the tiles that it loaded, as SVG.
+// The track of a flight over the tiles that were loaded, as SVG.
 #pragma once
 
 #include <string>
@@ -8,8 +8,8 @@
 
 namespace terrace::fly {
 
-// North is up. Shows the surroundings of the track, each tile once, deep ones above shallow ones.
-std::string MapOf(const std::vector<AskedTile>& asked, const std::vector<GeodeticPoint>& track);
+// North is up. Shows the surroundings of the track. Each tile appears once; deep ones cover shallow ones.
+std::string MapOf(const std::vector<LoadedTile>& tiles, const std::vector<GeodeticPoint>& track);
 
 // A colour for a level, from violet for shallow ones to yellow for the deepest.
 std::string ColorOfLevel(int level, int shallowest, int deepest);

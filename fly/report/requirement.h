@@ -34,7 +34,7 @@ Result<std::vector<Requirement>> ParseRequirements(std::string_view text);
 
 struct Judgement {
   Requirement requirement;
-  double value = 0;  // as `bound`; negative if there was nothing to measure, which fails
+  double value = 0;  // in the unit of `bound`; negative if nothing was measured: the requirement fails
   bool holds = false;
   std::string shown;  // the value with its unit
 };

@@ -8,8 +8,9 @@
 namespace terrace::fly {
 namespace {
 
-// A view that moves waits for its next tiles in some frames even where the server is quick.
-constexpr double kKeepsUp = 0.75;  // share of refined frames
+// The share of refined frames from which on the server keeps up. Below 1: a moving view waits for its next tiles in
+// some frames even if the server is fast.
+constexpr double kMinRefinedShare = 0.75;
 
 // "1,234,567"
 std::string Group(std::uint64_t number) {
@@ -31,8 +32,8 @@ std::string Milliseconds(double seconds) {
                        : fmt::format("{:.1f} s", seconds);
 }
 
-// In seconds of which frames were not refined although tiles were wanted: how many tiles came.
-double StarvedTilesPerSecond(const std::vector<Second>& seconds) {
+// Tiles per second over the seconds in which at most half of the frames were refined.
+double UnrefinedTilesPerSecond(const std::vector<Second>& seconds) {
   std::uint64_t tiles = 0, count = 0;
   for (const Second& second : seconds) {
     if (second.frames == 0 || second.refined * 2 > second.frames) continue;
@@ -55,12 +56,12 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
     findings.push_back(
         fmt::format("{} of {} clients never saw a full view.", summary.never_full, summary.clients.size()));
   }
-  if (totals.flying_frames > 0 && summary.refined_share < kKeepsUp) {
+  if (totals.flying_frames > 0 && summary.refined_share < kMinRefinedShare) {
     findings.push_back(fmt::format(
         "The server does not keep up: {:.0f} % of the frames of the flight were not fully refined. While the view was "
         "incomplete, {:.1f} tiles a second arrived with up to {} requests open at a time; half of the tiles took more "
         "than {}.",
-        100 * (1 - summary.refined_share), StarvedTilesPerSecond(seconds), options.max_loads * options.clients,
+        100 * (1 - summary.refined_share), UnrefinedTilesPerSecond(seconds), options.max_loads * options.clients,
         Milliseconds(summary.p50_s)));
   }
   if (totals.hole_frames > 0) {

@@ -14,18 +14,20 @@ namespace terrace::fly {
 struct Summary {
   Totals totals;
   std::vector<ClientRecord> clients;
-  double seconds = 0;                                 // of everything
+  double seconds = 0;                                 // of the whole run
   int never_opened = 0, never_full = 0;               // clients
   double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
   double arrival_s = -1;                              // worst
   double p50_s = 0, p99_s = 0, max_s = 0;             // of tiles
-  double tiles_per_second = 0;                        // while tiles came
+  double tiles_per_second = 0;                        // mean over the seconds in which tiles arrived
   double best_tiles_per_second = 0;                   // in the best second
   double refined_share = 0;                           // of the frames of the flight
-  double frame_p50_px = 0, frame_p99_px = 0;          // of the worst error of a frame
+  double frame_p50_px = 0, frame_p99_px = 0;          // percentiles of the frames' worst errors
   std::uint64_t errors = 0;                           // requests that did not end with ok or a refusal
   std::vector<std::string> findings;                  // what is wrong, in sentences
 };
+
+struct Judgements;  // requirement.h
 
 Summary Summarize(const FlightOptions& options, const Statistics& statistics);
 
@@ -36,7 +38,6 @@ std::string TextOf(const Summary& summary);
 std::string LineOf(std::size_t i, const Second& second);
 
 // One JSON object: {"document": .., "summary": {..}, "requirements": [..], "seconds": [..]}.
-struct Judgements;
 std::string JsonOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
                    const std::vector<Second>& seconds);
 

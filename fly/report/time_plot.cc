@@ -29,9 +29,9 @@ class Scale {
   Scale(double low, double high, bool is_logarithmic) : low_(low), high_(high), logarithmic_(is_logarithmic) {}
 
   double Y(double value) const {
-    const double way = logarithmic_ ? std::log(std::max(value, low_) / low_) / std::log(high_ / low_)
-                                    : (value - low_) / (high_ - low_);
-    return kTop + kPlotHeight * (1 - std::clamp(way, 0.0, 1.0));
+    const double fraction = logarithmic_ ? std::log(std::max(value, low_) / low_) / std::log(high_ / low_)
+                                         : (value - low_) / (high_ - low_);
+    return kTop + kPlotHeight * (1 - std::clamp(fraction, 0.0, 1.0));
   }
 
   std::vector<double> Ticks() const {
@@ -83,14 +83,14 @@ void AddLine(const Series& series, const Scale& scale, double step, std::string&
       finish();
       continue;
     }
-    // A point for itself is drawn as a short line.
+    // Each value is a short horizontal line, so that a single one is visible too.
     const double x = kLeft + step * (static_cast<double>(i) + 0.5), y = scale.Y(series.values[i]);
     fmt::format_to(std::back_inserter(points), "{:.1f},{:.1f} {:.1f},{:.1f} ", x - 0.5, y, x + 0.5, y);
   }
   finish();
 }
 
-// Adds the values of the series on top of `base`, which it raises.
+// Draws the values of the series on top of `base`, and adds them to it.
 void AddStacked(const Series& series, const Scale& scale, double step, std::vector<double>& base, std::string& svg) {
   const double gap = series.shape == Series::Shape::kBars && step > 4 ? 1 : 0;
   std::string path;
@@ -183,7 +183,7 @@ double RoundUp(double value) {
 std::string SvgOf(const TimePlot& plot) {
   std::size_t count = 1;
   for (const Series& one : plot.series) count = std::max(count, one.values.size());
-  double low = 0, high = std::max({Highest(plot.series, count), plot.least_top, plot.limit});
+  double low = 0, high = std::max({Highest(plot.series, count), plot.min_top, plot.limit});
   if (plot.is_logarithmic) {
     high = std::pow(10, std::ceil(std::log10(std::max(high, 1e-3))));
     low = high;
@@ -195,7 +195,7 @@ std::string SvgOf(const TimePlot& plot) {
     low = std::max(std::pow(10, std::floor(std::log10(low))), high / 1e5);
     if (low >= high) low = high / 10;
   } else {
-    high = high > plot.least_top || high == 0 ? RoundUp(high) : high;
+    high = high > plot.min_top || high == 0 ? RoundUp(high) : high;
   }
   const Scale scale(low, high, plot.is_logarithmic);
   const double step = kPlotWidth / static_cast<double>(count);

@@ -20,10 +20,10 @@ struct TimePlot {
   std::string note;  // one sentence below the title
   std::vector<Series> series;
   bool is_logarithmic = false;  // values below the lowest decade are drawn on it
-  double limit = -1;            // a line across; negative: none
+  double limit = -1;            // a horizontal line; negative: none
   std::string limit_name;
-  double least_top = 0;       // the scale reaches at least this
-  std::vector<double> marks;  // seconds, lines from top to bottom
+  double min_top = 0;         // the scale ends at this value or above
+  std::vector<double> marks;  // seconds; vertical lines
   std::string marks_name;
 };
 

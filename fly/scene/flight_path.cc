@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr double kMeanRadius = 6371000;
-constexpr double kStepDegrees = 0.05;  // of the ways that are computed; interpolation between is straight
+constexpr double kStepDegrees = 0.05;  // between the points of a great circle
 constexpr std::size_t kMaxPoints = 1'000'000;
 
 // The turn from a to b, -180 to 180.
@@ -39,8 +39,8 @@ double HeadingFromTo(const GeodeticPoint& a, const GeodeticPoint& b) {
                  std::cos(lat_a) * std::sin(lat_b) - std::sin(lat_a) * std::cos(lat_b) * std::cos(turn)));
 }
 
-// Times by speed, headings along the way, and longitudes that do not jump.
-void Follow(const FlightSpeed& speed, FlightPath& path) {
+// Sets times by speed, headings along the path, and the pitch.
+void SetTimesAndHeadings(const FlightSpeed& speed, FlightPath& path) {
   std::vector<FlightPath::Point>& points = path.points;
   for (std::size_t i = 0; i < points.size(); ++i) {
     points[i].pose.pitch = speed.pitch;
@@ -55,6 +55,7 @@ void Follow(const FlightSpeed& speed, FlightPath& path) {
   }
 }
 
+// Removes jumps of the longitudes at the antimeridian.
 void Unwrap(FlightPath& path) {
   for (std::size_t i = 1; i < path.points.size(); ++i) {
     const double before = path.points[i - 1].pose.position.longitude;
@@ -135,7 +136,7 @@ Result<FlightPath> ParseGeoJson(std::string_view text, const FlightSpeed& speed)
   }
   if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the LineString has no points");
   Unwrap(path);
-  Follow(speed, path);
+  SetTimesAndHeadings(speed, path);
   return path;
 }
 
@@ -156,11 +157,11 @@ Pose FlightPath::PoseAt(double seconds) const {
   Pose pose = after == points.end() ? points.back().pose : after->pose;
   if (after != points.begin() && after != points.end()) {
     const Pose &a = (after - 1)->pose, &b = after->pose;
-    const double way = (at - (after - 1)->seconds) / (after->seconds - (after - 1)->seconds);
-    const auto mix = [way](double from, double to) { return from + (to - from) * way; };
+    const double fraction = (at - (after - 1)->seconds) / (after->seconds - (after - 1)->seconds);
+    const auto mix = [fraction](double from, double to) { return from + (to - from) * fraction; };
     pose.position = {mix(a.position.longitude, b.position.longitude), mix(a.position.latitude, b.position.latitude),
                      mix(a.position.height_m, b.position.height_m)};
-    pose.heading = a.heading + Turn(a.heading, b.heading) * way;
+    pose.heading = a.heading + Turn(a.heading, b.heading) * fraction;
     pose.pitch = mix(a.pitch, b.pitch);
   }
   pose.position.longitude = std::remainder(pose.position.longitude, 360.0);
@@ -174,18 +175,18 @@ FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, 
   const double angle = std::atan2(geo::Length(geo::Cross(u, v)), geo::Dot(u, v));
   const int steps = std::max(1, static_cast<int>(std::ceil(geo::ToDegrees(angle) / kStepDegrees)));
   for (int i = 0; i <= steps; ++i) {
-    const double way = static_cast<double>(i) / steps;
+    const double fraction = static_cast<double>(i) / steps;
     GeodeticPoint point = i == 0 ? from : to;
     if (i > 0 && i < steps) {
-      const geo::Vec3 n = u * std::sin((1 - way) * angle) + v * std::sin(way * angle);
+      const geo::Vec3 n = u * std::sin((1 - fraction) * angle) + v * std::sin(fraction * angle);
       point.longitude = geo::ToDegrees(std::atan2(n.y, n.x));
       point.latitude = geo::ToDegrees(std::atan2(n.z, std::hypot(n.x, n.y)));
     }
-    point.height_m = from.height_m + (to.height_m - from.height_m) * way;
+    point.height_m = from.height_m + (to.height_m - from.height_m) * fraction;
     path.points.push_back({0, {point, 0, 0}});
   }
   Unwrap(path);
-  Follow(speed, path);
+  SetTimesAndHeadings(speed, path);
   if (path.duration_s() <= 0) path.points.resize(1);
   return path;
 }
@@ -204,7 +205,7 @@ FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const Flight
     path.points.push_back({0, {{geo::ToDegrees(lon + east), geo::ToDegrees(to), center.height_m}, 0, 0}});
   }
   Unwrap(path);
-  Follow(speed, path);
+  SetTimesAndHeadings(speed, path);
   return path;
 }
 
@@ -231,7 +232,7 @@ Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed) {
   if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the path has no points");
   Unwrap(path);
   const std::vector<FlightPath::Point> stated = path.points;
-  if (columns != 6) Follow(speed, path);
+  if (columns != 6) SetTimesAndHeadings(speed, path);
   for (std::size_t i = 0; i < stated.size(); ++i) {
     if (columns == 6) path.points[i].seconds -= stated[0].seconds;
     if (columns == 5) path.points[i].pose = stated[i].pose;

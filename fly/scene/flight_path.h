@@ -1,4 +1,4 @@
-// The way of a camera: poses at times.
+// The path of a camera: poses at times.
 #pragma once
 
 #include <string_view>
@@ -20,20 +20,21 @@ struct FlightPath {
   double duration_s() const { return points.back().seconds; }
   double length_m() const;
 
-  // The pose at a time from 0 on. After the end a closed path starts again, another one is flown back and forth. The
-  // longitude is -180 to 180.
+  // The pose at a time >= 0, interpolated linearly. After its end a closed path starts again; an open one is flown back
+  // and forth. The longitude is -180 to 180.
   Pose PoseAt(double seconds) const;
 };
 
 struct FlightSpeed {
   double metres_per_second = 200;  // > 0
-  double pitch = -20;              // degrees, where a path does not say
+  double pitch = -20;              // degrees, for paths that state none
 };
 
-// Along the shortest way on the ground. Heading follows the way. Equal ends: the camera rests and looks north.
+// The shortest path over the ground, and the heading along it. If both ends are equal, the camera stands still and
+// looks north.
 FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed);
 
-// Around `center` at its height, from north to east. Heading follows the circle. 0 < radius_m < 5,000,000.
+// Around `center` at its height, clockwise from the north; the heading is along the circle. 0 < radius_m < 5,000,000.
 FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const FlightSpeed& speed);
 
 // Lines of "lon,lat,height", "lon,lat,height,heading,pitch" or "seconds,lon,lat,height,heading,pitch"; # begins a

@@ -65,8 +65,8 @@ double FogDensity(double height_m) {
   if (above == kTable.begin()) return kTable.front().density;
   if (above == kTable.end()) return kTable.back().density;
   const Row& low = *(above - 1);
-  const double way = (height_m - low.height_m) / (above->height_m - low.height_m);
-  return low.density + (above->density - low.density) * way;
+  const double fraction = (height_m - low.height_m) / (above->height_m - low.height_m);
+  return low.density + (above->density - low.density) * fraction;
 }
 
 bool IsHiddenByFog(double distance_m, double density) {

@@ -33,7 +33,7 @@ class View {
   // Whether any part of the volume may be between the four sides of the frustum. There is no near or far plane.
   bool Sees(const Volume& volume) const;
 
-  // Pixels that `error_m` metres at `distance_m` metres take on the screen, upright.
+  // The height in pixels of `error_m` metres at a distance of `distance_m` metres.
   double ErrorInPixels(double error_m, double distance_m) const;
 
   // Unit direction of the ray through the screen at (x, y), each from -1 (left, bottom) to 1.
@@ -47,8 +47,8 @@ class View {
   std::array<Plane, 4> sides_;  // normals point inwards
 };
 
-// Density of the fog at a camera's height in metres, by cesium-native's table. What is `distance` metres away vanishes
-// if exp(-(distance * density)^2) is 0 in double precision.
+// Density of the fog at a camera's height in metres, by cesium-native's table. Fog hides a point at a distance of d
+// metres if exp(-(d * density)^2) is 0 in double precision.
 double FogDensity(double height_m);
 bool IsHiddenByFog(double distance_m, double density);
 

@@ -100,14 +100,15 @@ double BoxDistanceSquared(const OrientedBox& box, const Vec3& position) {
   return sum;
 }
 
-double BoxReach(const OrientedBox& box, const Vec3& normal) {
+// Half the extent of the box along a unit normal.
+double HalfExtent(const OrientedBox& box, const Vec3& normal) {
   double reach = 0;
   for (const Vec3& half_axis : box.half_axes) reach += std::abs(Dot(normal, half_axis));
   return reach;
 }
 
-// Rectangle around a ball at the centre of a volume, to tell what is below a camera.
-bool IsBelowBall(const Vec3& center, double radius_m, const GeodeticPoint& point) {
+// Whether the sphere meets the ray from the Earth's centre through the point on the ellipsoid below `point`.
+bool SphereMeetsVertical(const Vec3& center, double radius_m, const GeodeticPoint& point) {
   const double distance = geo::Length(center);
   if (distance <= radius_m) return true;
   const Vec3 below = geo::ToEcef(point.longitude, point.latitude, 0);
@@ -136,7 +137,8 @@ Region::Region(const Rectangle& rectangle, double min_height_m, double max_heigh
   const Vec3 westward = west_middle - east_middle;
   if (geo::Length(westward) < 1) return;  // a full turn has no sides
   const Vec3 direction = Normalized(westward);
-  // A side nearer to a pole bulges inwards: its plane passes through the middle of the parallel, not the corners.
+  // A side that faces the equator is a parallel that lies outside of the chord of its corners: the plane passes through
+  // the middle of the parallel instead.
   Vec3 south_up = geo::SurfaceNormal(r.east, r.south);
   if (r.south > 0) {
     const Vec3 middle = ToEcef(longitude, r.south, 0);
@@ -184,7 +186,7 @@ bool IsBehind(const Volume& volume, const Plane& plane) {
   if (const auto* sphere = std::get_if<Sphere>(&volume)) return behind(sphere->center, sphere->radius_m);
   const auto* region = std::get_if<Region>(&volume);
   const OrientedBox& box = region != nullptr ? region->box() : std::get<OrientedBox>(volume);
-  return behind(box.center, BoxReach(box, plane.normal));
+  return behind(box.center, HalfExtent(box, plane.normal));
 }
 
 double DistanceSquared(const Volume& volume, const geo::Vec3& position, const GeodeticPoint& geodetic) {
@@ -201,15 +203,16 @@ geo::Vec3 CenterOf(const Volume& volume) {
   return std::get<Sphere>(volume).center;
 }
 
-bool IsBelow(const Volume& volume, const GeodeticPoint& point) {
+bool MeetsVertical(const Volume& volume, const GeodeticPoint& point) {
   if (const auto* region = std::get_if<Region>(&volume)) {
     return region->rectangle().Contains(point.longitude, point.latitude);
   }
-  if (const auto* sphere = std::get_if<Sphere>(&volume)) return IsBelowBall(sphere->center, sphere->radius_m, point);
+  if (const auto* sphere = std::get_if<Sphere>(&volume))
+    return SphereMeetsVertical(sphere->center, sphere->radius_m, point);
   const auto& box = std::get<OrientedBox>(volume);
   double radius_squared = 0;
   for (const Vec3& half_axis : box.half_axes) radius_squared += Dot(half_axis, half_axis);
-  return IsBelowBall(box.center, std::sqrt(radius_squared), point);
+  return SphereMeetsVertical(box.center, std::sqrt(radius_squared), point);
 }
 
 }  // namespace terrace::fly

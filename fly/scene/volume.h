@@ -1,5 +1,5 @@
-// Bounding volumes of tiles, as 3D Tiles defines them, and what selection asks of them. Positions are ECEF metres,
-// angles are degrees.
+// Bounding volumes of tiles, as 3D Tiles defines them, and their tests for selection. Positions are ECEF metres, angles
+// are degrees.
 #pragma once
 
 #include <array>
@@ -10,7 +10,7 @@
 
 namespace terrace::fly {
 
-// Dot(normal, p) + offset is the distance in metres on the side that the unit normal points to.
+// Dot(normal, p) + offset is the signed distance in metres, positive on the side that the unit normal points to.
 struct Plane {
   geo::Vec3 normal;
   double offset = 0;
@@ -40,8 +40,8 @@ struct OrientedBox {
   std::array<geo::Vec3, 3> half_axes;  // orthogonal
 };
 
-// The part of a shell around the ellipsoid above a rectangle. Selection sees it as cesium-native does: a box is tested
-// against the frustum, and the distance is the larger of those to the box and to the planes of the sides.
+// The points above a rectangle between two heights over the ellipsoid. As in cesium-native, a box around it is tested
+// against the frustum. Its distance is the larger one of the distances to that box and to the planes of its sides.
 class Region {
  public:
   Region() = default;
@@ -70,12 +70,12 @@ using Volume = std::variant<Region, Sphere, OrientedBox>;
 // Whether the volume lies wholly behind the plane.
 bool IsBehind(const Volume& volume, const Plane& plane);
 
-// Square of the distance in metres; 0 inside. `geodetic` is `position`.
+// Square of the distance in metres; 0 inside. `geodetic` is the same point as `position`.
 double DistanceSquared(const Volume& volume, const geo::Vec3& position, const GeodeticPoint& geodetic);
 
 geo::Vec3 CenterOf(const Volume& volume);
 
-// Whether the point is above or below the volume. A sphere or box around the Earth's centre is below every point.
-bool IsBelow(const Volume& volume, const GeodeticPoint& point);
+// Whether the volume is above, at or below the point: always if it contains the Earth's centre.
+bool MeetsVertical(const Volume& volume, const GeodeticPoint& point);
 
 }  // namespace terrace::fly

@@ -36,7 +36,7 @@ const Tile* ChildAt(const Tile& tile, const GeodeticPoint& point) {
   for (const auto& child : tile.children) {
     const auto* region = std::get_if<Region>(&child->volume);
     if (region != nullptr && region->rectangle().Contains(point.longitude, point.latitude)) return child.get();
-    // A sphere says nothing of where its rectangle is: its descendants do.
+    // Other volumes do not state a rectangle; those of their descendants may.
     if (region == nullptr && ChildAt(*child, point) != nullptr) return child.get();
   }
   return nullptr;
@@ -63,36 +63,42 @@ Found FindAt(const Tile& root, const GeodeticPoint& point, std::uint64_t frame) 
   return found;
 }
 
+// The tiles at the point where a ray meets the lowest surface; nothing if the ray does not count.
+std::optional<Found> FindOnRay(const View& view, const geo::Vec3& ray, std::uint64_t frame, const Tile& root) {
+  Found found;
+  double height_m = 0, next_height_m = 0;
+  std::optional<double> distance;
+  // Two passes: the point at height 0 finds the tile, and the tile's lowest height gives the final point.
+  for (int pass = 0; pass < 2; ++pass) {
+    height_m = next_height_m;
+    const Surface surface = Raised(height_m);
+    distance = HitDistance(view.position(), ray, surface);
+    if (!distance) return std::nullopt;
+    found = FindAt(root, PointOn(view.position() + ray * *distance, surface, height_m), frame);
+    if (found.deepest == nullptr) return std::nullopt;
+    next_height_m = found.min_height_m;
+  }
+  if (IsHiddenByFog(*distance, FogDensity(view.geodetic().height_m))) return std::nullopt;
+  // A coarse mesh may have a smaller range of heights than its descendants. Outside of it culling may be right.
+  if (height_m < found.min_height_m || height_m > found.max_height_m) return std::nullopt;
+  // The tile has children, but none here: the data end.
+  if (!found.deepest->children.empty() && found.drawn == 0) return std::nullopt;
+  return found;
+}
+
 }  // namespace
 
 Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root) {
   Coverage coverage;
-  const double fog = FogDensity(view.geodetic().height_m);
   for (int row = 0; row < kRows; ++row) {
     for (int column = 0; column < kColumns; ++column) {
       const geo::Vec3 ray = view.RayThrough((column + 0.5) * 2 / kColumns - 1, (row + 0.5) * 2 / kRows - 1);
-      // Twice: the point at height 0 names the tile, whose lowest height gives the point.
-      Found found;
-      double height_m = 0, next_height_m = 0;
-      std::optional<double> distance;
-      for (int pass = 0; pass < 2; ++pass) {
-        height_m = next_height_m;
-        const Surface surface = Raised(height_m);
-        distance = HitDistance(view.position(), ray, surface);
-        if (!distance) break;
-        found = FindAt(root, PointOn(view.position() + ray * *distance, surface, height_m), frame);
-        if (found.deepest == nullptr) break;
-        next_height_m = found.min_height_m;
-      }
-      if (!distance || found.deepest == nullptr || IsHiddenByFog(*distance, fog)) continue;
-      // The range of a coarse mesh need not contain those of finer ones: outside of it, culling may be right.
-      if (height_m < found.min_height_m || height_m > found.max_height_m) continue;
-      // Without a child here the server has nothing below: the tile ends where the data do.
-      if (!found.deepest->children.empty() && found.drawn == 0) continue;
+      const std::optional<Found> found = FindOnRay(view, ray, frame, root);
+      if (!found) continue;
       ++coverage.rays;
-      if (found.drawn == 0) ++coverage.uncovered;
-      if (found.drawn > 0 && found.ready == 0) ++coverage.missing;
-      if (found.drawn > 1) ++coverage.doubled;
+      if (found->drawn == 0) ++coverage.uncovered;
+      if (found->drawn > 0 && found->ready == 0) ++coverage.missing;
+      if (found->drawn > 1) ++coverage.doubled;
     }
   }
   return coverage;

@@ -1,4 +1,4 @@
-// What part of the screen shows nothing, although the server has terrain there.
+// The part of the screen that shows nothing although the server has terrain there.
 #pragma once
 
 #include <cstdint>
@@ -8,19 +8,20 @@
 
 namespace terrace::fly {
 
-// Counts of rays through a grid of 23 x 13 points of the screen that meet a tile.
+// Counts rays through 23 x 13 points of the screen. `rays`: those that meet a tile.
 struct Coverage {
   int rays = 0;
   int missing = 0;    // a selected tile is not loaded, or failed
   int uncovered = 0;  // no tile was selected: a fault of selection
-  int doubled = 0;    // more than one was
+  int doubled = 0;    // more than one tile was selected
 
   int holes() const { return missing + uncovered; }
 };
 
-// Sends rays to the lowest surface that the volumes of all tiles there allow: where such a point is on the screen, none
-// of the tiles may be culled. Points in fog do not count, nor those where the deepest tile has no child: there the data
-// end. Call it after SelectTiles for the same frame.
+// Intersects each ray with the lowest surface that lies within the height ranges of all tiles there. Such a point is in
+// the volumes of all these tiles, so that none of them may be culled. Not counted are points in fog, and points where
+// the deepest tile has children but none at that point: there the data end. Call it after SelectTiles for the same
+// frame.
 Coverage MeasureCoverage(const View& view, std::uint64_t frame, const Tile& root);
 
 }  // namespace terrace::fly

@@ -43,6 +43,7 @@ class Selector {
         selection_(selection),
         fog_density_(FogDensity(view.geodetic().height_m)) {}
 
+  // `ancestor_suffices`: the error of an ancestor is small enough, but the ancestor is not loaded.
   Subtree VisitIfNeeded(Tile& tile, bool ancestor_suffices);
 
  private:
@@ -86,7 +87,7 @@ Selector::Measures Selector::Measure(const Tile& tile) const {
   measures.distance_m = std::sqrt(std::max(0.0, DistanceSquared(tile.volume, view_.position(), view_.geodetic())));
   const geo::Vec3 to_tile = CenterOf(tile.volume) - view_.position();
   const double length = geo::Length(to_tile);
-  // What is near the middle of the screen comes first, and of that what is near.
+  // Tiles in the middle of the screen come first, near ones before far ones.
   if (length >= 1e-5) {
     measures.priority = (1 - geo::Dot(to_tile, view_.direction()) / length) * measures.distance_m;
   }
@@ -94,8 +95,10 @@ Selector::Measures Selector::Measure(const Tile& tile) const {
   return measures;
 }
 
-// What is right below the camera counts as visible: it is what the camera sees next if it turns.
-bool Selector::IsVisible(const Volume& volume) const { return view_.Sees(volume) || IsBelow(volume, view_.geodetic()); }
+// Tiles right below the camera count as visible: the camera sees them next if it turns.
+bool Selector::IsVisible(const Volume& volume) const {
+  return view_.Sees(volume) || MeetsVertical(volume, view_.geodetic());
+}
 
 // The children's volumes fit more tightly than the tile's own.
 bool Selector::IsOutOfSight(const Tile& tile) const {
@@ -112,7 +115,7 @@ Subtree Selector::VisitIfNeeded(Tile& tile, bool ancestor_suffices) {
   const Measures measures = Measure(tile);
   update_(tile);
   const bool culled = IsOutOfSight(tile) || IsHiddenByFog(measures.distance_m, fog_density_);
-  // Structure must be followed to find what would be loaded: at the root, and wherever no hole may appear.
+  // Tiles without content lead to those that would be loaded: the root, and all of them if holes are forbidden.
   const bool must_visit = tile.always_refine && (options_.forbid_holes || tile.parent == nullptr);
   if (culled && !must_visit) return Cull(tile, measures);
   const double limit_px = culled ? options_.culled_error_px : options_.max_error_px;
@@ -140,7 +143,7 @@ bool Selector::AnyDescendantRenderedBefore(const Tile& tile) const {
 
 Subtree Selector::Single(const Tile& tile) const {
   const Verdict before = PreviousVerdict(tile, frame_);
-  // Its children were drawn instead of it: it takes their place, and must not be kicked for being new.
+  // If its descendants were drawn in the previous frame, it replaces them, and must not be kicked for being new.
   const bool was_rendered =
       before == Verdict::kRendered || (before == Verdict::kRefined && AnyDescendantRenderedBefore(tile));
   const bool renderable = tile.IsRenderable();
@@ -201,7 +204,7 @@ Subtree Selector::VisitVisible(Tile& tile, const Measures& measures, bool suffic
   const Verdict before = PreviousVerdict(tile, frame_);
   bool is_queued = false;
   if (!tile.always_refine && (suffices || ancestor_suffices)) {
-    // Deeper tiles are on the screen and this one is not loaded: they stay until it is.
+    // Deeper tiles that are on the screen stay until this one is loaded.
     const bool was_refined = before == Verdict::kRefined || before == Verdict::kKickedRefined;
     const bool keeps_deeper = was_refined && !tile.IsRenderable();
     if (!ancestor_suffices) {
@@ -218,7 +221,7 @@ Subtree Selector::VisitVisible(Tile& tile, const Measures& measures, bool suffic
   const std::size_t first_drawn = selection_.drawn.size(), first_load = selection_.loads.size();
   Subtree subtree = VisitChildren(tile, ancestor_suffices);
   const bool wants_kick = !subtree.all_renderable && !subtree.any_rendered_before;
-  // To kick in favour of a tile that is not loaded would only make a larger hole.
+  // Drawing a tile that is not loaded instead of its descendants would make a larger hole.
   if (wants_kick && (subtree.missing > options_.descendant_limit || tile.IsRenderable())) {
     is_queued = DrawInsteadOfDescendants(tile, measures, first_drawn, first_load, is_queued, subtree);
   } else {

@@ -1,11 +1,11 @@
 // Which tiles a client draws and loads for one frame, as cesium-native v0.62 selects them
 // (Cesium3DTilesSelection/src/TilesetSelection.cpp) for tiles that replace their parents.
 //
-// A tile is refined while its geometric error takes more than `max_error_px` pixels on the screen at its distance.
-// Refined tiles are drawn once all of them are loaded; until then an ancestor is drawn instead of them: they are
-// kicked. Detail that was drawn in the frame before never vanishes: then new siblings do not wait for each other, and a
-// tile that is not loaded yet is a hole. With `forbid_holes` a culled sibling is loaded too before any of four is
-// drawn.
+// A tile is refined while its geometric error takes more than `max_error_px` pixels on the screen at its distance. The
+// visible children are drawn once all of them are loaded. Until then an ancestor is drawn, and the selected descendants
+// are "kicked" (cesium-native's word). If one of them was drawn in the previous frame, they are not kicked: they are
+// drawn as they are loaded, and those that are missing are holes. With `forbid_holes`, culled siblings must be loaded
+// too before any of the four children is drawn.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,8 @@ namespace terrace::fly {
 
 struct SelectOptions {
   double max_error_px = 16;
-  double culled_error_px = 64;          // for the root, which is visited even if it is out of sight
-  std::uint32_t descendant_limit = 20;  // more missing descendants than this: the tile itself is loaded first
+  double culled_error_px = 64;          // limit for tiles that are visited although they are culled, such as the root
+  std::uint32_t descendant_limit = 20;  // if more descendants than this are missing, the tile is loaded before them
   bool preload_ancestors = true;
   bool preload_siblings = true;
   bool forbid_holes = false;
@@ -31,7 +31,7 @@ enum class LoadGroup { kPreload, kNormal, kUrgent };
 struct LoadTask {
   Tile* tile = nullptr;
   LoadGroup group = LoadGroup::kNormal;
-  double priority = 0;  // metres off the view's axis; less is more urgent
+  double priority = 0;  // distance in metres * (1 - cosine of the angle to the view's axis); smaller is more urgent
 };
 
 struct DrawnTile {
@@ -42,13 +42,13 @@ struct DrawnTile {
 
 struct Selection {
   std::vector<DrawnTile> drawn;  // also tiles that are not loaded: they are holes
-  std::vector<LoadTask> loads;   // the most urgent first
+  std::vector<LoadTask> loads;   // most urgent first
   std::uint32_t visited = 0;
   std::uint32_t culled = 0;
   std::uint32_t pending = 0;  // wanted tiles whose load has begun
   bool any_kicked = false;
 
-  // The picture is what the view asks for: nothing was kicked, everything drawn is loaded.
+  // Whether the picture is complete: nothing was kicked, and everything drawn is loaded.
   bool IsRefined() const;
 };
 

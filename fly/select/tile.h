@@ -18,7 +18,7 @@ enum class Content {
   kMesh,       // has a URL
   kUpsampled,  // a quarter of the parent's mesh, made by the client where the server has only some of four children
   kEmpty,      // nothing to draw here
-  kStructure,  // never drawn itself: the root, the place of an implicit tree
+  kStructure,  // never drawn: the root, and the parent of the root of an implicit tree
 };
 
 enum class LoadState { kUnloaded, kReady, kFailed };
@@ -36,7 +36,7 @@ struct ImplicitTree;
 struct Tile {
   Tile* parent = nullptr;
   std::vector<std::unique_ptr<Tile>> children;
-  bool may_have_more_children = false;  // unknown until something has been loaded
+  bool may_have_more_children = false;  // the tree has not added its children yet
 
   Volume volume;
   double geometric_error_m = 0;
@@ -47,16 +47,17 @@ struct Tile {
   std::shared_ptr<ImplicitTree> tree;
   geo::TileKey local;  // inside `tree`: level 0 is its root
 
-  // Its children are always visited instead of it. Structure is, and empty tiles whose error is not below the parent's.
+  // Its children are always visited instead of it: of structure, and of empty tiles whose error is not below the
+  // parent's.
   bool always_refine = false;
 
   LoadState state = LoadState::kUnloaded;
   bool in_flight = false;  // a request for it runs
-  bool waiting = false;    // for the time that a Retry-After named
+  bool waiting = false;    // a request for it failed, and will be repeated after a pause
   bool is_stale = false;   // loaded, but from an older version of the dataset
-  int attempts = 0;        // failed ones since it was wanted
+  int attempts = 0;        // that failed, since the last success
 
-  double stated_error_m = -1;  // of the reply's Terrain-Max-Error; -1: not stated
+  double stated_error_m = -1;  // the reply's Terrain-Max-Error; -1: not stated
   std::uint32_t triangles = 0;
   std::uint64_t decoded_bytes = 0;
   std::uint32_t version = 0;  // index of the version that it was loaded from
@@ -65,7 +66,7 @@ struct Tile {
 
   bool NeedsLoad() const { return !in_flight && !waiting && (state == LoadState::kUnloaded || is_stale); }
   bool IsPending() const { return in_flight || waiting; }
-  // Drawing it leaves no hole that waiting could close. A tile that failed for good is drawn as nothing.
+  // Whether drawing it leaves no hole that a reply could fill. A tile that has failed is drawn as nothing.
   bool IsRenderable() const {
     if (state == LoadState::kFailed) return true;
     return state == LoadState::kReady && (!always_refine || children.empty());

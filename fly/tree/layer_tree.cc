@@ -17,10 +17,10 @@ namespace {
 
 using Json = nlohmann::json;
 
-// Clients assume these until a tile has told its heights, metres.
+// Clients assume these heights in metres until a tile has stated its own.
 constexpr double kLowestGround = -1000, kHighestGround = 9000;
-// Error of a root, metres: 8 times a quarter of 65 columns of half the equator. With 16 pixels it refines where
-// CesiumJS does with its 2.
+// Error of a root, metres. CesiumJS assumes a quarter of the width of a sample, with 65 samples over a root's half of
+// the equator, and refines above 2 pixels. With the factor 8, 16 pixels refine at the same distances.
 constexpr double kRootError = 8 * geo::kSemiMajorAxis * 0.25 / 65 * 3.14159265358979323846;
 
 // Tiles of one level, as rectangles.
@@ -36,7 +36,7 @@ class LevelRanges {
     auto i = std::upper_bound(ranges_.begin(), ranges_.end(), key.y,
                               [](std::int64_t y, const geo::TileRange& range) { return y < range.start_y; }) -
              ranges_.begin();
-    // Of the ranges that begin at or below the row; none before reaches it once the highest end so far does not.
+    // Goes back through the ranges that begin at or below the row, until none of the earlier ones reaches it.
     while (i-- > 0 && ends_[static_cast<std::size_t>(i)] >= key.y) {
       if (ranges_[static_cast<std::size_t>(i)].Contains(key)) return true;
     }
@@ -102,7 +102,7 @@ class LayerTree : public TileTree {
 
   Format format() const override { return Format::kTerrain; }
 
-  // All four children or none: the client makes those that the server does not have from their parent.
+  // Adds all four children or none. The client upsamples the parent where the server has no child.
   void AddChildren(Tile& tile) override {
     if (!std::exchange(tile.may_have_more_children, false) || !tile.key || tile.key->level >= geo::kMaxLevel) return;
     const geo::TileKey& key = *tile.key;
@@ -120,14 +120,14 @@ class LayerTree : public TileTree {
     }
   }
 
-  TileRequest RequestFor(const Tile& tile) const override {
+  NextRequest RequestFor(const Tile& tile) const override {
     if (tile.content != Content::kMesh) return {};
     std::string uri = layer_.tile_template;
     Replace(uri, "{z}", std::to_string(tile.key->level));
     Replace(uri, "{x}", std::to_string(tile.key->x));
     Replace(uri, "{y}", std::to_string(tile.key->y));
     Replace(uri, "{version}", layer_.version);
-    return {TileRequest::Kind::kMesh, std::move(uri)};
+    return {NextRequest::Kind::kMesh, std::move(uri)};
   }
 
   Result<void> TakeSubtree(Tile& /*tile*/, std::string_view /*bytes*/) override { return {}; }

@@ -12,14 +12,14 @@ namespace terrace::fly {
 
 class Subtree3d {
  public:
-  // `levels` of the tiling's subtrees. kInvalidArgument if the bytes are no binary subtree of that many levels, or keep
-  // their bits in other files.
+  // `levels`: of the tiling's subtrees. kInvalidArgument if the bytes are not a binary subtree of that many levels, or
+  // if its bits are in other files.
   static Result<Subtree3d> Parse(std::string_view bytes, int levels);
 
-  // Of the tile (x, y) at `level` below the subtree's root, 0 <= level < levels.
+  // About the tile (x, y) at `level` below the subtree's root, 0 <= level < levels.
   bool HasTile(int level, std::uint32_t x, std::uint32_t y) const;
   bool HasContent(int level, std::uint32_t x, std::uint32_t y) const;
-  // At the level below the last: whether another subtree begins there.
+  // Whether another subtree begins at (x, y) on the level below the last one.
   bool HasSubtree(std::uint32_t x, std::uint32_t y) const;
 
  private:

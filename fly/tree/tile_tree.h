@@ -1,5 +1,4 @@
-// The tree of tiles that a document of the server describes, and grows while the client flies: layer.json or
-// tileset.json. Not thread-safe.
+// The tree of tiles that a layer.json or tileset.json describes. It grows while the client flies. Not thread-safe.
 #pragma once
 
 #include <memory>
@@ -15,8 +14,8 @@ namespace terrace::fly {
 
 enum class Format { kTerrain, k3dTiles };
 
-// What to ask for next, for a tile that needs loading.
-struct TileRequest {
+// What to request next for a tile that needs loading.
+struct NextRequest {
   enum class Kind { kNothing, kMesh, kSubtree };
   Kind kind = Kind::kNothing;  // kNothing: the tile is ready without a request
   std::string uri;             // relative to the document
@@ -33,7 +32,7 @@ class TileTree {
   // Adds the children of a tile that is visited, as far as they are known by now.
   virtual void AddChildren(Tile& tile) = 0;
 
-  virtual TileRequest RequestFor(const Tile& tile) const = 0;
+  virtual NextRequest RequestFor(const Tile& tile) const = 0;
 
   // Takes the reply to a request of kind kSubtree. kInvalidArgument if it is damaged.
   virtual Result<void> TakeSubtree(Tile& tile, std::string_view bytes) = 0;

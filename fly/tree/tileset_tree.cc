@@ -90,7 +90,7 @@ Tile& AddTile(Tile& parent) {
   return *parent.children.back();
 }
 
-// The part of the implicit root's region; descendants inherit its heights.
+// The region of a descendant of the implicit root, with the root's heights.
 Region PartOf(const Region& root, const geo::TileKey& local) {
   const Rectangle& r = root.rectangle();
   const auto parts = static_cast<double>(std::int64_t{1} << local.level);
@@ -135,7 +135,7 @@ void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile
   if (json.contains("content")) {
     tile.uri = json.at("content").at("uri").get<std::string>();
   } else {
-    // Without content: a mere volume if its error is not below the parent's, else nothing is to be shown.
+    // Without content. It only groups its children if its error is not below the parent's; else it is drawn as nothing.
     tile.content = Content::kEmpty;
     tile.state = LoadState::kReady;
     tile.always_refine = tile.geometric_error_m >= enclosing_error_m;
@@ -162,7 +162,7 @@ class TilesetTree : public TileTree {
     if (!tile.may_have_more_children || !tile.tree) return;
     const ImplicitTree& tree = *tile.tree;
     const auto found = tree.subtrees.find(SubtreeOf(tile.local, tree.subtree_levels));
-    if (found == tree.subtrees.end()) return;  // its tile asks for it first
+    if (found == tree.subtrees.end()) return;  // RequestFor requests the subtree first
     tile.may_have_more_children = false;
     const int level = tile.local.level % tree.subtree_levels + 1;
     for (int i = 0; i < 4; ++i) {
@@ -176,15 +176,15 @@ class TilesetTree : public TileTree {
     }
   }
 
-  TileRequest RequestFor(const Tile& tile) const override {
+  NextRequest RequestFor(const Tile& tile) const override {
     if (tile.content != Content::kMesh) return {};
-    if (!tile.tree) return {TileRequest::Kind::kMesh, WithVersion(tile.uri)};
+    if (!tile.tree) return {NextRequest::Kind::kMesh, WithVersion(tile.uri)};
     const auto subtree = SubtreeOf(tile.local, tile.tree->subtree_levels);
     if (!tile.tree->subtrees.contains(subtree)) {
       const geo::TileKey root{std::get<0>(subtree), std::get<1>(subtree), std::get<2>(subtree)};
-      return {TileRequest::Kind::kSubtree, WithVersion(Fill(tile.tree->subtree_uri, root))};
+      return {NextRequest::Kind::kSubtree, WithVersion(Fill(tile.tree->subtree_uri, root))};
     }
-    return {TileRequest::Kind::kMesh, WithVersion(Fill(tile.tree->content_uri, tile.local))};
+    return {NextRequest::Kind::kMesh, WithVersion(Fill(tile.tree->content_uri, tile.local))};
   }
 
   Result<void> TakeSubtree(Tile& tile, std::string_view bytes) override {
@@ -222,7 +222,7 @@ class TilesetTree : public TileTree {
     tile.state = LoadState::kReady;
   }
 
-  // URLs contain the version of the document that they are from.
+  // URLs contain the version of the first document: replaces it by the current one.
   std::string WithVersion(std::string uri) const {
     if (first_version_.empty() || first_version_ == version_) return uri;
     const std::size_t at = uri.find(first_version_);

@@ -1,7 +1,6 @@
 // Heights as the colours of PNG images: the "raster-dem" tiles of MapLibre, Mapbox and deck.gl.
 //
-// PNG (ISO/IEC 15948) with 8 bits of red, green and blue, without alpha and colour profile, so that browsers pass the
-// stored bytes on unchanged. Deterministic: filters are chosen by sums of integers, and the compressor is libdeflate.
+// PNG with red, green and blue (png.h), without alpha, so that browsers pass the stored bytes on unchanged.
 #pragma once
 
 #include <cstdint>

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "engine/geo/mercator_grid.h"
+#include "proto/documents/vector_tile.h"
 
 namespace terrace::proto {
 
@@ -25,10 +26,20 @@ std::string EncodeTileJson(const TileJsonDescription& tiles) {
   json["bounds"] = Json::array({crosses_antimeridian ? -180 : tiles.west, clipped(tiles.south),
                                 crosses_antimeridian ? 180 : tiles.east, clipped(tiles.north)});
   json["attribution"] = tiles.attribution;
-  json["type"] = "raster-dem";
-  json["format"] = "png";
-  json["encoding"] = ToString(tiles.encoding);
-  json["tileSize"] = tiles.tile_size;
+  json["type"] = tiles.kind == TileJsonKind::kHeights    ? "raster-dem"
+                 : tiles.kind == TileJsonKind::kPictures ? "raster"
+                                                         : "vector";
+  json["format"] = tiles.format;
+  if (tiles.kind == TileJsonKind::kHeights) json["encoding"] = ToString(tiles.encoding);
+  if (tiles.kind == TileJsonKind::kContours) {
+    json["vector_layers"] = Json::array({{{"id", kContourLayer},
+                                          {"description", "lines of equal height"},
+                                          {"minzoom", 0},
+                                          {"maxzoom", tiles.max_zoom},
+                                          {"fields", {{"ele", "Number"}, {"index", "Boolean"}}}}});
+  } else {
+    json["tileSize"] = tiles.tile_size;
+  }
   // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

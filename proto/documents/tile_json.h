@@ -1,13 +1,19 @@
-// TileJSON 3.0: what MapLibre, Mapbox, QGIS and others read before the first tile of a raster-dem source.
+// TileJSON 3.0: what MapLibre, Mapbox, QGIS and others read before the first tile of a source.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "proto/documents/height_png.h"
 
 namespace terrace::proto {
 
+// The type of a source. kHeights: "raster-dem"; kPictures: "raster"; kContours: "vector" (vector_tile.h).
+enum class TileJsonKind : std::uint8_t { kHeights, kPictures, kContours };
+
 struct TileJsonDescription {
+  TileJsonKind kind = TileJsonKind::kHeights;
+  std::string format = "png";  // "pbf" for contours
   std::string name;
   std::string attribution;
   std::string tile_template;  // an absolute URL with {z}, {x} and {y}: clients do not resolve it against the TileJSON's

@@ -20,8 +20,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Metres: the geometric error of the tileset, while nothing is drawn. CesiumJS requests nothing while this is at most
-// 16 pixels, so it must be large enough for every viewing distance.
+// The geometric error of the tileset in metres, which counts while nothing is drawn. CesiumJS requests nothing while
+// this is at most 16 pixels, so it must be large enough for every viewing distance.
 constexpr double kNothingDrawn = 1e7;
 
 Json Region(const HeightSpan& heights, int level, const geo::TileRange& block) {

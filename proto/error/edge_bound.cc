@@ -17,7 +17,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The largest error at a crossing, and what the surface bends away beside it.
+// The largest sum, over the crossings, of the error there and the deviation of the surface beside it.
 HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
   const double first = std::floor(std::min(edge.from, edge.to)) + 1, last = std::ceil(std::max(edge.from, edge.to)) - 1;
   if (!(first <= last)) return 0;
@@ -26,12 +26,12 @@ HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
   const hn::Rebind<float, decltype(d)> floats;
   using V = hn::Vec<decltype(d)>;
   const double lanes = static_cast<double>(hn::Lanes(d));
-  const V most_line = hn::Set(d, last), from = hn::Set(d, edge.from), zero = hn::Zero(d);
+  const V last_line = hn::Set(d, last), from = hn::Set(d, edge.from), zero = hn::Zero(d);
   const V inverse = hn::Set(d, 1 / (edge.to - edge.from)), last_cell = hn::Set(d, edge.cells - 1);
   V largest = zero;
   for (double line = first; line <= last; line += lanes) {
-    // The last crossing takes the lanes that are left.
-    const V lines = hn::Min(hn::Iota(d, line), most_line);
+    // Surplus lanes repeat the last crossing.
+    const V lines = hn::Min(hn::Iota(d, line), last_line);
     const V part = hn::Mul(hn::Sub(lines, from), inverse);
     const V along = hn::Add(hn::Set(d, edge.along_from), hn::Mul(part, hn::Set(d, edge.along)));
     const V cell = hn::Min(hn::Max(hn::Floor(along), zero), last_cell);
@@ -47,7 +47,8 @@ HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
   return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
 
-// Of a row of cells: |twist| of each, and the largest steps along its southern edge and from there to its northern one.
+// Measures a row of cells: |twist| of each, and the largest steps along its southern edge and from there to its
+// northern one.
 void MeasureCells(const float* south, const float* north, std::size_t cells, float* twists, float& east, float& up) {
   const hn::CappedTag<float, 16> d;
   const std::size_t lanes = hn::Lanes(d);
@@ -63,8 +64,8 @@ void MeasureCells(const float* south, const float* north, std::size_t cells, flo
   up = hn::GetLane(hn::MaxOfLanes(d, highest));
 }
 
-// Of nodes: the largest of the two cells of this row, then also of the row below. `twists`: from the cell west of the
-// first node.
+// For each node: the largest twist of the four cells around it, two of this row and two of the row below. `twists`:
+// from the cell west of the first node. `below`: of the row below; becomes that of this row.
 void SpreadTwists(const float* twists, std::size_t nodes, float* below, float* out) {
   const hn::CappedTag<float, 16> d;
   const std::size_t lanes = hn::Lanes(d);
@@ -92,7 +93,7 @@ HWY_EXPORT(LargestAtBoth);
 HWY_EXPORT(MeasureCells);
 HWY_EXPORT(SpreadTwists);
 
-constexpr std::size_t kLanes = 16;  // at most: what is stored beyond the last node
+constexpr std::size_t kLanes = 16;  // limit of the lanes, and so of the values stored beyond the last node
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// How far a line between two vertices is from the lattice surface at most: found in vectors, from its crossings with
-// the lattice's lines, and a little too large. Most edges need no closer look.
+// An upper bound on the distance between an edge and the lattice surface, computed with SIMD from the crossings of the
+// edge with the lattice's lines. It is slightly too large; most edges need no exact measurement.
 #pragma once
 
 #include <cstdint>
@@ -16,10 +16,10 @@ struct LatticePoint {
 
 // Where an edge crosses the lattice's lines of one direction. Axes are named for lines of columns.
 struct LatticeCrossings {
-  double from, to;           // across the lines
-  double along_from, along;  // along them: at the first end, and the difference to the last one
-  double height, rise;       // the same of the height
-  double bend;               // of a cell's twist, what the surface may bend away between two crossings
+  double from, to;           // across the lines, at both ends
+  double along_from, along;  // along the lines: at the first end; the difference to the last end
+  double height, rise;       // of the edge at the first end; the difference to the last end
+  double bend;               // the deviation of the surface between two crossings is at most bend * the cell's twist
   const float *heights, *twists;
   std::int32_t line_stride, step;  // from one line to the next, and along a line
   int cells;
@@ -30,7 +30,7 @@ class EdgeBound {
   // The lattice must outlive this object.
   explicit EdgeBound(const LatticeView& lattice);
 
-  // A vertex as the end of edges.
+  // A vertex, prepared once for all its edges.
   struct End {
     LatticePoint place;
     double height = 0;

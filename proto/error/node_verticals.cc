@@ -40,7 +40,7 @@ NodeVerticals::Plane::Plane(const std::array<Vec3, 3>& corners) {
   normal = geo::Cross(a, b);
   offset = geo::Dot(normal, corners[0]);
   const double longest = std::max({geo::Dot(a, a), geo::Dot(b, b), geo::Dot(c, c)});
-  least = geo::Length(normal) / kSteepest;
+  min_up = geo::Length(normal) / kSteepest;
   is_line = geo::Dot(normal, normal) <= kNarrowest_m * kNarrowest_m * longest;
 }
 
@@ -50,11 +50,11 @@ double NodeVerticals::LargestOfRow(const Plane& plane, int j, std::int64_t first
   const PlumbRow plumb{
       plane.normal.x, plane.normal.y, row.cos, row.sin * plane.normal.z, plane.offset - row.z * plane.normal.z,
       row.radius};
-  double steepest = 0;
+  double min_up = 0;
   const double largest = LargestOfPlumbRow(plumb, columns_.data() + first, samples + first,
-                                           static_cast<std::size_t>(last + 1 - first), steepest);
+                                           static_cast<std::size_t>(last + 1 - first), min_up);
   // Whether the plane is too steep for a height at some node.
-  return steepest <= plane.least ? std::numeric_limits<double>::infinity() : largest;
+  return min_up <= plane.min_up ? std::numeric_limits<double>::infinity() : largest;
 }
 
 bool NodeVerticals::Meets(const std::array<Vec3, 3>& corners, int i, int j) const {

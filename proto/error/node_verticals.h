@@ -28,7 +28,7 @@ class NodeVerticals {
     explicit Plane(const std::array<geo::Vec3, 3>& corners);
     geo::Vec3 normal;   // of any length
     double offset = 0;  // dot(normal, point) of its points
-    double least = 0;   // the smallest dot(normal, plumb line) with a defined height; steeper planes have none
+    double min_up = 0;  // the smallest dot(normal, plumb line) with a defined height; steeper planes have none
     // The corners are so close to one line that rounding determines the plane. The triangle is ignored, because its
     // neighbours' edges cover it.
     bool is_line = false;
@@ -40,7 +40,7 @@ class NodeVerticals {
     const Parallel& row = rows_[static_cast<std::size_t>(j)];
     const double across = column.cos * plane.normal.x + column.sin * plane.normal.y;
     const double up = row.cos * across + row.sin * plane.normal.z;
-    if (std::abs(up) <= plane.least) return std::numeric_limits<double>::quiet_NaN();
+    if (std::abs(up) <= plane.min_up) return std::numeric_limits<double>::quiet_NaN();
     return (plane.offset - row.z * plane.normal.z - row.radius * across) / up;
   }
 

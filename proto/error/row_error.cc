@@ -14,7 +14,8 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Calls step(i) for vectors of nodes. The last one begins earlier if need be: nodes may be measured twice.
+// Calls step(i) for vectors of nodes. If count is no multiple of a vector, the last vector overlaps the one before it:
+// some nodes are measured twice.
 template <class D, typename Step>
 HWY_INLINE void ForVectors(D d, std::size_t count, const Step& step) {
   const std::size_t lanes = hn::Lanes(d);
@@ -48,9 +49,9 @@ double Linear(const LinearRow& row, const float* samples, std::size_t count) {
 
 template <class D>
 HWY_INLINE double PlumbWith(D d, const PlumbRow& row, const geo::SinCos* columns, const float* samples,
-                            std::size_t count, double& steepest) {
+                            std::size_t count, double& min_up) {
   static_assert(sizeof(geo::SinCos) == 2 * sizeof(double));
-  auto largest = hn::Zero(d), least = hn::Set(d, std::numeric_limits<double>::infinity());
+  auto largest = hn::Zero(d), lowest = hn::Set(d, std::numeric_limits<double>::infinity());
   ForVectors(d, count, [&](std::size_t i) HWY_ATTR {
     hn::Vec<D> sine, cosine;
     hn::LoadInterleaved2(d, &columns[i].sin, sine, cosine);
@@ -59,19 +60,18 @@ HWY_INLINE double PlumbWith(D d, const PlumbRow& row, const geo::SinCos* columns
     const auto height = hn::Div(hn::Sub(hn::Set(d, row.rest), hn::Mul(hn::Set(d, row.radius), across)), up);
     const auto error = hn::Abs(hn::Sub(height, SamplesAt(d, samples + i)));
     largest = hn::IfThenElse(hn::Gt(error, largest), error, largest);  // not where the plane is a plumb line: NaN
-    least = hn::Min(least, hn::Abs(up));
+    lowest = hn::Min(lowest, hn::Abs(up));
   });
-  steepest = hn::GetLane(hn::MinOfLanes(d, least));
+  min_up = hn::GetLane(hn::MinOfLanes(d, lowest));
   return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
 
-double Plumb(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count,
-             double& steepest) {
+double Plumb(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count, double& min_up) {
   const hn::CappedTag<double, 8> wide;
-  if (count >= hn::Lanes(wide)) return PlumbWith(wide, row, columns, samples, count, steepest);
+  if (count >= hn::Lanes(wide)) return PlumbWith(wide, row, columns, samples, count, min_up);
   const hn::CappedTag<double, 2> narrow;
-  if (count >= hn::Lanes(narrow)) return PlumbWith(narrow, row, columns, samples, count, steepest);
-  return PlumbWith(hn::CappedTag<double, 1>(), row, columns, samples, count, steepest);
+  if (count >= hn::Lanes(narrow)) return PlumbWith(narrow, row, columns, samples, count, min_up);
+  return PlumbWith(hn::CappedTag<double, 1>(), row, columns, samples, count, min_up);
 }
 
 HeightExtent Extent(const float* heights, std::size_t count) {
@@ -116,8 +116,8 @@ double LargestOfLinearRow(const LinearRow& row, const float* samples, std::size_
 }
 
 double LargestOfPlumbRow(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count,
-                         double& steepest) {
-  return HWY_DYNAMIC_DISPATCH(Plumb)(row, columns, samples, count, steepest);
+                         double& min_up) {
+  return HWY_DYNAMIC_DISPATCH(Plumb)(row, columns, samples, count, min_up);
 }
 
 }  // namespace terrace::proto

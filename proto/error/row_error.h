@@ -1,5 +1,5 @@
-// The largest error of a row of samples, and the extent of samples, in vectors. Results are bit-equal on all sets of
-// instructions.
+// The largest error of a row of samples, and the extent of samples, with SIMD. Results are bit-equal on all instruction
+// sets.
 #pragma once
 
 #include <cstddef>
@@ -29,8 +29,8 @@ struct PlumbRow {
   double x = 0, y = 0, cos = 0, north = 0, rest = 0, radius = 0;
 };
 
-// The largest difference from `count` samples. `steepest`: becomes the smallest |cos across + north|.
+// The largest difference from `count` samples. `min_up`: becomes the smallest |cos across + north|.
 double LargestOfPlumbRow(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count,
-                         double& steepest);
+                         double& min_up);
 
 }  // namespace terrace::proto

@@ -19,7 +19,7 @@ namespace {
 constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
 
 // The relative difference in curvature between the ellipsoid and ground up to 100 km from it.
-constexpr double kHeights = 1.02;
+constexpr double kCurvatureMargin = 1.02;
 
 LatticePoint Between(LatticePoint a, LatticePoint b, double t) {
   return {a.x + t * (b.x - a.x), a.y + t * (b.y - a.y)};
@@ -91,9 +91,9 @@ class Ground {
     const double y = width * width / 16 + height * (heights / 4 + height * (0.005 + height));
     if (width == 0) return {0, y / step_};
     // For the whole tile if that is tight enough, else for the chord's rows.
-    const double least = narrowest_ > 0.1 ? narrowest_ : std::min(RowNear(a.y).cos, RowNear(b.y).cos) - step_ / 2;
-    if (least < height / 8 + 1e-9) return {kUnknown, kUnknown};  // about a pole
-    return {width * (height / least / 4 + heights / 2 + width * width / 16) / step_, y / step_};
+    const double min_cosine = narrowest_ > 0.1 ? narrowest_ : std::min(RowNear(a.y).cos, RowNear(b.y).cos) - step_ / 2;
+    if (min_cosine < height / 8 + 1e-9) return {kUnknown, kUnknown};  // about a pole
+    return {width * (height / min_cosine / 4 + heights / 2 + width * width / 16) / step_, y / step_};
   }
 
  private:
@@ -247,8 +247,8 @@ struct End {
   double height = 0;  // above the ellipsoid, metres
 };
 
-// The height of a chord above the ellipsoid along the line between its ends' places: a quadratic with that leading
-// coefficient, but for `slack`.
+// The height of a chord above the ellipsoid along the line between its ends' places: a quadratic with the leading
+// coefficient `bend`, within `slack`.
 struct Chord {
   double first = 0, last = 0, bend = 0, slack = 0;
   bool is_quadratic = true;  // else it must be evaluated at every position
@@ -298,15 +298,16 @@ double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a
                       double known) {
   const Chord chord = ChordOf(ground, a, b);
   const double slack = chord.slack + meter.LargestChange(shift);
-  double before = chord.first - meter.SampleAt(a.place), most = known - slack;
+  double before = chord.first - meter.SampleAt(a.place), max_deviation = known - slack;
   meter.ForEachPiece(a.place, b.place, [&](const Piece& piece) {
     const double length = piece.end - piece.begin, bend = chord.bend - piece.bend;
     const double height = chord.is_quadratic ? chord.At(piece.end) : HeightOn(ground, a, b, piece.end);
     const double at_end = height - piece.end_sample;
-    if (IsLarger(length, bend, before, at_end, most)) most = LargestOn(length, bend, before, at_end, most);
+    if (IsLarger(length, bend, before, at_end, max_deviation))
+      max_deviation = LargestOn(length, bend, before, at_end, max_deviation);
     before = at_end;
   });
-  return std::max(known, most + slack);
+  return std::max(known, max_deviation + slack);
 }
 
 // Chords that deviate from the line between the positions of their ends are halved until the deviation is small.
@@ -330,15 +331,15 @@ double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& 
 // between edges. `steps`: the largest span of an edge.
 double ChordDeviation(const Ground& ground, double steps) {
   const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
-  return kHeights * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
+  return kCurvatureMargin * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
-// The largest difference along edges from the lattice surface, metres, with ChordDeviation. `heights`: by vertex, of
-// the reading in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat triangles, which lie
-// `beside_m` beside their places at most.
+// The largest difference along edges from the lattice surface, in metres, with ChordDeviation. `heights`: by vertex, of
+// the surface that is linear in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat
+// triangles, which lie `beside_m` beside their places at most.
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
-// shift. So most chords are known to matter less than what was found already, without a look at them.
+// shift. Most chords are therefore known to stay below the largest difference found so far, and are not measured.
 double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles) {
@@ -360,7 +361,7 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
   double largest = deviation;
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
-    const double sagitta = kHeights * (x * x + y * y) / (8 * kSmallestRadius);
+    const double sagitta = kCurvatureMargin * (x * x + y * y) / (8 * kSmallestRadius);
     const LatticePoint shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
     // If both surfaces are measured, their heights also differ by rounding.
     double rounding = 0;

@@ -77,8 +77,8 @@ class TileErrorMeter::Impl {
         cells_(lattice.cells()),
         bound_(bound_m),
         allowed_(std::move(allowed_m)),
-        least_(allowed_.empty() ? bound_m
-                                : std::min(bound_m, static_cast<double>(*std::ranges::min_element(allowed_)))),
+        min_allowed_(allowed_.empty() ? bound_m
+                                      : std::min(bound_m, static_cast<double>(*std::ranges::min_element(allowed_)))),
         verticals_(lattice) {}
 
   int cells() const { return cells_; }
@@ -94,24 +94,24 @@ class TileErrorMeter::Impl {
     const bool of_same_vertices = is_alike && HasVerticesOf(before, surface_);
     is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
     for (const NodePoint& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
-    readings_.resize(surface_.triangles.size());
+    errors_.resize(surface_.triangles.size());
     std::size_t worst = 0;
-    for (std::size_t t = 0; t < readings_.size(); ++t) {
-      Reading& reading = readings_[t];
+    for (std::size_t t = 0; t < errors_.size(); ++t) {
+      TriangleError& error = errors_[t];
       // Triangles that exceed the bound are reported again, because the samples that can be inserted change.
-      if (!is_alike || reading.most_m > least_ || !IsSame(before, surface_, t, of_same_vertices))
-        reading = ReadLinear(t);
-      if (reading.most_m > readings_[worst].most_m) worst = t;
+      if (!is_alike || error.max_m > min_allowed_ || !IsSame(before, surface_, t, of_same_vertices))
+        error = BoundTriangle(t);
+      if (error.max_m > errors_[worst].max_m) worst = t;
     }
     TileError result;
     std::vector<MissedVertex> vertices;
     const auto measure = [&](std::size_t t) {
-      if (!readings_[t].is_exact) readings_[t] = ReadBoth(t, result.misses, vertices);
-      result.max_m = std::max(result.max_m, readings_[t].most_m);
+      if (!errors_[t].is_exact) errors_[t] = MeasureTriangle(t, result.misses, vertices);
+      result.max_m = std::max(result.max_m, errors_[t].max_m);
     };
-    if (!readings_.empty() && readings_[worst].most_m <= least_) measure(worst);
-    for (std::size_t t = 0; t < readings_.size(); ++t) {
-      if (readings_[t].most_m > std::min(result.max_m, least_)) measure(t);
+    if (!errors_.empty() && errors_[worst].max_m <= min_allowed_) measure(worst);
+    for (std::size_t t = 0; t < errors_.size(); ++t) {
+      if (errors_[t].max_m > std::min(result.max_m, min_allowed_)) measure(t);
     }
     if (result.misses.empty()) result.misses = NeighboursOf(vertices);
     result.is_cut_through = result.misses.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
@@ -122,8 +122,8 @@ class TileErrorMeter::Impl {
 
  private:
   // The error of a triangle: an upper bound or exact.
-  struct Reading {
-    double most_m = std::numeric_limits<double>::infinity();
+  struct TriangleError {
+    double max_m = std::numeric_limits<double>::infinity();
     bool is_exact = false;
   };
 
@@ -134,11 +134,11 @@ class TileErrorMeter::Impl {
   std::int64_t NodeOf(std::int64_t coordinate) const { return (coordinate + surface_.unit / 2) / surface_.unit; }
 
   template <typename Value>
-  Linear Through(const std::array<NodePoint, 3>& p, double area, const Value& value) const {
+  Linear Through(const std::array<NodePoint, 3>& p, double twice_area, const Value& value) const {
     const double x1 = static_cast<double>(p[1].x - p[0].x), y1 = static_cast<double>(p[1].y - p[0].y);
     const double x2 = static_cast<double>(p[2].x - p[0].x), y2 = static_cast<double>(p[2].y - p[0].y);
     const double d1 = value(1) - value(0), d2 = value(2) - value(0);
-    return {value(0), (d1 * y2 - d2 * y1) / area, (d2 * x1 - d1 * x2) / area};
+    return {value(0), (d1 * y2 - d2 * y1) / twice_area, (d2 * x1 - d1 * x2) / twice_area};
   }
 
   std::array<NodePoint, 3> CornersOf(std::size_t t) const {
@@ -210,8 +210,8 @@ class TileErrorMeter::Impl {
            std::ranges::all_of(NeighboursOf(vertex.at), [&](tin::SamplePosition at) { return IsVertex(at); });
   }
 
-  // visit(j, first, last, largest) for rows of nodes with the largest error of the height that is linear in longitude
-  // and latitude: clip(row, first, last) narrows the columns. The rows are those of [low, high].
+  // Calls visit(j, first, last, largest) for each row of nodes in [low, high]. clip(row, first, last) narrows its
+  // columns. `largest`: the largest error in these columns of the height that is linear in longitude and latitude.
   template <typename Clip, typename Visit>
   void VisitRows(const Linear& plane, const NodePoint& corner, std::int64_t low, std::int64_t high, const Clip& clip,
                  const Visit& visit) const {
@@ -228,39 +228,39 @@ class TileErrorMeter::Impl {
 
   // The flat triangle differs from the linear one by at most its sagitta, at a position that differs by at most the
   // shift.
-  Reading ReadLinear(std::size_t t) const {
-    constexpr Reading kUnknown;
+  TriangleError BoundTriangle(std::size_t t) const {
+    constexpr TriangleError kUnknown;
     const std::array<NodePoint, 3> p = CornersOf(t);
-    const std::int64_t area = TwiceArea(p);
-    if (area <= 0) return kUnknown;
+    const std::int64_t twice_area = TwiceArea(p);
+    if (twice_area <= 0) return kUnknown;
     const NodeVerticals::Bounds bounds = verticals_.BoundsOf(p, surface_.unit, surface_.beside_m);
     if (!std::isfinite(bounds.shift.x)) return kUnknown;
-    const Linear plane = PlaneOf(t, p, area);
+    const Linear plane = PlaneOf(t, p, twice_area);
     const double unit = static_cast<double>(surface_.unit);
     const double x = bounds.shift.x * unit, y = bounds.shift.y * unit;
     const std::array<EdgeRows, 3> edges = EdgesOf(p);
     const std::array<double, 3> moves = {edges[0].Move(x, y), edges[1].Move(x, y), edges[2].Move(x, y)};
     const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
     const auto up = static_cast<std::int64_t>(y) + 1;
-    double most = 0;
+    double max_m = 0;
     VisitRows(
         plane, p[0], low - up, high + up,
         [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
           for (std::size_t k = 0; k < 3; ++k) edges[k].ClipMoved(row, moves[k], first, last);
         },
-        [&](int, int, int, double largest) { most = std::max(most, largest); });
-    return {most + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
+        [&](int, int, int, double largest) { max_m = std::max(max_m, largest); });
+    return {max_m + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
   }
 
-  Reading ReadBoth(std::size_t t, std::vector<tin::SamplePosition>& samples,
-                   std::vector<MissedVertex>& vertices) const {
+  TriangleError MeasureTriangle(std::size_t t, std::vector<tin::SamplePosition>& samples,
+                                std::vector<MissedVertex>& vertices) const {
     const std::array<NodePoint, 3> p = CornersOf(t);
     Found found(bound_);
-    const std::int64_t area = TwiceArea(p);
-    if (surface_.is_planar && area > 0) {
+    const std::int64_t twice_area = TwiceArea(p);
+    if (surface_.is_planar && twice_area > 0) {
       const std::array<EdgeRows, 3> edges = EdgesOf(p);
       const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
-      const Linear plane = PlaneOf(t, p, area);
+      const Linear plane = PlaneOf(t, p, twice_area);
       VisitRows(
           plane, p[0], low, high,
           [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
@@ -268,7 +268,7 @@ class TileErrorMeter::Impl {
           },
           [&](int j, int first, int last, double largest) {
             found.largest = std::max(found.largest, largest);
-            if (largest <= least_) return;  // no samples of the row are skipped
+            if (largest <= min_allowed_) return;  // no sample of the row has too large an error
             const double y = static_cast<double>(j * surface_.unit - p[0].y);
             for (int i = first; i <= last; ++i) {
               const double height = plane.At(static_cast<double>(i * surface_.unit - p[0].x), y);
@@ -287,8 +287,8 @@ class TileErrorMeter::Impl {
             EdgeRows(p[2], p[0], surface_.unit)};
   }
 
-  Linear PlaneOf(std::size_t t, const std::array<NodePoint, 3>& p, std::int64_t area) const {
-    return Through(p, static_cast<double>(area),
+  Linear PlaneOf(std::size_t t, const std::array<NodePoint, 3>& p, std::int64_t twice_area) const {
+    return Through(p, static_cast<double>(twice_area),
                    [&](std::size_t k) { return surface_.heights[surface_.triangles[t][k]]; });
   }
 
@@ -306,7 +306,7 @@ class TileErrorMeter::Impl {
       const VerticalsInTriangle::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
       const double largest = verticals_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
-      if (largest <= found.largest && largest <= least_) continue;
+      if (largest <= found.largest && largest <= min_allowed_) continue;
       for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
         const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
         const double counted = Counted(error, i, j);
@@ -325,12 +325,12 @@ class TileErrorMeter::Impl {
   const int cells_;
   const double bound_;
   const std::vector<float> allowed_;  // by node; empty: the bound
-  const double least_;                // of them
+  const double min_allowed_;          // the smallest error that a node may have
 
   // State of the mesh that is measured.
   Surface surface_;
-  std::vector<bool> is_vertex_;    // by node
-  std::vector<Reading> readings_;  // by triangle
+  std::vector<bool> is_vertex_;        // by node
+  std::vector<TriangleError> errors_;  // by triangle
 
   const NodeVerticals verticals_;
 };

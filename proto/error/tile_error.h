@@ -14,12 +14,12 @@ namespace terrace::proto {
 struct TileError {
   double max_m = 0;  // over every lattice sample of the tile
   // Samples to insert: for each triangle that exceeds the bound, its worst sample inside the tile that is not a vertex.
-  // If there is no such sample any more, the neighbours of the vertices that exceed it: rounding moves vertices along
-  // steep triangles, and between neighbouring samples triangles are no steeper than the ground. Empty if nothing can be
+  // If there are none, the neighbours of the vertices that exceed the bound: rounding moves vertices along steep
+  // triangles, but triangles between neighbouring samples are no steeper than the ground. Empty if nothing can be
   // inserted, whatever max_m is.
   std::vector<tin::SamplePosition> misses;
-  // Nothing can be inserted, but a vertex exceeds the bound because of a triangle with an edge between it and its
-  // neighbours. A Delaunay triangulation has no such edges.
+  // Nothing can be inserted, but a vertex exceeds the bound because an edge passes between it and a neighbouring
+  // vertex. A Delaunay triangulation has no such edges.
   bool is_cut_through = false;
 };
 

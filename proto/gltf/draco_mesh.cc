@@ -135,6 +135,26 @@ TriangleSum SumOf(const GridMesh& grid, bool uv) {
 
 tl::unexpected<Error> Failed(const char* what) { return MakeError(ErrorCode::kInternal, "Draco: {}", what); }
 
+// Adds the texture coordinates of the decoded mesh to the hashes of its points.
+Result<void> ReadTextureCoordinates(const draco::Mesh& mesh, std::uint32_t uv_id, int cells_of_grid,
+                                    std::vector<std::uint64_t>& hash) {
+  const draco::PointAttribute* const coordinates = mesh.GetAttributeByUniqueId(uv_id);
+  if (!coordinates) return Failed("the texture coordinates are missing");
+  for (std::uint32_t k = 0; k < hash.size(); ++k) {
+    std::array<float, 2> uv{};
+    coordinates->GetMappedValue(draco::PointIndex(k), uv.data());
+    std::array<std::uint16_t, 2> node{};
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      // Half a step of 12 bits is less than half a lattice cell.
+      const double cells = std::floor(static_cast<double>(uv[axis]) * cells_of_grid + 0.5);
+      if (!(cells >= 0 && cells <= cells_of_grid)) return Failed("a texture coordinate left the picture");
+      node[axis] = static_cast<std::uint16_t>(cells);
+    }
+    hash[k] ^= HashOf(node);
+  }
+  return {};
+}
+
 // Sets the members that describe the decoded mesh.
 Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMesh& encoded) {
   draco::DecoderBuffer buffer;
@@ -169,20 +189,7 @@ Result<void> ReadBack(const GridMesh& grid, const DracoOptions& options, DracoMe
     hash.push_back(HashOf(steps));
   }
   if (options.uv) {
-    const draco::PointAttribute* const coordinates = mesh.GetAttributeByUniqueId(encoded.uv_id);
-    if (!coordinates) return Failed("the texture coordinates are missing");
-    for (std::uint32_t k = 0; k < encoded.points; ++k) {
-      std::array<float, 2> uv{};
-      coordinates->GetMappedValue(draco::PointIndex(k), uv.data());
-      std::array<std::uint16_t, 2> node{};
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        // Half a step of 12 bits is less than half a lattice cell.
-        const double cells = std::floor(static_cast<double>(uv[axis]) * grid.cells + 0.5);
-        if (!(cells >= 0 && cells <= grid.cells)) return Failed("a texture coordinate left the picture");
-        node[axis] = static_cast<std::uint16_t>(cells);
-      }
-      hash[k] ^= HashOf(node);
-    }
+    if (Result<void> read = ReadTextureCoordinates(mesh, encoded.uv_id, grid.cells, hash); !read) return read;
   }
   TriangleSum sum;
   for (std::uint32_t t = 0; t < mesh.num_faces(); ++t) {

@@ -36,7 +36,8 @@ class EdgeRows {
     if (dy_ < 0) first = std::max(first, -Floor(y));
   }
 
-  // How far the edge moves to its right, at most, if it is moved by `x` and `y` along the axes. Negative: to its left.
+  // The displacement for ClipMoved if the edge is moved by at most `x` and `y` along the axes. Negative values displace
+  // it to its left.
   double Move(double x, double y) const {
     return std::abs(static_cast<double>(dx_)) * y + std::abs(static_cast<double>(dy_)) * x;
   }

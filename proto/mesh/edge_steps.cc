@@ -6,9 +6,6 @@
 namespace terrace::proto {
 namespace {
 
-// Largest power of two that is at most `value` > 0.
-double PowerOfTwoAtMost(double value) { return std::ldexp(1.0, std::ilogb(value)); }
-
 double PowerOfTwoAtLeast(double value) {
   const double below = PowerOfTwoAtMost(value);
   return below == value ? below : 2 * below;
@@ -18,10 +15,11 @@ double PowerOfTwoAtLeast(double value) {
 
 double EdgeSteps::Coarsest(tin::Side which) const {
   const auto index = static_cast<std::size_t>(which);
-  // A side's corners in the south-west, south-east, north-east, north-west order: side k runs from corner k to k + 1,
-  // south, east, north, west.
+  // Sides are in the order south, east, north, west: side k runs from corner k to corner k + 1.
   return std::max({side[index], corner[index], corner[(index + 1) % 4]});
 }
+
+double PowerOfTwoAtMost(double value) { return std::ldexp(1.0, std::ilogb(value)); }
 
 double NeededStep(double min_height, double max_height) {
   return PowerOfTwoAtLeast(std::max((max_height - min_height) / 16384, kHeightResolution));

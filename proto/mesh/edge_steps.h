@@ -35,10 +35,10 @@ struct EdgeSteps {
   double Coarsest(tin::Side side) const;
 };
 
-// The smallest error that samples of each side and at each corner may have: that of the tile unless limits by place
-// (engine/tin/sample_limits.h) are smaller. What neighbours share has the same errors in both. An edge's step for its
-// error is at least an 8192nd of the step for the tile's error, so that in the proof above S <= 8192 M, and 16384 M + S
-// < 32767 M holds.
+// The smallest error that samples of each side and at each corner may have: that of the tile unless local limits
+// (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared edges and corners. An edge's step
+// for its error is at least an 8192nd of the step for the tile's error, so that in the proof above S <= 8192 M, and
+// 16384 M + S < 32767 M holds.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);
@@ -47,6 +47,9 @@ struct EdgeErrors {
   double tile;
   std::array<double, 4> side, corner;
 };
+
+// The largest power of two that is at most `value`. Precondition: `value` > 0.
+double PowerOfTwoAtMost(double value);
 
 double NeededStep(double min_height, double max_height);
 

@@ -16,9 +16,6 @@ namespace {
 
 using Triangle = std::array<std::uint32_t, 3>;
 
-// The largest power of two that is at most `value`.
-double PowerOfTwoUpTo(double value) { return std::ldexp(1.0, std::ilogb(value)); }
-
 // 1 / step is exact, and so are products with it.
 GridPoint Snap(geo::Vec3 ecef, double per_metre) {
   const auto whole = [&](double metres) { return static_cast<std::int64_t>(std::floor(metres * per_metre + 0.5)); };
@@ -140,12 +137,12 @@ GridBox BoxOf(const std::vector<GridPoint>& points) {
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width) {
   constexpr double kFinestStepMetres = 0x1p-16;
   const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
-  const double step_m = std::max(PowerOfTwoUpTo(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
+  const double step_m = std::max(PowerOfTwoAtMost(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
   if (width == PositionWidth::k16Bits) return step_m;
   // Half the diagonal of a cube of 2^-7 m is 7 mm. A tile's side is at most 2^23 steps: FitsFloats.
   constexpr double kBorderStepMetres = 0x1p-7;
   const double side_m = cell_m * lattice.cells;
-  return std::min(step_m, PowerOfTwoUpTo(std::max(kBorderStepMetres, side_m / 0x1p22)));
+  return std::min(step_m, PowerOfTwoAtMost(std::max(kBorderStepMetres, side_m / 0x1p22)));
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
@@ -156,17 +153,17 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
   return points;
 }
 
-GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double least_error_m, PositionWidth width)
+GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double min_error_m, PositionWidth width)
     : inside(GridStep(lattice, errors.tile, width)) {
   // A step that does not fit would be doubled, but not by the neighbour (FitsFloats).
   const double side_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees()) * lattice.cells;
-  const double finest_m = std::min(PowerOfTwoUpTo(side_m / 0x1p22), inside);
+  const double finest_m = std::min(PowerOfTwoAtMost(side_m / 0x1p22), inside);
   const auto step = [&](double error_m) { return std::max(GridStep(lattice, error_m, width), finest_m); };
   for (std::size_t k = 0; k < 4; ++k) {
     side[k] = step(errors.side[k]);
     corner[k] = step(errors.corner[k]);
   }
-  inside = step(std::min(errors.tile, least_error_m));
+  inside = step(std::min(errors.tile, min_error_m));
 }
 
 void GridSteps::Double() {

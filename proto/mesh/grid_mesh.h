@@ -47,7 +47,7 @@ struct GridSteps {
   double inside = 1;
   std::array<double, 4> side{}, corner{};
 
-  GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double least_error_m, PositionWidth width);
+  GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double min_error_m, PositionWidth width);
   void Double();
 };
 

@@ -1,6 +1,8 @@
 #include "proto/mesh/quantized_mesh.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <optional>
 #include <string_view>
 
@@ -152,6 +154,42 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
   if (options.water_mask) PutWaterMask(out, tile.water_mask);
   if (options.metadata) PutMetadata(out, tile.metadata);
   return out.Take();
+}
+
+std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const geo::TileKey& key) {
+  ByteReader in(encoded);
+  QuantizedTile tile;
+  tile.key = key;
+  in.GetBytes(3 * sizeof(double));  // the centre
+  tile.min_height = in.Get<float>();
+  tile.max_height = in.Get<float>();
+  in.GetBytes(kHeaderBytes - 3 * sizeof(double) - 2 * sizeof(float));
+  const std::size_t count = in.Get<std::uint32_t>();
+  if (!in.ok() || count > kMaxTileVertices || !std::isfinite(tile.min_height) || !std::isfinite(tile.max_height)) {
+    return std::nullopt;
+  }
+  for (std::vector<std::uint16_t>* const values : {&tile.u, &tile.v, &tile.h}) {
+    int value = 0;
+    for (std::size_t i = 0; i < count && in.ok(); ++i) {
+      const int zigzag = in.Get<std::uint16_t>();
+      value += (zigzag >> 1) ^ -(zigzag & 1);
+      if (value < 0 || value > kQuantizedMax) return std::nullopt;
+      values->push_back(static_cast<std::uint16_t>(value));
+    }
+  }
+  const std::size_t triangles = in.Get<std::uint32_t>();
+  std::uint32_t highest = 0;  // the high-water mark
+  for (std::size_t t = 0; t < triangles && in.ok(); ++t) {
+    auto& triangle = tile.triangles.emplace_back();
+    for (std::uint32_t& corner : triangle) {
+      const std::uint32_t code = in.Get<std::uint16_t>();
+      if (code > highest || highest - code >= count) return std::nullopt;
+      corner = highest - code;
+      if (code == 0) ++highest;
+    }
+  }
+  if (!in.ok()) return std::nullopt;
+  return tile;
 }
 
 std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options) {

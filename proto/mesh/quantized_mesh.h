@@ -1,4 +1,4 @@
-// The quantized-mesh-1.0 tile format (CesiumGS/quantized-mesh README), encoder only.
+// The quantized-mesh-1.0 tile format (CesiumGS/quantized-mesh README): the encoder, and the reading of its own tiles.
 #pragma once
 
 #include <array>
@@ -43,6 +43,10 @@ struct QuantizedMeshOptions {
 // centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
 // at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
+
+// Decodes the mesh of a tile, without extensions: nothing if `encoded` is no complete quantized-mesh tile. Vertices
+// without a triangle, and triangles of one point, are kept.
+std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const geo::TileKey& key);
 
 // Removes the extensions that `options` does not name. The result is what EncodeQuantizedMesh returns for these
 // options. Nothing: `encoded` is no tile of EncodeQuantizedMesh, or lacks an extension that the options name.

@@ -28,7 +28,7 @@ bool CarriesMetadata(int level, int metadata_levels, int max_level) {
   return metadata_levels > 0 && level % metadata_levels == 0 && level < max_level;
 }
 
-std::string EncodeTileMetadata(const geo::TileKey& key, const std::vector<std::vector<geo::TileRange>>& available,
+std::string EncodeTileMetadata(const geo::TileKey& key, std::span<const std::vector<geo::TileRange>> available,
                                int metadata_levels) {
   const int deepest = std::min(key.level + metadata_levels, static_cast<int>(available.size()) - 1);
   Json levels = Json::array();

@@ -2,6 +2,7 @@
 // whole `available` of layer.json.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,7 @@ bool CarriesMetadata(int level, int metadata_levels, int max_level);
 
 // {"available":[[ranges of the next level], [of the one after it], ...]}: the part of `available` below the tile, for
 // `metadata_levels` levels. `available` is by level, from 0. Columns and rows are global, from the south.
-std::string EncodeTileMetadata(const geo::TileKey& key, const std::vector<std::vector<geo::TileRange>>& available,
+std::string EncodeTileMetadata(const geo::TileKey& key, std::span<const std::vector<geo::TileRange>> available,
                                int metadata_levels);
 
 }  // namespace terrace::proto

@@ -59,8 +59,8 @@ geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo
     east = Limited(east, from_west, 2 * east - from_west);
     north = Limited(north, from_south, 2 * north - from_south);
   }
-  const double tamed = kSteepestSlope / std::max(std::sqrt(east * east + north * north), kSteepestSlope);
-  return geo::Normalized(frame.up - frame.east * (east * tamed) - frame.north * (north * tamed));
+  const double factor = kSteepestSlope / std::max(std::sqrt(east * east + north * north), kSteepestSlope);
+  return geo::Normalized(frame.up - frame.east * (east * factor) - frame.north * (north * factor));
 }
 
 // Sums of the cross products of the triangles around each vertex.

@@ -14,6 +14,7 @@
 #include "engine/geo/error_ladder.h"
 #include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
+#include "server/api/map_parameters.h"
 #include "server/http/text.h"
 #include "server/openapi/operations.h"
 
@@ -90,12 +91,38 @@ std::string_view QuantizedMeshVary(const TileRequest&) { return "Accept, Accept-
 std::string_view GlbVary(const TileRequest& tile) { return CodingHelps(tile) ? "Accept-Encoding" : ""; }
 std::string_view PngVary(const TileRequest&) { return ""; }
 
+Result<void> ReadPicture(std::string_view query, const RequestFields&, const DatasetView& dataset, TileRequest& tile) {
+  return ReadMapTile(query, dataset, tile);
+}
+Result<void> ReadContours(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
+                          TileRequest& tile) {
+  tile.coding = NegotiateCoding(fields.accept_encoding);
+  return ReadMapTile(query, dataset, tile);
+}
+std::string_view ContoursVary(const TileRequest&) { return "Accept-Encoding"; }
+
+using tiler::TileFormat::kContours, tiler::TileFormat::kGeodeticImagery, tiler::TileFormat::kHillshade,
+    tiler::TileFormat::kImagery, tiler::TileFormat::kSlope;
+constexpr proto::PictureFormat kPng = proto::PictureFormat::kPng, kWebp = proto::PictureFormat::kWebp,
+                               kJpeg = proto::PictureFormat::kJpeg;
+
 constexpr TileFormat kFormats[] = {
-    {tiler::TileFormat::kQuantizedMesh, ".terrain", /*is_mercator=*/false, QuantizedMeshType, QuantizedMeshVary,
-     ReadQuantizedMesh, &kTerrainTileOperation},
-    {tiler::TileFormat::kGlb, ".glb", /*is_mercator=*/false, GlbType, GlbVary, ReadGlb, &kGlbTileOperation},
-    {tiler::TileFormat::kHeightPng, ".png", /*is_mercator=*/true, PngType, PngVary, ReadHeightPng,
+    {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh,
+     proto::PictureFormat::kPng, &kTerrainTileOperation},
+    {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb, proto::PictureFormat::kPng, &kGlbTileOperation},
+    {tiler::TileFormat::kHeightPng, "", ".png", PngType, PngVary, ReadHeightPng, proto::PictureFormat::kPng,
      &kHeightTileOperation},
+    {kHillshade, "hillshade", ".png", MapTileType, PngVary, ReadPicture, kPng, &kHillshadePngOperation},
+    {kHillshade, "hillshade", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kHillshadeWebpOperation},
+    {kSlope, "slope", ".png", MapTileType, PngVary, ReadPicture, kPng, &kSlopePngOperation},
+    {kSlope, "slope", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kSlopeWebpOperation},
+    {kContours, "contours", ".mvt", MapTileType, ContoursVary, ReadContours, kPng, &kContoursOperation},
+    {kImagery, "imagery", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kImageryWebpOperation},
+    {kImagery, "imagery", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg, &kImageryJpegOperation},
+    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, PngVary, ReadPicture, kWebp,
+     &kGeodeticImageryWebpOperation},
+    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg,
+     &kGeodeticImageryJpegOperation},
 };
 
 // If `repeatable`, a parameter may be repeated with the same value.
@@ -266,7 +293,7 @@ int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& d
     const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
     return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
   }
-  return ErrorStep(requested, level, level == dataset.deepest_level(), dataset.error_fraction);
+  return ErrorStep(requested, level, level >= dataset.finest_level(), dataset.error_fraction);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
@@ -276,7 +303,7 @@ Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format
   const auto* const row = std::ranges::find(kFormats, format, &TileFormat::format);
   TERRACE_CHECK(row != std::end(kFormats));
   return MakeError(ErrorCode::kNotFound, "the dataset is an archive of finished tiles alone, which has no {} tiles",
-                   row->suffix);
+                   row->folder.empty() ? row->suffix : row->folder);
 }
 
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
@@ -288,13 +315,24 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
 
 std::span<const TileFormat> TileFormats() { return kFormats; }
 
-const TileFormat* CutSuffix(std::string_view& name) {
+const TileFormat* CutSuffix(std::string_view& name, std::string_view folder) {
   for (const TileFormat& row : kFormats) {
-    if (!name.ends_with(row.suffix)) continue;
+    if (row.folder != folder || !name.ends_with(row.suffix)) continue;
     name.remove_suffix(row.suffix.size());
     return &row;
   }
   return nullptr;
+}
+
+const TileFormat* FirstFormatIn(std::string_view folder) {
+  const auto* const row = std::ranges::find(kFormats, folder, &TileFormat::folder);
+  return row == std::end(kFormats) ? nullptr : row;
+}
+
+const TileFormat* FormatWith(tiler::TileFormat format, proto::PictureFormat picture) {
+  const auto* const row = std::ranges::find_if(
+      kFormats, [&](const TileFormat& of) { return of.format == format && of.picture == picture; });
+  return row == std::end(kFormats) ? nullptr : row;
 }
 
 Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets) {
@@ -308,6 +346,7 @@ Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const
   tile.dataset = *dataset;
   tile.key = route.key;
   tile.format = route.format->format;
+  tile.map.picture = route.format->picture;
   if (Result<void> read = route.format->read(route.query, *context.request->fields, datasets[*dataset], tile); !read) {
     return tl::unexpected(std::move(read.error()));
   }
@@ -326,7 +365,7 @@ tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::Enco
   put("Content-Length", tile.bytes.size());
   head.body_bytes = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
-  put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
+  if (!tiler::IsForMaps(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {
     put("Terrain-Certified-Error", proto::FormatErrorUp(*tile.certified_error_m));
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "proto/documents/map_picture.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "proto/media_type.h"
@@ -48,23 +49,31 @@ Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 struct TileFormat {
   tiler::TileFormat format;
+  std::string_view folder;  // of the URL, between the dataset and the level: "hillshade"; empty: none
   std::string_view suffix;  // of the URL: ".terrain"
-  bool is_mercator;         // keys are in Web Mercator's XYZ scheme; else in TMS geodetic
   std::string_view (*media_type)(const tiler::TileRequest& tile);
   std::string_view (*vary)(const tiler::TileRequest& tile);  // the headers that a reply depends on, as in Response
   // Reads the parameters of a URL and sets the rest of the request; its dataset, key and format are set. kNotFound: the
   // dataset has no such tile. kInvalidArgument: see ParseTileParameters and ParseHeightTileParameters.
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                        tiler::TileRequest& tile);
-  const Operation* operation = nullptr;  // what /openapi.json says about its URLs
+  proto::PictureFormat picture = proto::PictureFormat::kPng;  // of pictures for maps
+  const Operation* operation = nullptr;                       // what /openapi.json says about its URLs
+
+  bool is_mercator() const { return tiler::IsMercator(format); }
 };
 
 // All formats.
 std::span<const TileFormat> TileFormats();
 
-// Removes the suffix of a tile's URL from its last segment, and returns the row of the format; null if no suffix
-// matches.
-const TileFormat* CutSuffix(std::string_view& name);
+// Removes the suffix of a tile's URL from its last segment, and returns the row of the format in a folder; null if no
+// suffix matches.
+const TileFormat* CutSuffix(std::string_view& name, std::string_view folder = {});
+
+// The first row of a format in a folder, whose suffix is that of TileJSON documents; null if there is none.
+const TileFormat* FirstFormatIn(std::string_view folder);
+// The row of a format with these pictures; null if there is none.
+const TileFormat* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
 
 // Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies
 // outside what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.

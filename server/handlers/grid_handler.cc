@@ -28,7 +28,7 @@ struct MadeGrid {
   std::string description;
 };
 
-// How integers of 16 bits mean heights: offset + scale * integer.
+// The code of heights as integers of 16 bits: height = offset + scale * integer.
 struct Steps {
   double offset = 0, scale = 0;
   std::size_t voids = 0;
@@ -47,7 +47,7 @@ struct Steps {
     steps.scale = (max - min) / kLargest;
     return steps;
   }
-  // Voids are the lowest height, and heights outside the range its ends.
+  // Voids become the lowest height. Heights outside the range are clamped.
   std::uint16_t Of(float height) const {
     if (std::isnan(height) || scale == 0) return 0;
     return static_cast<std::uint16_t>(std::clamp(std::floor((height - offset) / scale + 0.5), 0.0, double{kLargest}));
@@ -161,6 +161,8 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
     return ClientErrorResponse(datum.error(), request.id);
   }
+  // Archives have no other heights.
+  if (view.baked_alone && query->datum == dem::HeightDatum::kEllipsoid && !query->drawn) query->drawn.emplace();
   const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
   const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
   Response response;

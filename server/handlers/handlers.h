@@ -1,4 +1,4 @@
-// The handlers, one function for each kind of URL (server/routes.cc), and what they answer from.
+// The handlers, one function for each kind of URL (server/routes.cc), and the state that they share.
 #pragma once
 
 #include <chrono>
@@ -154,6 +154,10 @@ DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& conte
 // GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.
 Answer AnswerTileJson(const Handlers& from, const RequestContext& context);
 
+// GET /{dataset}/hillshade/tiles.json and those of slopes, contours and imagery. The parameters of the tiles go into
+// the tile template; `?format` names the suffix of pictures. Precondition: the route has a format.
+Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context);
+
 // GET /datasets: the datasets that the client may see.
 DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context);
 // GET / and /viewer/{file}. Without a viewer, `/` is a plain list of datasets.
@@ -162,7 +166,9 @@ DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& co
 using IsSeen = std::function<bool(const DatasetView&)>;
 
 // {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
-//   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","mesh"}}],"more_with_token":true}
+//   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","mesh",
+//   "hillshade","slope","contours","imagery","imagery_geodetic"},"imagery":{"attribution","bounds","max_level",
+//   "geodetic_max_level"}}],"more_with_token":true}
 // Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server. `more_with_token` is
 // present for every client that may not see all datasets, whether or not there are more, so that it reveals nothing.
 // Returns an empty string if a stop was requested; so does IndexHtml.

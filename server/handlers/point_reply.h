@@ -19,21 +19,21 @@ struct MadeReply {
 
 using PointHandler = asio::awaitable<Response> (*)(const Handlers& from, const RequestContext& context,
                                                    std::uint32_t dataset);
-// Calls `handler` with the index of the dataset, or refuses: 415 for another body than of points, 404.
+// Calls `handler` with the index of the dataset. 415: the type of the body is not one of points. 404: no such dataset.
 Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHandler handler);
 
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
 
-// JSON in a coding that the client takes, or binary values, which hardly shrink: compressing them takes longer than
-// reading them. `no-store`, as replies to POST are.
+// Starts a reply with JSON, in a coding that the client accepts, or with binary values. Those are not compressed: they
+// hardly shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies to POST.
 struct PointReply {
   tiler::Coding coding;
   Response response;
 };
 PointReply StartPointReply(const Request& request, bool is_binary);
 
-// The reply to a request that failed: the client's fault (400, or 404 where an archive has no heights), or ours.
+// The reply to a request that failed: 400, 404 (an archive has no heights), or the status of a failure of the server.
 asio::awaitable<Response> RefusePoints(Error error, const DatasetView& view, RequestId request_id);
 // The reply with what a worker made, or RefusePoints.
 asio::awaitable<Response> FinishPointReply(Response response, Result<MadeReply> made, const DatasetView& view,

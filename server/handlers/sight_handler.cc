@@ -74,7 +74,7 @@ void AppendPlace(std::string& json, const char* name, const dem::SightRay& ray, 
                  place.latitude, place.longitude, place.height_m, share * length_m);
 }
 
-// What a client should be told beside the numbers; empty: nothing.
+// A remark for the client on an answer; empty: none.
 const char* RemarkOn(const dem::SightAnswer& answer, double length_m) {
   if (std::isnan(answer.clearance_m)) return "the dataset has no height along the ray";
   if (answer.blocked_at && *answer.blocked_at <= 0) return "the ray begins below the surface";
@@ -134,6 +134,7 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   const auto deadline = from.Deadline();
   Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
+  if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have no other heights
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;

@@ -4,6 +4,7 @@
 
 #include "proto/documents/tile_json.h"
 #include "server/api/caching.h"
+#include "server/api/map_parameters.h"
 #include "server/api/tile_formats.h"
 #include "server/documents/document.h"
 #include "server/handlers/handlers.h"
@@ -30,6 +31,20 @@ std::string OriginOf(const Request& request) {
   return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
 }
 
+void SetBounds(const dem::GeoBounds& bounds, proto::TileJsonDescription& tiles) {
+  tiles.west = bounds.west;
+  tiles.south = bounds.south;
+  tiles.east = bounds.east;
+  tiles.north = bounds.north;
+}
+
+Response ServeTileJson(const Handlers& from, const RequestContext& context, const proto::TileJsonDescription& tiles) {
+  Response response =
+      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *context.request, kRevalidate);
+  response.vary_more = from.origin_headers;
+  return response;
+}
+
 }  // namespace
 
 Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
@@ -50,14 +65,38 @@ Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
-  tiles.west = dataset.west;
-  tiles.south = dataset.south;
-  tiles.east = dataset.east;
-  tiles.north = dataset.north;
-  Response response =
-      Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *context.request, kRevalidate);
-  response.vary_more = from.origin_headers;
-  return response;
+  SetBounds({dataset.west, dataset.south, dataset.east, dataset.north}, tiles);
+  return ServeTileJson(from, context, tiles);
+}
+
+Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
+  const auto refuse = [&](const Error& error) { return ClientErrorResponse(error, context.request->id); };
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+  if (!index) return refuse(index.error());
+  const DatasetView& dataset = from.catalog->datasets[*index];
+  const TileFormat* row = context.route.format;
+  if (const auto has = CheckHasFormat(dataset, row->format); !has) return refuse(has.error());
+  if (const auto has = CheckHasImagery(dataset, row->format); !has) return refuse(has.error());
+  const auto parameters = ParseMapParameters(context.route.query, row->format, /*in_tile_json=*/true);
+  if (!parameters) return refuse(parameters.error());
+  if (parameters->picture) row = FormatWith(row->format, *parameters->picture);
+  if (row == nullptr) {
+    return refuse({ErrorCode::kInvalidArgument, "the tiles of this layer do not have this format"});
+  }
+  const bool is_lines = row->format == tiler::TileFormat::kContours;
+  proto::TileJsonDescription tiles;
+  tiles.kind = is_lines ? proto::TileJsonKind::kContours : proto::TileJsonKind::kPictures;
+  tiles.format = is_lines ? "pbf" : proto::ToString(row->picture);
+  tiles.name = fmt::format("{} {}", dataset.name, row->folder);
+  const bool has_own = row->format == tiler::TileFormat::kImagery && !dataset.imagery_attribution.empty();
+  tiles.attribution = has_own ? dataset.imagery_attribution : dataset.attribution;
+  const std::string query = fmt::format("v={}{}", dataset.version(), MapTileQuery(*parameters));
+  tiles.tile_template = fmt::format("{}/{}/{}/{{z}}/{{x}}/{{y}}{}?{}", OriginOf(*context.request),
+                                    PercentEncode(dataset.name), row->folder, row->suffix, WithToken(query, context));
+  tiles.max_zoom = MaxMapLevel(dataset, row->format, parameters->size);
+  tiles.tile_size = parameters->size;
+  SetBounds(MapBounds(dataset, row->format), tiles);
+  return ServeTileJson(from, context, tiles);
 }
 
 }  // namespace terrace::server

@@ -39,7 +39,7 @@ tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested) {
           dataset.available,
           {dataset.west, dataset.south, dataset.east, dataset.north},
           dataset.error_fraction,
-          dataset.deepest_level(),
+          dataset.finest_level(),
           [&dataset](const geo::TileKey& key) { return RangeOf(dataset, key); },
           [&dataset, requested](int level) { return ErrorStepOf(requested, level, dataset); }};
 }

@@ -78,7 +78,24 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
     entry["urls"]["tiles_json"] = base + "/tiles.json";
     entry["urls"]["heights"] = base + "/heights";
+    entry["urls"]["grid"] = base + "/grid";
+    entry["urls"]["sight"] = base + "/sight";
     entry["urls"]["mesh"] = base + "/mesh";
+    if (!dataset.baked_alone) {
+      for (const char* const layer : {"hillshade", "slope", "contours"}) {
+        entry["urls"][layer] = fmt::format("{}/{}/tiles.json", base, layer);
+      }
+    }
+    if (dataset.imagery) {
+      entry["urls"]["imagery"] = base + "/imagery/tiles.json";
+      entry["urls"]["imagery_geodetic"] = base + "/imagery/geodetic/{z}/{x}/{y}.webp?v=" + dataset.version();
+      Json& imagery = entry["imagery"];
+      const dem::GeoBounds& bounds = dataset.imagery->bounds;
+      imagery["attribution"] = dataset.imagery_attribution;
+      imagery["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
+      imagery["max_level"] = dataset.imagery->max_mercator_depth;
+      imagery["geodetic_max_level"] = dataset.imagery->max_geodetic_level;
+    }
     list.push_back(std::move(entry));
   }
   Json document;

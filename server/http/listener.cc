@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <array>
 #include <boost/asio/co_spawn.hpp>
@@ -118,6 +119,23 @@ Result<std::shared_ptr<Listener>> Listener::Adopt(IoThreads& io, int socket,
   return listener;
 }
 
+// Asio's TCP sockets serve Unix ones as well: reading, writing, waiting and closing are the same, options of TCP are
+// refused and not needed. Only the addresses of peers have no meaning.
+Result<std::shared_ptr<Listener>> Listener::OpenPath(IoThreads& io, const std::string& path, unsigned mode,
+                                                     std::shared_ptr<const SessionContext> context) {
+  std::shared_ptr<Listener> listener(new Listener(io, std::move(context)));
+  Result<PathSocket> socket = ListenOnPath(path, mode);
+  if (!socket) return tl::unexpected(socket.error());
+  listener->file_ = std::move(socket->file);
+  error_code error;
+  listener->acceptor_.assign(tcp::v4(), socket->descriptor, error);
+  if (error) {
+    ::close(socket->descriptor);
+    return MakeError(ErrorCode::kUnavailable, "cannot listen on unix:{}: {}", path, error.message());
+  }
+  return listener;
+}
+
 Result<void> Listener::CheckAddress(const std::string& host, std::uint16_t port) {
   asio::io_context io;
   tcp::acceptor acceptor(io);
@@ -193,6 +211,7 @@ asio::awaitable<void> Listener::AcceptAll() {
 }
 
 void Listener::Finish() {
+  file_.Remove();  // first: later connections would only be refused
   if (!is_adopted_) TakeQueue();
   error_code ignored;
   acceptor_.close(ignored);

@@ -17,6 +17,7 @@
 #include "engine/core/result.h"
 #include "server/asio.h"
 #include "server/http/session.h"
+#include "server/http/unix_socket.h"
 #include "server/net/io_threads.h"
 
 namespace terrace::server {
@@ -32,11 +33,17 @@ class Listener : public std::enable_shared_from_this<Listener> {
   static Result<std::shared_ptr<Listener>> Adopt(IoThreads& io, int socket,
                                                  std::shared_ptr<const SessionContext> context);
 
+  // Listens on a path of the file system, which is removed when the listener is closed. Errors: as ListenOnPath.
+  static Result<std::shared_ptr<Listener>> OpenPath(IoThreads& io, const std::string& path, unsigned mode,
+                                                    std::shared_ptr<const SessionContext> context);
+
   // Whether Open could use the address now. The socket does not listen: nobody can connect meanwhile.
   static Result<void> CheckAddress(const std::string& host, std::uint16_t port);
 
   const std::string& host() const { return host_; }  // of an adopted socket: its address
   std::uint16_t port() const { return port_; }
+  bool is_path() const { return !file_.path().empty(); }
+  const std::string& path() const { return file_.path(); }
 
   // Begins to accept connections, unless Close was called before. Call once.
   void Start();
@@ -66,6 +73,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   bool is_adopted_ = false;
   std::string host_;
   std::uint16_t port_ = 0;
+  SocketFile file_;                         // of a Unix socket
   bool started_ = false, closing_ = false;  // for the acceptor's thread
   std::promise<void> closed_;
   std::optional<asio::posix::stream_descriptor> spare_;  // released briefly when no descriptors are left

@@ -71,7 +71,11 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     boost::system::error_code error;
     const auto peer = stream_.socket().remote_endpoint(error);
     handler_ = context_->application->Connect(peer.address());
-    if (!error) peer_text_ = fmt::format("{}:{}", Canonical(peer.address()).to_string(), peer.port());
+    if (!error && peer.data()->sa_family == AF_UNIX) {
+      peer_text_ = "unix:-";
+    } else if (!error) {
+      peer_text_ = fmt::format("{}:{}", Canonical(peer.address()).to_string(), peer.port());
+    }
   }
   ~Session() override { context_->connections->Remove(this); }
 

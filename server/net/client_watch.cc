@@ -2,6 +2,7 @@
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <poll.h>
 #include <sys/socket.h>
 
 #include <boost/asio/redirect_error.hpp>
@@ -23,8 +24,22 @@ constexpr std::chrono::milliseconds kInterval{250};
 // The beginning of every reply; RFC 9112, section 4.
 constexpr std::string_view kReplyBegin = "HTTP/1.";
 
+bool IsUnix(int descriptor) {
+  int domain = 0;
+  socklen_t size = sizeof domain;
+  return ::getsockopt(descriptor, SOL_SOCKET, SO_DOMAIN, &domain, &size) == 0 && domain == AF_UNIX;
+}
+
+// As of a TCP connection.
+int StateOfUnix(int descriptor) {
+  pollfd state{descriptor, POLLRDHUP, 0};
+  if (::poll(&state, 1, 0) < 0 || (state.revents & (POLLHUP | POLLERR)) != 0) return TCP_CLOSE;
+  return (state.revents & POLLRDHUP) != 0 ? TCP_CLOSE_WAIT : TCP_ESTABLISHED;
+}
+
 // The kernel's state: TCP_ESTABLISHED, TCP_CLOSE_WAIT once the client has closed its sending direction, ...
 int StateOf(asio::ip::tcp::socket& socket) {
+  if (IsUnix(socket.native_handle())) return StateOfUnix(socket.native_handle());
   tcp_info info{};
   socklen_t size = sizeof info;
   if (::getsockopt(socket.native_handle(), IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return TCP_CLOSE;

@@ -13,8 +13,8 @@
 //   second per kRate bytes that it takes: its reply is late once it lags kGrace behind this rate. If a body waits, the
 //   late replies of the client that holds most are cut off, if this client holds more than the waiting one. If an
 //   upload waits, the newest upload of the client that holds most is displaced, if this client holds more than the
-//   waiting one would; so are uploads of other clients that have not arrived within kGrace plus one second per kRate
-//   bytes. Bodies of one client wait for one another.
+//   waiting one would. Uploads of other clients that have not arrived within kGrace plus one second per kRate bytes are
+//   displaced too. Bodies of one client wait for one another.
 //
 // Replies about the server's state, for operators, may exceed all pools by kReserve: they matter most when memory is
 // short.

@@ -10,6 +10,9 @@ extern const Operation kTerrainTileOperation, kGlbTileOperation, kHeightTileOper
 extern const Operation kDatasetsOperation, kLayerOperation, kTilesetOperation, kTileJsonOperation, kOpenApiOperation,
     kViewerOperation, kViewerFileOperation;
 extern const Operation kHeightsOperation, kGridOperation, kSightOperation, kAreaOperation;
+extern const Operation kHillshadePngOperation, kHillshadeWebpOperation, kHillshadeTileJsonOperation, kSlopePngOperation,
+    kSlopeWebpOperation, kSlopeTileJsonOperation, kContoursOperation, kContoursTileJsonOperation, kImageryWebpOperation,
+    kImageryJpegOperation, kImageryTileJsonOperation, kGeodeticImageryWebpOperation, kGeodeticImageryJpegOperation;
 extern const Operation kLiveOperation, kReadyOperation, kMetricsOperation, kVersionOperation;
 
 }  // namespace terrace::server

@@ -19,7 +19,7 @@ class LookUpGate {
   // nevertheless, so that a store that others have filled meanwhile is noticed.
   bool ShouldAsk(std::size_t of) {
     const std::uint32_t number = asked_[of].fetch_add(1, std::memory_order_relaxed);
-    return shares_[of].load(std::memory_order_relaxed) >= kLeast || number % kSample == 0;
+    return shares_[of].load(std::memory_order_relaxed) >= kMinShare || number % kSample == 0;
   }
 
   // The result of a look-up that was made. Two threads may lose one of two results.
@@ -35,7 +35,7 @@ class LookUpGate {
   // The share of look-ups that found something, as a moving average of about the last kMemory. It begins with all, so
   // that a new process asks.
   static constexpr std::uint32_t kOne = 1U << 24, kMemory = 64;
-  static constexpr std::uint32_t kLeast = kOne / 20;  // a look-up takes about a twentieth of a build of several ms
+  static constexpr std::uint32_t kMinShare = kOne / 20;  // a look-up takes about a twentieth of a build of several ms
 
   std::array<std::atomic<std::uint32_t>, kClasses> shares_;
   std::array<std::atomic<std::uint32_t>, kClasses> asked_{};

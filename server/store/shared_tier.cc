@@ -66,34 +66,48 @@ Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout,
   return redis::Connection::Open(options_.address, options);
 }
 
-SharedTier::ConnectionPtr SharedTier::Borrow(std::uint64_t& epoch) {
+SharedTier::Loan SharedTier::Borrow() {
   const std::lock_guard lock(mutex_);
-  epoch = epoch_;
-  if (!on_) return nullptr;
-  if (idle_.empty()) return nullptr;
-  ConnectionPtr connection = std::move(idle_.back());
-  idle_.pop_back();
-  return connection;
+  while (on_ && !idle_.empty()) {
+    ConnectionPtr connection = std::move(idle_.back().connection);
+    idle_.pop_back();
+    if (!connection->HasEnded()) {
+      borrowed_.insert(connection.get());
+      return {std::move(connection), epoch_};
+    }
+    --open_;  // Redis closes what it has not heard of for its `timeout`: that is no failure
+    changed_.notify_all();
+  }
+  return {nullptr, epoch_};
 }
 
-void SharedTier::GiveBack(ConnectionPtr connection, std::uint64_t epoch) {
+void SharedTier::GiveBack(Loan loan) {
   const std::lock_guard lock(mutex_);
-  if (epoch == epoch_) idle_.push_back(std::move(connection));
+  borrowed_.erase(loan.connection.get());
+  if (loan.epoch == epoch_) idle_.push_back({std::move(loan.connection), Clock::now()});
 }
 
-void SharedTier::SwitchOff(const std::string& why, bool is_timeout) {
-  ++errors_;
-  if (is_timeout) ++timeouts_;
-  std::vector<ConnectionPtr> gone;  // closed after the lock is released
+void SharedTier::Drop(Loan loan) {
   const std::lock_guard lock(mutex_);
-  if (!on_) return;  // another caller has seen the same failure
+  borrowed_.erase(loan.connection.get());
+}
+
+// What fails in an earlier epoch was ended by the failure that began this one.
+void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
+  std::deque<Idle> gone;  // closed after the lock is released
+  const std::lock_guard lock(mutex_);
+  if (epoch != epoch_ || !on_) return;
   on_ = false;
   ++epoch_;
   ++switched_off_;
+  ++errors_;
+  if (IsTimeout(why)) ++timeouts_;
   gone.swap(idle_);
+  for (const redis::Connection* const connection : borrowed_) connection->Interrupt();
+  borrowed_.clear();
   open_ = 0;
-  retry_at_ = Clock::now() + kRetryAfter;
-  Report(why, /*is_off=*/true);
+  retry_at_ = Clock::now() + options_.retry_after;
+  Report(why.message, /*is_off=*/true);
   changed_.notify_all();
 }
 
@@ -111,31 +125,34 @@ void SharedTier::Report(const std::string& why, bool is_off) {
 }
 
 std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
-  std::uint64_t epoch = 0;
-  ConnectionPtr connection = Borrow(epoch);
-  if (!connection) {
+  Loan loan = Borrow();
+  if (!loan.connection) {
     ++skipped_;
     return std::nullopt;
   }
-  Result<std::vector<redis::Reply>> replies = connection->CallAll(std::span(&command, 1));
+  const std::uint64_t epoch = loan.epoch;
+  Result<std::vector<redis::Reply>> replies = loan.connection->CallAll(std::span(&command, 1));
   if (!replies) {
-    SwitchOff(replies.error().message, IsTimeout(replies.error()));
+    Drop(std::move(loan));
+    SwitchOff(replies.error(), epoch);
     return std::nullopt;
   }
   redis::Reply reply = std::move(replies->front());
   // A lease that Redis does not write: it is full, a copy, or cannot save. Values can still be read.
   if (reply.is_error() &&
       std::ranges::any_of(kRefusesWrites, [&](std::string_view why) { return reply.text().starts_with(why); })) {
-    RefuseWrites(connection->Refusal(command.front(), reply).message);
-    GiveBack(std::move(connection), epoch);
+    RefuseWrites(loan.connection->Refusal(command.front(), reply).message);
+    GiveBack(std::move(loan));
     return std::nullopt;
   }
   // Something of another type at the key is a value that is wrong. After any other refusal Redis is of no use.
   if (reply.is_error() && !reply.text().starts_with("WRONGTYPE")) {
-    SwitchOff(connection->Refusal(command.front(), reply).message, /*is_timeout=*/false);
+    const Error refusal = loan.connection->Refusal(command.front(), reply);
+    Drop(std::move(loan));
+    SwitchOff(refusal, epoch);
     return std::nullopt;
   }
-  GiveBack(std::move(connection), epoch);
+  GiveBack(std::move(loan));
   return reply;
 }
 
@@ -235,15 +252,17 @@ void SharedTier::Run() {
     }
     const bool connects = !stop_ && open_ < options_.readers && Clock::now() >= retry_at_;
     const bool writes = on_ && !queue_.empty() && Clock::now() >= write_at_;
-    if (!connects && !writes) {
-      Clock::time_point next = Clock::now() + kReportAgain;
-      if (open_ < options_.readers) next = retry_at_;
+    const bool tests = !stop_ && Clock::now() >= NextTest();
+    if (!connects && !writes && !tests) {
+      Clock::time_point next = std::min(Clock::now() + kReportAgain, NextTest());
+      if (open_ < options_.readers) next = std::min(next, retry_at_);
       if (on_ && !queue_.empty()) next = std::min(next, write_at_);
       changed_.wait_until(lock, std::min(next, end));
       continue;
     }
     is_writing_ = writes;
     lock.unlock();
+    if (tests) Test();
     if (connects) Connect();
     if (writes) Write();
     lock.lock();
@@ -263,7 +282,7 @@ void SharedTier::Connect() {
   Result<redis::Reply> pong = connection ? (*connection)->Call({"PING"}) : tl::unexpected(connection.error());
   const std::lock_guard lock(mutex_);
   if (!pong) {
-    retry_at_ = Clock::now() + kRetryAfter;
+    retry_at_ = Clock::now() + options_.retry_after;
     if (!on_) Report(pong.error().message, /*is_off=*/true);
     return;  // those that are open may go on
   }
@@ -278,20 +297,50 @@ void SharedTier::Connect() {
     }
   }
   ++open_;
-  idle_.push_back(*std::move(connection));
+  idle_.push_back({*std::move(connection), Clock::now()});
+}
+
+// `mutex_` is held.
+SharedTier::Clock::time_point SharedTier::NextTest() const {
+  return idle_.empty() ? Clock::time_point::max() : idle_.front().since + options_.test_after;
+}
+
+// Asks on the connection that was not used for longest. A fire wall, or a failover, may have dropped it silently.
+void SharedTier::Test() {
+  Loan loan;
+  {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty()) return;
+    loan = {std::move(idle_.front().connection), epoch_};
+    idle_.pop_front();
+    borrowed_.insert(loan.connection.get());
+  }
+  const std::uint64_t epoch = loan.epoch;
+  if (loan.connection->HasEnded()) {
+    Drop(std::move(loan));
+    const std::lock_guard lock(mutex_);
+    if (epoch == epoch_) --open_;
+    return;
+  }
+  const Result<redis::Reply> pong = loan.connection->Call({"PING"});
+  if (pong) return GiveBack(std::move(loan));
+  Drop(std::move(loan));
+  SwitchOff(pong.error(), epoch);
 }
 
 void SharedTier::RefuseWrites(const std::string& why) {
   const std::lock_guard lock(mutex_);
-  write_at_ = Clock::now() + kRetryAfter;
+  write_at_ = Clock::now() + options_.retry_after;
   Report(why, /*is_off=*/false);
 }
 
 // One batch, in one round trip.
 void SharedTier::Write() {
   std::list<Job> jobs;
+  std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
+    epoch = epoch_;
     std::size_t bytes = 0;
     while (!queue_.empty() && jobs.size() < kBatchValues && bytes < kBatchBytes) {
       bytes += queue_.front().charge;
@@ -301,11 +350,11 @@ void SharedTier::Write() {
   }
   const auto values =
       static_cast<std::uint64_t>(std::ranges::count_if(jobs, [](const Job& job) { return !!job.value; }));
-  if (!writer_ || !writer_->is_open()) {
+  if (!writer_ || writer_->HasEnded()) {
     Result<ConnectionPtr> opened = Open(kWriteTimeout, MaxReply());
     if (!opened) {
       dropped_ += values;
-      return SwitchOff(opened.error().message, IsTimeout(opened.error()));
+      return SwitchOff(opened.error(), epoch);
     }
     writer_ = *std::move(opened);
   }
@@ -323,7 +372,7 @@ void SharedTier::Write() {
   const Result<std::vector<redis::Reply>> replies = writer_->CallAll(commands);
   if (!replies) {
     dropped_ += values;
-    return SwitchOff(replies.error().message, IsTimeout(replies.error()));
+    return SwitchOff(replies.error(), epoch);
   }
   std::string refused;
   for (std::size_t i = 0; i < commands.size(); ++i) {

@@ -2,22 +2,26 @@
 // longer than one time-out, and nothing depends on it.
 //
 // Thread-safe. Find blocks for at most one time-out, on a connection that is open already. Opening connections,
-// writing, and trying again are the work of a thread of the store. After a time-out, or another failure of a
-// connection, the store is switched off for kRetryAfter, and then until a connection opens and answers within the
-// time-out: meanwhile Find returns at once. So a failing Redis delays the look-ups that were under way, one for each
-// caller, and no others. Log and statistics report it. All keys begin with "terrace:" in Redis, so that a user's rights
-// can be limited to them.
+// writing, testing and trying again are the work of a thread of the store. After a time-out, or another failure of a
+// connection, the store is switched off for `retry_after`, and then until a connection opens and answers within the
+// time-out: meanwhile Find returns at once, without a system call. The first look-up that fails ends all others that
+// are under way. So a failing Redis costs one time-out, whatever the number of connections and callers. Connections
+// that nobody used for `test_after` are tested, and those that Redis has closed are replaced, before a look-up meets
+// them. Log and statistics report it. All keys begin with "terrace:" in Redis, so that a user's rights can be limited
+// to them.
 #pragma once
 
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <string_view>
@@ -38,6 +42,8 @@ struct SharedTierOptions {
   std::size_t max_value_bytes = 0;                 // larger ones are neither sent nor fetched
   std::size_t readers = 1;                         // connections for look-ups: how many run at a time
   std::size_t queue_bytes = std::size_t{8} << 20;  // memory of values that wait to be written; more are dropped
+  std::chrono::milliseconds retry_after{1'000};    // between two attempts to connect, or to write what was refused
+  std::chrono::milliseconds test_after{5'000};     // a connection that was not used
 };
 
 class SharedTier {
@@ -57,8 +63,8 @@ class SharedTier {
   // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
 
-  // Takes the lease of a key for `time`, unless somebody else has it. kHeld: wait, and look again. kNone: the store is
-  // switched off, so nobody is to be waited for. Let go of it with Release, or by the time.
+  // Takes the lease of a key, which ends with Release or after `time`. kHeld: another server has it; wait, and look
+  // again. kNone: the store is switched off; do not wait.
   enum class Lease { kTaken, kHeld, kNone };
   Lease Take(const std::string& key, std::chrono::milliseconds time);
   void Release(const std::string& key);
@@ -69,8 +75,6 @@ class SharedTier {
                             const std::stop_token& stop);
 
   tiler::StoreStats stats() const;
-
-  static constexpr std::chrono::milliseconds kRetryAfter{1'000};
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -86,14 +90,22 @@ class SharedTier {
   std::size_t MaxReply() const { return options_.max_value_bytes + 4096; }
   // A command that a caller waits for. Nothing: the store is or was just switched off.
   std::optional<redis::Reply> Ask(const redis::Command& command);
-  ConnectionPtr Borrow(std::uint64_t& epoch);
-  void GiveBack(ConnectionPtr connection, std::uint64_t epoch);
-  void SwitchOff(const std::string& why, bool is_timeout);
+  // A connection of a time between two failures, and which.
+  struct Loan {
+    ConnectionPtr connection;  // null: none
+    std::uint64_t epoch = 0;
+  };
+  Loan Borrow();
+  void GiveBack(Loan loan);
+  void Drop(Loan loan);
+  void SwitchOff(const Error& why, std::uint64_t epoch);
   void Enqueue(Job job);
 
   // Of the store's thread.
   void Run();
   void Connect();
+  void Test();
+  Clock::time_point NextTest() const;
   void Write();
   void RefuseWrites(const std::string& why);
   void Report(const std::string& why, bool is_off);
@@ -102,15 +114,20 @@ class SharedTier {
   mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
   std::condition_variable changed_;
   bool on_ = false;
-  std::uint64_t epoch_ = 0;          // counts how often it was switched off: connections of an earlier one are closed
-  std::vector<ConnectionPtr> idle_;  // for look-ups
-  std::size_t open_ = 0;             // idle or borrowed, of this epoch
+  std::uint64_t epoch_ = 0;  // counts how often it was switched off: connections of an earlier one are closed
+  struct Idle {
+    ConnectionPtr connection;
+    Clock::time_point since;
+  };
+  std::deque<Idle> idle_;                  // for look-ups; that which was used last is at the end
+  std::set<redis::Connection*> borrowed_;  // of this epoch
+  std::size_t open_ = 0;                   // idle or borrowed, of this epoch
   Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt to connect, to write
   std::list<Job> queue_;
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
-  std::string reported_;                         // the last reason in the log, and when
+  std::string reported_;                         // the last reason in the log
   Clock::time_point reported_at_, answered_at_;  // when the log said so
 
   ConnectionPtr writer_;  // of the store's thread

@@ -49,6 +49,7 @@ prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, co
 struct CacheTier {
   const char *name, *kind;
   tiler::StoreStats stats;
+  bool counts_lookups = true;
 };
 
 // A family for each number, with a value for each tier and kind. Memory, the first `in_memory` tiers, has no writes.
@@ -58,6 +59,7 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
     if (first == tiers.size()) return;
     prometheus::MetricFamily family{name, help, type, {}};
     for (std::size_t i = first; i < tiers.size(); ++i) {
+      if (type == prometheus::MetricType::Counter && !tiers[i].counts_lookups) continue;
       prometheus::ClientMetric& metric = family.metric.emplace_back();
       metric.label = {{"tier", tiers[i].name}, {"kind", tiers[i].kind}};
       (type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
@@ -323,6 +325,14 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
     all.push_back(Value(type, name, help, static_cast<double>(value)));
   };
   std::vector<CacheTier> tiers = {{"memory", "tiles", {tiles.cache}}, {"memory", "refinements", {state.refinements}}};
+  if (state.catalog->pipeline) {
+    tiers.push_back({"memory", "drawn_meshes", {state.catalog->pipeline->drawn_meshes()}, false});
+  }
+  const dem::KeptBlocks blocks = dem::DemSource::CountKeptBlocks();
+  tiler::ByteCacheStats of_blocks;
+  of_blocks.entries = blocks.count;
+  of_blocks.bytes = blocks.bytes;
+  tiers.push_back({"memory", "sample_blocks", {of_blocks}, false});
   const std::size_t in_memory = tiers.size();
   for (std::size_t i = 0; i < state.stores.size(); ++i) {
     const tiler::StoreBase& store = *state.stores[i];

@@ -20,10 +20,10 @@ constexpr std::string_view kToken = "token";  // omitted and not counted: admiss
 
 // The parameters of all URLs; a test compares them with the manual.
 constexpr std::string_view kParameters[] = {
-    "error",  "fraction",    "atleast",   "extensions", "compression", "texture", "encoding", "size",
-    "v",      "path",        "locations", "step",       "samples",     "datum",   "certify",  "bbox",
-    "format", "coordinates", "normals",   "surface",    "level",       "width",   "height",   "spacing",
-    "crs",    "range",       "from",      "to",         "refraction",  "heights", "rays"};
+    "error",   "fraction",  "atleast", "extensions", "compression", "texture", "encoding",   "size",     "v",
+    "path",    "locations", "step",    "samples",    "datum",       "certify", "bbox",       "format",   "coordinates",
+    "normals", "surface",   "level",   "width",      "height",      "spacing", "azimuth",    "altitude", "zfactor",
+    "style",   "interval",  "crs",     "range",      "from",        "to",      "refraction", "heights",  "rays"};
 
 // Their values that are not numbers; several are separated by '-'.
 constexpr std::string_view kWords[] = {"octvertexnormals",
@@ -54,6 +54,10 @@ constexpr std::string_view kWords[] = {"octvertexnormals",
                                        "png16",
                                        "geotiff",
                                        "json",
+                                       "png",
+                                       "jpg",
+                                       "colors",
+                                       "degrees",
                                        "terrain"};
 
 using Characters = std::array<bool, 256>;

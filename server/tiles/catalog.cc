@@ -85,7 +85,12 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.has_datum = dataset.source->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
-  if (dataset.imagery.image) view.texture = dataset.imagery.texture;
+  if (dataset.imagery.image) {
+    view.texture = dataset.imagery.texture;
+    view.imagery = dataset.imagery.image->extent();
+    view.imagery_attribution = dataset.imagery.attribution;
+  }
+  view.sources_finest_level = info.finest_level;
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;
@@ -103,13 +108,15 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline) {
 
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const dem::GeoBounds all{dataset.west, dataset.south, dataset.east, dataset.north};
-  if (dataset.available.empty() || dataset.available.back().empty()) return all;
-  const std::vector<geo::TileRange>& ranges = dataset.available.back();
+  // Levels that edits have added are no finer data.
+  const int level = std::min(dataset.finest_level(), dataset.max_level());
+  if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
+  const std::vector<geo::TileRange>& ranges = dataset.available[static_cast<std::size_t>(level)];
   const auto size = [](const geo::TileRange& range) {
     return (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
   };
   const auto largest = std::ranges::max_element(ranges, {}, size);
-  const std::int64_t columns = geo::TileColumns(dataset.max_level());
+  const std::int64_t columns = geo::TileColumns(level);
   const geo::TileRange box = Grown(*largest, ranges, columns);
   const double step = 360.0 / static_cast<double>(columns);
   const auto degrees = [step](std::int64_t tiles) { return static_cast<double>(tiles) * step; };

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
+#include "engine/dem/image/imagery.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "proto/gltf/glb_tile.h"
@@ -40,13 +41,16 @@ struct DatasetView {
   // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
   // above holds for all tiles.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
-  bool has_datum = true;                        // the vertical datum of its heights is known
-  std::size_t sources = 1;                      // rasters that the heights come from
-  bool has_water = false;                       // tiles have a water mask
-  std::optional<proto::TextureFormat> texture;  // of GLB tiles, for requests that name none; nothing: no imagery
-  int metadata_levels = 0;                      // tiles at multiples of this level have metadata; 0: none
-  int max_mercator_depth = 1;                   // the deepest geo::MercatorGrid of height tiles
-  std::optional<tiler::Coding> baked_coding;    // of the tiles of its archive; nothing: it has no archive
+  bool has_datum = true;                         // the vertical datum of its heights is known
+  std::size_t sources = 1;                       // rasters that the heights come from
+  bool has_water = false;                        // tiles have a water mask
+  std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
+  std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
+  std::string imagery_attribution = {};
+  std::optional<int> sources_finest_level;    // DemSource::finest_level; nothing: the deepest level
+  int metadata_levels = 0;                    // tiles at multiples of this level have metadata; 0: none
+  int max_mercator_depth = 1;                 // the deepest geo::MercatorGrid of height tiles
+  std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
   // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
   std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
 
@@ -55,6 +59,10 @@ struct DatasetView {
   // What keys of caches contain.
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
+  // The deepest level without edits, as of dem::DemSource.
+  int finest_level() const {
+    return baked_alone ? baked_alone->extent().finest_level : sources_finest_level.value_or(max_level());
+  }
   // The deepest level of the sources; an archive may end above it.
   int deepest_level() const { return baked_alone ? baked_alone->extent().deepest_level : max_level(); }
 };
@@ -70,8 +78,8 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline);
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// Returns the bounds of the largest connected group of ranges of the deepest tiles, clipped to the dataset's bounds.
-// Degrees; west > east: across the antimeridian.
+// Returns the bounds of the largest connected group of ranges of the deepest tiles without edits, clipped to the
+// dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
 // Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the

@@ -14,6 +14,7 @@ import time
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
 from redis_process import Redis  # noqa: E402
 from srtm import write_hgt  # noqa: E402
 
@@ -107,7 +108,7 @@ class QueueCase(unittest.TestCase):
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             texts = [pool.submit(stream.read) if stream else None for stream in (process.stdout, process.stderr)]
             try:
-                process.wait(timeout=40)
+                process.wait(timeout=150)
             except subprocess.TimeoutExpired:
                 process.kill()
                 raise

@@ -5,9 +5,9 @@ import random
 import signal
 import subprocess
 import time
-import unittest
 
 from queue_case import BINARY, QueueCase, files_of
+import in_parallel  # queue_case has set the path
 from redis_process import Listener, proxy
 
 
@@ -112,10 +112,11 @@ class QueueFaults(QueueCase):
             if key == "job":
                 self.assertIn("the key belongs to something else", errors)
 
-    def expect_refusal(self, url, part, code, **options):
+    def expect_refusal(self, url, part, code, timeout=None, **options):
         place = self.place(f"refused-{part[:5]}")
         begun = time.monotonic()
-        out, errors = self.run_bake(place, url=url, code=code, **options)
+        arguments = ("--queue-timeout", timeout) if timeout else ()
+        out, errors = self.run_bake(place, *arguments, url=url, code=code, **options)
         self.assertIn(part, errors)
         self.assertNotIn("secret", out + errors)
         self.assertLess(time.monotonic() - begun, 60)
@@ -160,7 +161,7 @@ class QueueFaults(QueueCase):
         ending = proxy(self.redis.port, cut_reply)
         self.addCleanup(ending.close)
         self.expect_refusal(ending.url, "closed the connection", 1)
-        self.expect_refusal(cut.url, "did not reply in time", 1)
+        self.expect_refusal(cut.url, "did not reply in time", 1, timeout=1)
 
     def test_broken_and_slow_connections_do_no_harm(self):
         dice = random.Random(5)
@@ -212,4 +213,4 @@ class QueueFaults(QueueCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    in_parallel.main()

@@ -7,9 +7,9 @@ import signal
 import subprocess
 import sys
 import time
-import unittest
 
 from queue_case import BINARY, IS_LONG, QueueCase, files_of, write_hgt
+import in_parallel  # queue_case has set the path
 
 KILLS = 200 if IS_LONG else 8
 
@@ -58,27 +58,28 @@ class Queue(QueueCase):
         print(f"{KILLS} kills, {lives + 1} archives", file=sys.stderr)
 
     def finish(self, place):
-        """Runs two workers to the end. A worker that was killed between manifest and good-bye leaves its traces to them."""
+        """Runs two workers to the end. One that was killed between manifest and good-bye leaves its traces to a third."""
         for worker in [self.start(place) for _ in range(2)]:
             worker.communicate()
         self.run_bake(place)
-        left = [name for name in files_of(place) if name.endswith((".lock", ".partial"))]
-        for name in left:  # of a worker that was killed after the manifest was written
-            (place / name).unlink()
         self.expect_equal(place)
+
+    def stop_within_a_unit(self, worker, place):
+        """Its unit, and the id in the queue."""
+        worker.stdout.readline()
+        while True:
+            worker.send_signal(signal.SIGSTOP)
+            held = json.loads(self.status("--json"))["running"]
+            unit = held[0]["unit"].split("/")[1] if held else ""
+            if unit and not (place / "units" / f"{unit}.pmtiles").exists():
+                return unit, self.redis("XPENDING", self.key("units"), "bakers", "-", "+", 1)[0][0]
+            worker.send_signal(signal.SIGCONT)
+            time.sleep(0.02)
 
     def test_a_stopped_worker_loses_its_unit_and_comes_back(self):
         place = self.place()
         first = self.start(place)
-        first.stdout.readline()
-        while True:  # until it is stopped in the middle of a unit
-            first.send_signal(signal.SIGSTOP)
-            held = json.loads(self.status("--json"))["running"]
-            unit = held[0]["unit"].split("/")[1] if held else ""
-            if unit and not (place / "units" / f"{unit}.pmtiles").exists():
-                break
-            first.send_signal(signal.SIGCONT)
-            time.sleep(0.02)
+        unit, _ = self.stop_within_a_unit(first, place)
         out, _ = self.run_bake(place)  # waits for the lease, inherits, finishes
         self.assertIn(unit, self.baked(out))
         self.expect_equal(place)
@@ -86,6 +87,7 @@ class Queue(QueueCase):
         self.end(first)
         self.expect_equal(place)
 
+    @in_parallel.alone
     def test_a_slow_unit_is_not_inherited_while_its_worker_lives(self):
         place = self.place()
         lease = self.seconds / len(self.units) / 2
@@ -149,6 +151,44 @@ class Queue(QueueCase):
         out, errors = self.run_bake(place, code=1)
         self.assertIn(f"unit {unit} failed: its workers ended before it was done", errors)
         self.run_bake(place)
+        self.expect_equal(place)
+
+    def test_a_unit_that_was_given_up_and_is_done_after_all_is_not_dead(self):
+        place = self.place()
+        first = self.start(place)
+        unit, pending = self.stop_within_a_unit(first, place)
+        self.redis("XCLAIM", self.key("units"), "bakers", "killed", 0, pending, "RETRYCOUNT", 3)
+        _, errors = self.run_bake(place, code=1)
+        self.assertIn(f"unit terrain/{unit} failed: its workers ended before it was done", errors)
+        self.assertEqual(self.redis("XLEN", self.key("dead")), 1)
+        first.send_signal(signal.SIGCONT)
+        out, _ = self.end(first)
+        self.assertIn(unit, self.baked(out))
+        self.expect_equal(place)
+        self.assertEqual(self.redis("XLEN", self.key("dead")), 0)
+
+    def test_leftovers_of_the_killed_are_removed_at_the_end(self):
+        place = self.place()
+        first = self.start(place)
+        unit, _ = self.stop_within_a_unit(first, place)
+        first.kill()
+        first.communicate()
+        (place / "units" / f"{unit}.pmtiles.0badcafe.partial").write_text("of a kill while the file was written")
+        left = [name for name in files_of(place) if name.endswith((".lock", ".partial"))]
+        self.assertEqual(len(left), 2, left)
+        texts = {name: (place / name).read_bytes() for name in left}
+        self.run_bake(place)
+        self.expect_equal(place)
+        for name, text in texts.items():  # as if it had been killed after the manifest was written
+            (place / name).write_bytes(text)
+        _, errors = self.run_bake(place)
+        self.assertIn("is complete already", errors)
+        self.expect_equal(place)
+        for name, text in texts.items():
+            (place / name).write_bytes(text)
+        done = subprocess.run([BINARY, "bake", "--config", self.config, "--levels", "0-11", "--out", place, "--finish"], env=self.environment,
+                              stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
         self.expect_equal(place)
 
     def test_damaged_files_are_found_at_the_end(self):
@@ -216,4 +256,4 @@ class Queue(QueueCase):
 
 
 if __name__ == "__main__":
-    unittest.main()
+    in_parallel.main()

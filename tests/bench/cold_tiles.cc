@@ -1,7 +1,9 @@
 // terrace_cold_tiles measures how many tiles a second the pipeline builds on a number of threads, without HTTP, caches
-// or queues, and how long the stages of a tile take. tests/load/cold_storm.py compares a server with it.
+// or queues, and how long the stages of a tile take. tests/load/cold_storm.py compares a server with it. "hash" is one
+// of all tiles and their errors: builds of the same bytes print the same.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <xxhash.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -26,7 +28,15 @@ namespace {
 struct Arguments {
   std::string config, dataset, tiles;
   unsigned threads = std::max(std::thread::hardware_concurrency(), 1u);
+  unsigned rounds = 1;
 };
+
+// Does not depend on the order of the tiles.
+std::uint64_t HashOf(const geo::TileKey& key, const tiler::EncodedTile& tile) {
+  const std::string errors =
+      fmt::format("{} {} {}", geo::ToString(key), tile.max_error_m, tile.certified_error_m.value_or(-1));
+  return XXH3_64bits_withSeed(tile.bytes.data(), tile.bytes.size(), XXH3_64bits(errors.data(), errors.size()));
+}
 
 // One key a line: "/maui/12/252/2520.terrain".
 Result<std::vector<geo::TileKey>> ReadKeys(const std::string& file) {
@@ -66,16 +76,19 @@ Result<void> Run(const Arguments& arguments) {
   const tiler::TilePipeline pipeline(*std::move(datasets), 0);  // no tile is a replay of an earlier one
 
   std::atomic<std::size_t> next{0}, bytes{0}, failed{0};
+  std::atomic<std::uint64_t> hash{0};
   std::atomic<std::int64_t> read{0}, refine{0}, encode{0}, compress{0};  // microseconds
+  const std::size_t builds = keys->size() * arguments.rounds;
   const auto work = [&] {
-    for (std::size_t i = next++; i < keys->size(); i = next++) {
+    for (std::size_t i = next++; i < builds; i = next++) {
       tiler::TileRequest request;
-      request.key = (*keys)[i];
+      request.key = (*keys)[i % keys->size()];
       request.coding = tiler::Coding::kGzip;
       const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) ++failed;
       if (!tile) continue;
       bytes += tile->bytes.size();
+      hash += HashOf(request.key, *tile);
       read += tile->times.read.count();
       refine += tile->times.refine.count();
       encode += tile->times.encode.count();
@@ -88,12 +101,12 @@ Result<void> Run(const Arguments& arguments) {
   threads.clear();  // joins
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begun;
   const auto each = [&](const std::atomic<std::int64_t>& stage) {
-    return static_cast<double>(stage) / 1000 / static_cast<double>(std::max<std::size_t>(keys->size() - failed, 1));
+    return static_cast<double>(stage) / 1000 / static_cast<double>(std::max<std::size_t>(builds - failed, 1));
   };
   fmt::print(
-      "{{\"tiles\": {}, \"bytes\": {}, \"errors\": {}, \"seconds\": {:.3f}, "
+      "{{\"tiles\": {}, \"bytes\": {}, \"hash\": \"{:016x}\", \"errors\": {}, \"seconds\": {:.3f}, "
       "\"read_ms\": {:.3f}, \"refine_ms\": {:.3f}, \"encode_ms\": {:.3f}, \"compress_ms\": {:.3f}}}\n",
-      keys->size(), bytes.load(), failed.load(), seconds.count(), each(read), each(refine), each(encode),
+      builds, bytes.load(), hash.load(), failed.load(), seconds.count(), each(read), each(refine), each(encode),
       each(compress));
   return {};
 }
@@ -108,6 +121,7 @@ int main(int argc, char** argv) {
   app.add_option("dataset", arguments.dataset, "The name of one of its datasets")->required();
   app.add_option("tiles", arguments.tiles, "A file of paths, one a line")->required()->check(CLI::ExistingFile);
   app.add_option("--threads", arguments.threads, "As many builds at a time")->check(CLI::PositiveNumber);
+  app.add_option("--rounds", arguments.rounds, "Builds each tile as many times")->check(CLI::PositiveNumber);
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(spdlog::level::err);
   const terrace::Result<void> done = terrace::bench::Run(arguments);

@@ -45,6 +45,23 @@ TEST(ParseListenAddress, SaysWhatWouldBeRight) {
   }
 }
 
+TEST(ParseListenAddress, TakesThePathOfAUnixSocketOnlyWhereOneMayStand) {
+  const Result<ListenAddress> address = ParseListenAddressOrPath("unix:/run/terrace/admin.sock");
+  ASSERT_TRUE(address) << address.error().message;
+  EXPECT_EQ(address->path, "/run/terrace/admin.sock");
+  EXPECT_EQ(ToString(*address), "unix:/run/terrace/admin.sock");
+  EXPECT_FALSE(ParseListenAddress("unix:/run/terrace/admin.sock"));
+  EXPECT_EQ(ParseListenAddressOrPath("[::1]:8080")->host, "::1");
+  const std::string longest = "unix:/" + std::string(106, 'x');
+  EXPECT_TRUE(ParseListenAddressOrPath(longest));
+  for (const std::string& text : {std::string("unix:"), std::string("unix:/"), std::string("unix:admin.sock"),
+                                  std::string("unix:/run/"), longest + "x", std::string("unix:/a\0b", 9)}) {
+    const Result<ListenAddress> refused = ParseListenAddressOrPath(text);
+    ASSERT_FALSE(refused) << text;
+    EXPECT_NE(refused.error().message.find("unix:/run/terrace/admin.sock"), std::string::npos);
+  }
+}
+
 TEST(ParseListenAddress, RefusesBytesAfterAnEmbeddedNul) {
   EXPECT_FALSE(ParseListenAddress(std::string_view("127.0.0.1\0x:80", 14)));
   EXPECT_FALSE(ParseListenAddress(std::string_view("[::1\0]:80", 9)));

@@ -28,7 +28,8 @@ TEST(ToJson, ComesBackAsTheDefaults) { ExpectComesBack(Config{}); }
 TEST(ToJson, ComesBackWithEveryOptionSet) {
   Config config;
   config.listen = {"2001:db8::1", 0};
-  config.admin_listen = ListenAddress{"10.0.0.1", 9090};
+  config.admin_listen = ListenAddress{{}, 0, "/run/terrace/admin.sock"};
+  config.admin_socket_mode = 0660;
   DatasetConfig dataset = Dataset("a");
   dataset.sources = {"/data/a.tif"};
   dataset.vertical = "egm96";

@@ -168,6 +168,31 @@ class ArchiveTest(unittest.TestCase):
                 self.assertEqual((status, reason in body.decode()), (404, True), (target, body))
             self.assertEqual(both.get("/cell/heights?locations=46.5,7.5")[0], 200)
 
+    def test_heights_of_the_tiles_are_those_of_the_sources_as_drawn(self):
+        """Without sources, heights, grids and rays are read from the archive's tiles: what a server with sources says of the drawn surface."""
+        box = "bbox=7.3,46.3,7.32,46.32&width=33&height=33"
+        with self.serve() as live, self.serve_alone() as alone:
+            level = len(json.loads(gzip.decompress(live.get("/cell/layer.json")[2]))["available"]) - 1
+            points = "|".join(f"{46.3 + 0.0007 * i},{7.3 + 0.00091 * i}" for i in range(40))
+            for target in (f"/cell/heights?surface=served&normals=1&locations={points}",
+                           f"/cell/heights?surface=served&level={level - 2}&locations={points}", f"/cell/grid?surface=served&format=json&{box}",
+                           f"/cell/grid?surface=served&format=f32&{box}", "/cell/sight?surface=served&from=46.3,7.3,900&to=46.32,7.33,900",
+                           "/cell/sight?surface=served&heights=ground&from=46.3,7.3,2&to=46.31,7.31,2"):
+                wanted, found = live.get(target, {"Accept-Encoding": "identity"}), alone.get(target, {"Accept-Encoding": "identity"})
+                self.assertEqual((wanted[0], found[0], found[2]), (200, 200, wanted[2]), target)
+                without = target.replace("surface=served&", "")
+                if "/heights?" not in target:  # grids and rays have no other surface here
+                    self.assertEqual(alone.get(without, {"Accept-Encoding": "identity"})[2], wanted[2], without)
+            for target, reason in ((f"/cell/heights?surface=served&format=glb&locations={points}", "without format"),
+                                   (f"/cell/heights?surface=served&error=3&locations={points}", "one error"),
+                                   (f"/cell/grid?datum=orthometric&{box}", "")):
+                status, _, body = alone.get(target)
+                self.assertIn(status, (400, 404), target)
+                self.assertIn(reason, body.decode(), target)
+        with self.serve_alone(self.place / "glb") as alone:
+            status, _, body = alone.get(f"/cell/grid?{box}")
+            self.assertEqual((status, "has none" in body.decode()), (404, True), body)
+
     def test_serve_place(self):
         with Server({"datasets": []}, self.scratch, str(self.place / "glb")) as server:
             self.assertEqual(server.get("/cell/tileset.json")[0], 200)

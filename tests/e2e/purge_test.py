@@ -10,6 +10,7 @@ import pathlib
 import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -201,6 +202,39 @@ class Purge(unittest.TestCase):
                                   stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, timeout=60)
             self.assertEqual(done.returncode, 1)
             self.assertRegex(done.stderr, rf"admin_listen: cannot listen on {taken}: .*choose another port")
+
+    def test_the_address_may_be_a_path(self):
+        path = self.folder / "admin.sock"
+        for mode in ("0600", "0660"):
+            stale = socket.socket(socket.AF_UNIX)
+            stale.bind(str(path))
+            stale.close()  # as a process that was killed leaves it
+            with Server({**self.config, "admin_listen": f"unix:{path}", "admin_socket_mode": mode, "access_log": "combined"}, self.folder) as server:
+                self.assertIn(f"operators: unix:{path} answers", server.log())
+                self.assertEqual(oct(path.stat().st_mode & 0o777), oct(int(mode, 8)))
+                self.assertEqual(server.get("/alps/7/133/97.terrain")[0], 200)
+
+                def ask(method, target):
+                    done = subprocess.run(["curl", "-s", "-i", "--unix-socket", path, "-X", method, "http://localhost" + target], check=True,
+                                          stdout=subprocess.PIPE, text=True)
+                    head, _, body = done.stdout.partition("\n\n" if "\r" not in done.stdout else "\r\n\r\n")
+                    return int(head.split()[1]), body
+                self.assertEqual(json.loads(ask("POST", "/admin/purge?dataset=alps")[1])["erased"]["tiles"]["memory"], 1)
+                self.assertIn("terrace_http_requests_total", ask("GET", "/metrics")[1])
+                self.assertEqual(ask("GET", "/alps/layer.json")[0], 404)
+                taken = subprocess.run([BINARY, "serve", "--listen", "127.0.0.1:0", "--admin-listen", f"unix:{path}", self.folder / "N46E007.hgt"],
+                                       stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, timeout=60)
+                self.assertEqual(taken.returncode, 1)
+                self.assertRegex(taken.stderr, rf"admin_listen: cannot listen on unix:{path}: another process listens there")
+                self.assertEqual(ask("GET", "/version")[0], 200, "the socket of the other process still stands")
+            self.assertEqual(server.status, 0)
+            self.assertFalse(path.exists(), "removed at the end")
+        path.write_text("something else")
+        done = subprocess.run([BINARY, "serve", "--listen", "127.0.0.1:0", "--admin-listen", f"unix:{path}", self.folder / "N46E007.hgt"],
+                              stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, timeout=60)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("something else lies there", done.stderr)
+        self.assertEqual(path.read_text(), "something else")
 
 
 if __name__ == "__main__":

@@ -8,6 +8,8 @@ import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { promisify } from 'node:util';
 import { json, request, samples, serve } from '../e2e/harness.mjs';
+import { VectorTile } from './node_modules/@mapbox/vector-tile/index.js';
+import Pbf from './node_modules/pbf/index.js';
 import { fileOf, kExamples, kSettleMs, kSize, launchBrowser, pixels, servePages, settle, typeOf } from './pages.mjs';
 
 const run = promisify(execFile);
@@ -180,7 +182,55 @@ describe('the pages of examples/', () => {
         }
       },
     },
+    contours: {
+      ready: "window.map?.loaded() && map.areTilesLoaded() && map.queryRenderedFeatures({ layers: ['lines'] }).length > 0",
+      check: async (page, dataset) => {
+        const found = await page.evaluate(() => {
+          for (const { properties, geometry: { type, coordinates } } of map.queryRenderedFeatures({ layers: ['lines'] })) {
+            for (const [longitude, latitude] of type === 'LineString' ? coordinates : coordinates.flat()) {
+              const { x, y } = map.project([longitude, latitude]);
+              if (x > 60 && x < 270 && y > 110 && y < 180) return { x, y, longitude, latitude, properties };
+            }
+          }
+        });
+        assert.ok(found, 'a line in the middle of the picture');
+        assert.deepEqual(Object.keys(found.properties).sort(), ['ele', 'index']);
+        await page.mouse.click(found.x, found.y);
+        await page.waitForFunction(() => /\n-?[\d.]+ m$/.test(document.getElementById('line').innerText), null, { timeout: kSettleMs });
+        // The pixels of a coarse tile are averages.
+        const level = Math.floor(await page.evaluate(() => map.getZoom()));
+        const metres = pixelMetres(found.latitude, level, 256), [low, high] = await range(dataset, found, 2 * metres);
+        const slack = dataset === 'earth' ? 300 : 15;
+        within(found.properties.ele, [low - slack, high + slack], `contours, ${dataset} at ${found.latitude}, ${found.longitude}`);
+      },
+    },
   };
+
+  // Mapbox's reader of vector tiles, which MapLibre uses.
+  it('contours are read by the library of MapLibre, and meet at the edges of tiles', async () => {
+    const read = async (x, y) => {
+      const reply = await fetch(`${server.url}/jacksboro/contours/11/${x}/${y}.mvt?interval=20`);
+      const { layers } = new VectorTile(new Pbf(new Uint8Array(await reply.arrayBuffer())));
+      assert.deepEqual(Object.keys(layers), ['contour']);
+      assert.equal(layers.contour.extent, 4096);
+      return Array.from({ length: layers.contour.length }, (_, i) => layers.contour.feature(i));
+    };
+    // Heights and places of the crossings with a tile's western or eastern edge.
+    const crossings = (features, edge) => new Set(features.flatMap((feature) => {
+      const { ele, index } = feature.properties;
+      assert.equal(ele % 20, 0);
+      assert.equal(index, ele % 100 === 0);
+      return feature.loadGeometry().flatMap((line) => line.slice(1).flatMap((b, i) => {
+        const a = line[i];
+        if (Math.min(a.x, b.x) >= edge || Math.max(a.x, b.x) <= edge) return [];
+        const y = a.y + (edge - a.x) / (b.x - a.x) * (b.y - a.y);
+        return y > 0 && y < 4096 ? [`${ele} m at ${y.toFixed(6)}`] : [];
+      }));
+    }));
+    const west = crossings(await read(544, 802), 4096), east = crossings(await read(545, 802), 0);
+    assert.ok(west.size > 5, `${west.size} crossings`);
+    assert.deepEqual([...west].sort(), [...east].sort());
+  });
 
   for (const dataset of ['jacksboro', 'earth']) {
     for (const [name, { ready, check }] of Object.entries(pages)) {

@@ -1,7 +1,9 @@
 """terrace fly against the real server, sound and with faults between: fly_test.py BINARY SOURCE_DIR."""
 import json
+import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -219,6 +221,84 @@ class Faults(unittest.TestCase):
         self.assertEqual([requirement["holds"] for requirement in report["requirements"]], [False, False, False])
         self.assertIn("does not keep up", " ".join(summary["findings"]))
         self.assertLessEqual(summary["best_tiles_per_second"], 12)
+
+
+class Configured:
+    """A server with a configuration of its own, its output closed at the end."""
+
+    def __init__(self, folder, configuration):
+        path = pathlib.Path(folder, "terrace.json")
+        path.write_text(json.dumps({"listen": "127.0.0.1:0", **configuration}), encoding="utf-8")
+        self.process = subprocess.Popen([BINARY, "serve", "--config", path, "--log-level", "error"], stdout=subprocess.PIPE, text=True)
+        self.port = int(re.search(r"https?://[\d.]+:(\d+)/", self.process.stdout.readline())[1])
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.terminate()
+        self.process.stdout.close()
+        self.process.wait(60)
+
+
+def fly_to(url, *options, environment=None, way=WAY, duration="2"):
+    done = subprocess.run([BINARY, "fly", url, *way, "--duration", duration, "--json", *options], capture_output=True, text=True,
+                          timeout=120, check=False, env={**os.environ, **(environment or {})})
+    return done.returncode, json.loads(done.stdout)["summary"] if done.stdout else done.stderr
+
+
+@unittest.skipUnless(shutil.which("openssl"), "needs openssl")
+class Https(unittest.TestCase):
+    def test_loads_the_view_from_a_server_that_it_trusts(self):
+        with tempfile.TemporaryDirectory() as folder:
+            certificate, key = pathlib.Path(folder, "tls.crt"), pathlib.Path(folder, "tls.key")
+            subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",
+                            "-subj", "/CN=localhost", "-addext", "subjectAltName=DNS:localhost", "-keyout", key, "-out", certificate],
+                           check=True, stderr=subprocess.DEVNULL)
+            with Configured(folder, {"tls": {"certificate": str(certificate), "key": str(key)},
+                                     "datasets": [{"name": "jacksboro", "sources": [str(DEM)]}]}) as server:
+                url = f"https://localhost:{server.port}/jacksboro"
+                trusted = {"SSL_CERT_FILE": str(certificate)}
+                for tiles in ("terrain", "3dtiles"):
+                    status, summary = fly_to(url, "--format", tiles, "--require", "full-view=60s,errors=0,refusals=0,holes=0",
+                                             environment=trusted)
+                    self.assertEqual(status, 0, summary)
+                    self.assertGreater(summary["tiles"], 60)
+                    self.assertLessEqual(summary["connections"], 20)
+                # Not trusted, or another name than the certificate's: nothing is loaded.
+                for wrong, environment in ((url, {"SSL_CERT_FILE": "/dev/null"}), (url.replace("localhost", "127.0.0.1"), trusted)):
+                    status, answer = fly_to(wrong, environment=environment)
+                    self.assertEqual(status, 1, answer)
+                    self.assertIn("certificate verify failed", str(answer))
+                status, summary = fly_to(url.replace("localhost", "127.0.0.1"), "--insecure", "--require", "full-view=60s,errors=0")
+                self.assertEqual(status, 0, summary)
+
+
+class DeeperLevels(unittest.TestCase):
+    """Around `precision` there are levels below those of the sources, and nowhere else: no client finds a hole."""
+
+    def test_have_no_hole_around_them(self):
+        with tempfile.TemporaryDirectory() as folder:
+            box = [[-84.2505, 36.2995], [-84.2495, 36.2995], [-84.2495, 36.3005], [-84.2505, 36.3005], [-84.2505, 36.2995]]
+            edits = {"type": "FeatureCollection", "features": [
+                {"type": "Feature", "properties": {"terrain": {"op": "precision", "error_m": 0.5, "blend_m": 50}},
+                 "geometry": {"type": "Polygon", "coordinates": [box]}}]}
+            pathlib.Path(folder, "edits.geojson").write_text(json.dumps(edits), encoding="utf-8")
+            with Configured(folder, {"datasets": [{"name": "jacksboro", "sources": [str(DEM)], "edits": ["edits.geojson"]},
+                                                  {"name": "plain", "sources": [str(DEM)]}]}) as server:
+                def levels(name):
+                    with urllib.request.urlopen(f"http://127.0.0.1:{server.port}/{name}/layer.json", timeout=60) as reply:
+                        return len(json.load(reply)["available"])
+                self.assertGreater(levels("jacksboro"), levels("plain") + 2)
+                for tiles in ("terrain", "3dtiles"):
+                    urls = pathlib.Path(folder, "urls-" + tiles)
+                    status, summary = fly_to(f"http://127.0.0.1:{server.port}/jacksboro", "--format", tiles, "--urls", urls, "--require",
+                                             "full-view=60s,errors=0,refusals=0,holes=0",
+                                             way=["--circle", "-84.25,36.30,700,250", "--speed", "100"])
+                    self.assertEqual(status, 0, summary)
+                    self.assertGreater(summary["holes"]["examined_frames"], 3)
+                    asked = [int(level) for level in re.findall(r"^/jacksboro/(\d+)/\d+/\d+\.", urls.read_text(), re.M)]
+                    self.assertGreaterEqual(max(asked), levels("plain") + 1, tiles)
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ void Fill(Statistics& statistics) {
     tile.triangles = 50;
     tile.tier = i < 4 ? CacheTier::kHit : CacheTier::kMiss;
     statistics.AddRequest(i * 0.3, tile);
-    statistics.AddAsked(i * 0.3, {10, 1060 + i, 770}, tile.tier);
+    statistics.AddLoadedTile(i * 0.3, {10, 1060 + i, 770}, tile.tier);
     FrameRecord frame;
     frame.is_refined = i != 3;
     frame.is_measured = true;

@@ -23,7 +23,7 @@ TEST(LayerTree, MakesAllFourChildrenWhereTheServerHasOne) {
   EXPECT_EQ(east.children[2]->content, Content::kMesh);
   EXPECT_EQ(east.children[0]->content, Content::kUpsampled);
   EXPECT_EQ((*tree)->RequestFor(*east.children[2]).uri, "1/2/1.terrain?v=ab12&error=5");
-  EXPECT_EQ((*tree)->RequestFor(*east.children[0]).kind, TileRequest::Kind::kNothing);
+  EXPECT_EQ((*tree)->RequestFor(*east.children[0]).kind, NextRequest::Kind::kNothing);
   // A 2-pixel error of CesiumJS at level 0 is 77,067 m; 8 times that at 16 pixels.
   EXPECT_NEAR(east.geometric_error_m, 8 * 77067.34, 0.1);
   EXPECT_NEAR(east.children[0]->geometric_error_m, 4 * 77067.34, 0.1);
@@ -78,15 +78,15 @@ TEST(TilesetTree, GrowsWithItsSubtrees) {
   EXPECT_TRUE(place.always_refine);
   Tile& root = *place.children[0];
   EXPECT_EQ(root.key, (geo::TileKey{2, 4, 2}));
-  TileRequest request = tree.RequestFor(root);
-  EXPECT_EQ(request.kind, TileRequest::Kind::kSubtree);
+  NextRequest request = tree.RequestFor(root);
+  EXPECT_EQ(request.kind, NextRequest::Kind::kSubtree);
   EXPECT_EQ(request.uri, "t/0.0.0.subtree?v=aaaa");
   tree.AddChildren(root);
   EXPECT_TRUE(root.children.empty());
 
   ASSERT_TRUE(tree.TakeSubtree(root, SubtreeBytes(2, {{{0, 0, 0, 0}}, {{1, 0, 1, 1}}, {{3, 2, 3, 2}}})));
   request = tree.RequestFor(root);
-  EXPECT_EQ(request.kind, TileRequest::Kind::kMesh);
+  EXPECT_EQ(request.kind, NextRequest::Kind::kMesh);
   EXPECT_EQ(request.uri, "t/0/0/0.glb?v=aaaa");
   tree.AddChildren(root);
   ASSERT_EQ(root.children.size(), 2U);  // (1, 0) and (1, 1)

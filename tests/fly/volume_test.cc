@@ -75,17 +75,17 @@ TEST(Volume, ARegionBelowIsItsHeightAway) {
   const Rectangle& r = region.rectangle();
   const GeodeticPoint camera{(r.west + r.east) / 2, (r.south + r.north) / 2, 5900};
   EXPECT_NEAR(std::sqrt(DistanceSquared(Volume(region), At(camera), camera)), 5000, 1e-6);
-  EXPECT_TRUE(IsBelow(region, camera));
-  EXPECT_FALSE(IsBelow(region, {r.east + 1, r.south, 5900}));
+  EXPECT_TRUE(MeetsVertical(region, camera));
+  EXPECT_FALSE(MeetsVertical(region, {r.east + 1, r.south, 5900}));
 }
 
 TEST(Volume, SpheresAreMeasuredFromTheirSurface) {
   const Volume sphere = Sphere{{7e6, 0, 0}, 1000};
   EXPECT_DOUBLE_EQ(DistanceSquared(sphere, {7e6, 3000, 0}, {}), 2000.0 * 2000.0);
   EXPECT_EQ(DistanceSquared(sphere, {7e6, 10, 0}, {}), 0);
-  EXPECT_TRUE(IsBelow(sphere, {0, 0, 1e6}));
-  EXPECT_FALSE(IsBelow(sphere, {180, 0, 1e6}));
-  EXPECT_TRUE(IsBelow(Volume(Sphere{{0, 0, 0}, 6.4e6}), {180, 0, 1e6}));
+  EXPECT_TRUE(MeetsVertical(sphere, {0, 0, 1e6}));
+  EXPECT_FALSE(MeetsVertical(sphere, {180, 0, 1e6}));
+  EXPECT_TRUE(MeetsVertical(Volume(Sphere{{0, 0, 0}, 6.4e6}), {180, 0, 1e6}));
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 
 #include "engine/core/check.h"
 #include "engine/geo/error_ladder.h"
+#include "server/api/map_parameters.h"
 #include "server/api/tile_formats.h"
 #include "server/frontend/admission_control.h"
 #include "server/frontend/client_address.h"
@@ -18,6 +19,7 @@
 #include "server/routes.h"
 #include "server/telemetry/redact.h"
 #include "tests/fuzz/fuzz_input.h"
+#include "tiler/map/contour_tile.h"
 
 namespace terrace::fuzz {
 namespace {
@@ -34,6 +36,7 @@ const std::vector<DatasetView>& Datasets() {
     view.has_water = true;
     view.texture = proto::TextureFormat::kJpeg;
     view.max_mercator_depth = kDeepest;
+    view.imagery = dem::ImageExtent{{-180, -90, 180, 90}, kDeepest, kDeepest};
     for (int level = 0; level <= kDeepest; ++level) {
       view.available.push_back({{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1}});
     }
@@ -67,6 +70,21 @@ void TryQuery(std::string_view query) {
   }
   const auto height = ParseHeightTileParameters(query);
   TERRACE_CHECK(!height || height->size == 256 || height->size == 512);
+  for (const auto format : {tiler::TileFormat::kHillshade, tiler::TileFormat::kSlope, tiler::TileFormat::kContours,
+                            tiler::TileFormat::kImagery}) {
+    const auto of_map = ParseMapParameters(query, format, /*in_tile_json=*/true);
+    if (!of_map) {
+      ExpectClientError(of_map.error());
+      continue;
+    }
+    TERRACE_CHECK(of_map->size == 256 || of_map->size == 512);
+    TERRACE_CHECK(of_map->map.azimuth_deg < 360 && of_map->map.altitude_deg <= 90);
+    TERRACE_CHECK(of_map->map.z_factor_hundredths >= 1 && of_map->map.z_factor_hundredths <= 10'000);
+    TERRACE_CHECK(of_map->map.interval_cm <= tiler::kMaxIntervalCm);
+    // Written into a template, the parameters mean the same.
+    const auto again = ParseMapParameters(MapTileQuery(*of_map), format);
+    TERRACE_CHECK(again && again->map == of_map->map && again->size == of_map->size);
+  }
   if (const auto none = RefuseParameters(query); !none) ExpectClientError(none.error());
   const auto parameters = ParseQuery(query);
   if (!parameters) return ExpectClientError(parameters.error());
@@ -84,7 +102,9 @@ void TryQuery(std::string_view query) {
 
 // One tile has one URL: writing the parsed target again gives the requested one.
 void ExpectOneUrl(const Route& route) {
-  const std::string written = "/earth/" + geo::ToString(route.key) + std::string(route.format->suffix);
+  std::string folder(route.format->folder);
+  if (!folder.empty()) folder += '/';
+  const std::string written = "/earth/" + folder + geo::ToString(route.key) + std::string(route.format->suffix);
   const auto again = Routes().Match(written);
   TERRACE_CHECK(again && again->key == route.key && again->format == route.format);
 }
@@ -101,7 +121,7 @@ void TryTarget(std::string target) {
   TryQuery(route->query);
   TERRACE_CHECK(route->row != nullptr);
   TERRACE_CHECK(geo::IsValid(route->key) && geo::IsValid(route->root));
-  if (route->row->label != "tile") return;
+  if (route->format == nullptr || route->row->has_templates) return;
   ExpectOneUrl(*route);
   const Request request;
   RequestContext call;

@@ -9,6 +9,9 @@ level is the processor time of a cold tile in the best and in the median round, 
 and the medians of the last binary's stages. Before the levels it has the processor time of the first start and of a start with cached
 statistics; after them, the peak memory and the processor time of a warm tile (another error of a refinement in the cache).
 
+The dataset "cog" is a Cloud Optimized GeoTIFF with averages as overviews, read by range requests from a server on this machine; its
+request and bytes a tile are printed too.
+
 `--peer COMMAND` also runs a shell command in each round, which must write the same levels of the same source to
 {folder}/{z}/{x}/{y}; {source}, {first} and {last} are replaced too. The output then has its processor time a tile as well.
 """
@@ -30,6 +33,8 @@ import sys
 import tempfile
 import time
 
+from range_server import RangeServer
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MAUI = [f"srtm1_{name}.tif" for name in ("N20W157_maui_se_haleakala", "N20W158_maui_sw", "N21W157_maui_ne_molokai", "N21W158_maui_nw_molokai")]
 DATASETS = {  # name: sources, levels
@@ -37,6 +42,7 @@ DATASETS = {  # name: sources, levels
     "projected": (["bigtujunga_30m_utm11.tif"], range(9, 14)),
     "mosaic": ([*MAUI, "etopo5_global_10min.tif"], range(8, 15)),
     "lidar": (["lidar_greenriver_1m.tif"], range(14, 19)),
+    "cog": (MAUI[:1], range(8, 15)),
 }
 STAGES = ("read", "refine", "encode", "compress")
 
@@ -53,7 +59,8 @@ class Server:
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
         with tempfile.NamedTemporaryFile("w", suffix=".json") as config:
-            json.dump({"datasets": [{"name": "d", "sources": [str(source) for source in sources]}]}, config)
+            prefixes = [str(source).rpartition("/")[0] + "/" for source in sources if str(source).startswith("/vsicurl/")]
+            json.dump({"allowed_prefixes": prefixes, "datasets": [{"name": "d", "sources": [str(source) for source in sources]}]}, config)
             config.flush()
             self.process = subprocess.Popen(
                 [binary, "serve", "--config", config.name, "--listen", f"127.0.0.1:{self.port}", "--io-threads", "1", "--worker-threads", "1",
@@ -131,7 +138,13 @@ def run_peer(command, sources, level):
 
 def bench(name, sources, levels, arguments):
     print(f"\n{name}: {', '.join(source.name for source in sources)}")
-    with tempfile.TemporaryDirectory() as scratch:
+    with contextlib.ExitStack() as around:
+        scratch = around.enter_context(tempfile.TemporaryDirectory())
+        remote = None
+        if name == "cog":
+            remote = around.enter_context(RangeServer(scratch))
+            subprocess.run(["gdal_translate", "-q", "-of", "COG", "-co", "COMPRESS=DEFLATE", "-co", "RESAMPLING=AVERAGE", str(sources[0]), f"{scratch}/cog.tif"], check=True)
+            sources = [f"/vsicurl/{remote.url}cog.tif"]
         caches = [f"{scratch}/{k}" for k in range(len(arguments.binaries))]
         for binary, cache in zip(arguments.binaries, caches):
             with Server(binary, sources, cache) as server:
@@ -145,7 +158,11 @@ def bench(name, sources, levels, arguments):
             tiles = {level: draw(available[level], arguments.tiles) for level in levels if level < len(available) and available[level]}
             print("  | level | tiles | ms a cold tile: best / median of each | ratios | stages of the last |" + (" peer |" if arguments.peer else ""))
             for level in tiles:
+                before = (remote.requests, remote.bytes) if remote else None
                 cold_level(servers, level, tiles[level], sources, arguments)
+                if remote:
+                    builds = len(tiles[level]) * len(servers) * (arguments.rounds + 1)
+                    print(f"    {(remote.requests - before[0]) / builds:.2f} requests and {(remote.bytes - before[1]) / builds / 1000:.1f} KB a tile")
             print("  peak memory: " + ", ".join(f"{server.peak_mb():.0f} MB" for server in servers))
         with contextlib.ExitStack() as stack:
             servers = [stack.enter_context(Server(binary, sources, cache)) for binary, cache in zip(arguments.binaries, caches)]

@@ -81,6 +81,10 @@ describe('/openapi.json', () => {
       dataset.sources = dataset.sources.map((source) => path.join(samples, source));
     }
     scratch = fs.mkdtempSync(path.join(os.tmpdir(), 'openapi-'));
+    // And with imagery: the heights as grey.
+    const picture = path.join(scratch, 'picture.tif');
+    await promisify(execFile)('gdal_translate', ['-q', '-ot', 'Byte', '-scale', '-b', '1', '-b', '1', '-b', '1', path.join(samples, 'jacksboro.tif'), picture]);
+    config.datasets.find((dataset) => dataset.name === 'jacksboro').imagery = picture;
     fs.writeFileSync(path.join(scratch, 'samples.json'), JSON.stringify(config));
     server = await serve('--config', path.join(scratch, 'samples.json'));
     text = await (await send('/openapi.json')).text();
@@ -145,7 +149,13 @@ describe('/openapi.json', () => {
   it('has the URLs of the manual, and those that /datasets names', async () => {
     const table = manual.split('\n## URLs')[1].split('\n\n')[1];
     const rows = [...table.matchAll(/^\| (`\/[^|]*) \|/gm)].flatMap((row) => row[1].match(/`[^`]+`/g));
-    const listed = rows.map((url) => url.slice(1, -1).replace('/viewer/...', '/viewer/{file}'));
+    const listed = [];
+    // "`/a/b.png`, `.webp`" and "`/a/hillshade/tiles.json`, and so `slope`" mean further URLs like the one before.
+    for (const url of rows.map((row) => row.slice(1, -1).replace('/viewer/...', '/viewer/{file}'))) {
+      const before = listed.at(-1);
+      if (url.startsWith('.')) listed.push(before.replace(/\.\w+$/, url));
+      else listed.push(url.startsWith('/') ? url : before.replace(/[^/]+(?=\/tiles.json$)/, url));
+    }
     assert.deepEqual(Object.keys(spec.paths).sort(), listed.sort());
     const { datasets } = await (await send('/datasets')).json();
     const [{ name, urls }] = datasets;

@@ -105,6 +105,7 @@ TEST(SnapVertices, StaysWithinHalfAStepOfThePlace) {
   const double step = 0.5;
   const std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
   const LatticeView view = ground.view();
+  ASSERT_EQ(points.size(), mesh.vertices.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto [x, y] = mesh.vertices[k];
     const geo::Vec3 place = geo::ToEcef(view.Longitude(x), view.Latitude(y), static_cast<double>(view.At(x, y)));

@@ -59,7 +59,9 @@ TEST(TileNormals, LeanAwayFromTheRise) {
   const geo::TileKey key{13, 8192, 4096};  // at the equator and Greenwich: east is +y, up is +x
   const geo::Lattice lattice{key.level, kCells};
   const double metres = lattice.StepDegrees() * geo::MetresPerDegreeEast(0);
-  const auto normals = NormalsOf(SampledGround(key, [&](int i, int) { return i * metres; }), Fan(16, 16));
+  const tin::TinMesh mesh = Fan(16, 16);
+  const auto normals = NormalsOf(SampledGround(key, [&](int i, int) { return i * metres; }), mesh);
+  ASSERT_EQ(normals.size(), mesh.vertices.size());
   for (const geo::Vec3 normal : normals) {
     EXPECT_NEAR(normal.x, std::sqrt(0.5), 0.02);
     EXPECT_NEAR(normal.y, -std::sqrt(0.5), 0.02);
@@ -125,6 +127,7 @@ TEST(TileNormals, NeverPointIntoTheGround) {
   const SampledGround ground({18, 140000, 200000}, [](int i, int j) { return (i + j) % 2 == 0 ? 8000 : -8000; });
   const tin::TinMesh mesh = Fan(15, 16);
   const auto normals = NormalsOf(ground, mesh);
+  ASSERT_EQ(normals.size(), mesh.vertices.size());
   for (std::size_t k = 0; k < normals.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
     EXPECT_GT(geo::Dot(normals[k], geo::SurfaceNormal(ground.view().Longitude(p.x), ground.view().Latitude(p.y))), 0);

@@ -119,6 +119,7 @@ TEST(RedisConnection, ErrorsOfTheServerSayTheRemedyAndNoArgument) {
   expect("OOM command not allowed", ErrorCode::kOverloaded, "maxmemory");
   expect("READONLY You can't write", ErrorCode::kUnavailable, "primary");
   expect("NOAUTH Authentication required.", ErrorCode::kInvalidArgument, "password");
+  expect("DENIED Redis is running in protected mode", ErrorCode::kInvalidArgument, "requirepass");
   expect("LOADING Redis is loading", ErrorCode::kUnavailable, "soon");
   expect("ERR unknown command `GET`", ErrorCode::kInvalidArgument, "does not know GET");
   expect("ERR something", ErrorCode::kUnavailable, "refuses GET (ERR)");

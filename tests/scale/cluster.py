@@ -99,9 +99,10 @@ def sum_of(metrics, name, labels=""):
 
 
 class Nginx:
-    """The configuration that is shipped, on free ports. `nodes`: in the order of the file; more are added to it."""
+    """The configuration that is shipped, on free ports. `nodes`: in the order of the file; more are added to it. Without TLS for clients
+    that take only certificates of the system."""
 
-    def __init__(self, folder, nodes):
+    def __init__(self, folder, nodes, is_tls=True):
         self.folder = pathlib.Path(tempfile.mkdtemp(dir=folder))
         self.folder.chmod(0o755)  # nginx's workers run as another user
         self.port = free_port()
@@ -115,6 +116,8 @@ class Nginx:
                   "TERRACE_CERTIFICATES": certificates, "TERRACE_CACHE": self.folder / "cache"}
         filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: str(values[match[1]]), TEMPLATE.read_text())
         filled = filled.replace("/dev/stdout", str(self.folder / "access.log")).replace("/dev/stderr", str(self.folder / "error.log"))
+        if not is_tls:
+            filled = re.sub(r" ssl http2;|^  ssl_.*$", lambda match: ";" if match[0].startswith(" ssl ") else "", filled, flags=re.MULTILINE)
         paths = "\n".join(f"  {name}_temp_path {self.folder}/{name};" for name in ("client_body", "proxy", "fastcgi", "uwsgi", "scgi"))
         (self.folder / "nginx.conf").write_text(
             f"daemon off; worker_processes 1; pid {self.folder}/nginx.pid; events {{ worker_connections 1024; }}\n"

@@ -5,7 +5,6 @@ Skipped (exit code 77) without nginx, openssl or wrk.
 """
 import asyncio
 import contextlib
-import http.client
 import os
 import pathlib
 import re
@@ -17,71 +16,11 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import cluster  # noqa: E402
+from rolling import DELAY_SECONDS, Balancer, roll  # noqa: E402
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.argv.pop(1)
 ROUNDS = 20 if os.environ.get("TERRACE_LONG_TESTS") == "1" else 2
-PROBE_SECONDS = 0.2  # how often the balancer asks
-DELAY_SECONDS = 1.0
-MARK_SECONDS = 2.5  # longer than nginx avoids a node that failed: fail_timeout, in whole seconds
-
-
-class Balancer:
-    """Passes connections on to nodes that were ready when they were asked last. It repeats nothing, and closes nothing."""
-
-    def __init__(self, nodes):
-        self.nodes, self.ready, self.turn, self.port, self.tasks = nodes, set(), 0, cluster.free_port(), set()
-
-    async def __aenter__(self):
-        self.server = await asyncio.start_server(self.serve, "127.0.0.1", self.port)
-        self.prober = asyncio.ensure_future(self.probe())
-        return self
-
-    async def __aexit__(self, *_):
-        self.prober.cancel()
-        self.server.close()
-
-    @staticmethod
-    def is_ready(port):
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=2)
-        try:
-            connection.request("GET", "/readyz")
-            return connection.getresponse().status == 200
-        except (OSError, http.client.HTTPException):
-            return False
-        finally:
-            connection.close()
-
-    async def probe(self):
-        while True:
-            for node in self.nodes:
-                is_ready = await asyncio.to_thread(self.is_ready, node.port)
-                (self.ready.add if is_ready else self.ready.discard)(node.port)
-            await asyncio.sleep(PROBE_SECONDS)
-
-    async def wait_until_ready(self, node):
-        while node.port not in self.ready:
-            await asyncio.sleep(0.05)
-
-    async def serve(self, reader, writer):
-        ports = sorted(self.ready)
-        self.turn += 1
-        try:
-            there, back = await asyncio.open_connection("127.0.0.1", ports[self.turn % len(ports)])
-        except OSError:
-            return writer.transport.abort()  # the client sees a refused connection
-        await asyncio.gather(self.pump(reader, back), self.pump(there, writer))
-
-    @staticmethod
-    async def pump(reader, writer):
-        try:
-            while piece := await reader.read(1 << 16):
-                writer.write(piece)
-                await writer.drain()
-        except OSError:
-            pass
-        with contextlib.suppress(OSError):
-            writer.close()
 
 
 class Restarts(unittest.TestCase):
@@ -102,19 +41,6 @@ class Restarts(unittest.TestCase):
         script.write_text("local paths = {" + ",".join(f'"{target}"' for target in targets) + "}\nlocal at = 0\n"
                           "request = function() at = at % #paths + 1; return wrk.format('GET', paths[at]) end\n")
         return subprocess.Popen(["wrk", "-t1", "-c8", f"-d{seconds}s", "--timeout", "30s", "-s", script, url], stdout=subprocess.PIPE, text=True)
-
-    async def roll(self, nodes, balancer=None):
-        statuses = []
-        for _ in range(ROUNDS):
-            for node in nodes:
-                statuses.append(await asyncio.to_thread(node.stop))
-                node.start(waits=False)
-                await asyncio.to_thread(node.wait_until_served)
-                if balancer:
-                    await balancer.wait_until_ready(node)
-                else:
-                    await asyncio.sleep(MARK_SECONDS)
-        return statuses
 
     def check(self, statuses, seen, wrk):
         wrk.send_signal(signal.SIGINT)
@@ -139,7 +65,7 @@ class Restarts(unittest.TestCase):
         seen = cluster.Seen()
 
         async def both():
-            task = asyncio.ensure_future(self.roll(nodes))
+            task = asyncio.ensure_future(roll(nodes, ROUNDS))
             await asyncio.gather(task, cluster.draw(nginx.port, 8, fresh[::-1], seen, until=task.done, pause=0.05))
             return task.result()
         self.check(asyncio.run(both()), seen, wrk)
@@ -154,7 +80,7 @@ class Restarts(unittest.TestCase):
                     await balancer.wait_until_ready(node)
                 wrk = self.wrk(f"http://127.0.0.1:{balancer.port}", targets, 600)
                 self.stack.callback(wrk.kill)
-                task = asyncio.ensure_future(self.roll(nodes, balancer))
+                task = asyncio.ensure_future(roll(nodes, ROUNDS, balancer))
                 await asyncio.gather(task, cluster.draw(balancer.port, 8, targets, seen, is_tls=False, until=task.done, pause=0.1))
                 await asyncio.to_thread(self.check, task.result(), seen, wrk)
         asyncio.run(both())

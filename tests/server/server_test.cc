@@ -268,7 +268,9 @@ TEST_F(ServerTest, ServesProbesMetricsDatasetsAndAPage) {
         "terrace_tile_builds_total{dataset=\"maui\",result=\"ok\"} 1",
         "terrace_cache_hits_total{tier=\"memory\",kind=\"tiles\"} 1",
         "terrace_cache_misses_total{tier=\"memory\",kind=\"tiles\"} 1",
-        "terrace_cache_entries{tier=\"memory\",kind=\"tiles\"} 1", "terrace_datasets 1", "terrace_degraded 0",
+        "terrace_cache_entries{tier=\"memory\",kind=\"tiles\"} 1",
+        "terrace_cache_bytes{tier=\"memory\",kind=\"sample_blocks\"}",
+        "terrace_cache_bytes{tier=\"memory\",kind=\"drawn_meshes\"}", "terrace_datasets 1", "terrace_degraded 0",
         "terrace_http_connections ", "terrace_http_request_duration_seconds_bucket{cache=\"hit\",route=\"tile\"",
         "terrace_tile_build_stage_seconds_count{stage=\"refine\"} 1", "terrace_queue_length 0",
         "terrace_source_read_errors_total 0", "terrace_flights_joined_total 0"}) {

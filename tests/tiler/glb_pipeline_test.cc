@@ -100,7 +100,9 @@ TEST(GlbPipeline, SkirtsHangAsDeepAsTheySay) {
   const double depth = proto::SkirtDepth(11, geo::LadderError(11, 0));
   std::set<Corner> points;
   for (const geo::Vec3& p : glb.positions) points.insert({p.x, p.y, p.z});
-  for (const Corner& foot : Feet(glb)) {
+  const std::set<Corner> feet = Feet(glb);
+  ASSERT_FALSE(feet.empty());
+  for (const Corner& foot : feet) {
     const geo::Vec3 p{foot[0], foot[1], foot[2]};
     const double longitude = geo::ToDegrees(std::atan2(p.y, p.x));
     // Within a hundredth of a degree of the geodetic latitude, which is exact enough over a few hundred metres.

@@ -17,6 +17,7 @@
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh_error.h"
 #include "tiler/area/area_surface.h"
+#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/strong_etag.h"
 
@@ -132,8 +133,11 @@ PlacedMesh PlaceFlat(const tin::HeightField& field, const tin::TinMesh& mesh, co
 // The displacement is small, but at a cliff or near a pole the error can exceed the bound. Inserts samples that exceed
 // it.
 Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mesh, const AreaSurface& surface,
-                                const std::optional<Frame>& frame, double bound_m, const std::stop_token& stop) {
+                                const std::optional<Frame>& frame, double bound_m, const tin::SampleLimits& limits,
+                                const std::stop_token& stop) {
   constexpr double kRounding_m = 0x1p-8;  // the error of RoundPosition on a steep slope, which vertices cannot reduce
+  std::vector<float> allowed = AllowedErrors(limits, bound_m);
+  for (float& bound : allowed) bound = std::max(bound, static_cast<float>(kRounding_m));
   PlacedMesh placed;
   const auto measure = [&](const tin::TinMesh& rounded_mesh) {
     placed.vertices.clear();
@@ -144,13 +148,55 @@ Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mes
       placed.vertices.push_back({rounded.x, rounded.y, rounded.z});
       ecef.push_back(frame ? frame->ToEcef(rounded) : rounded);
     }
-    return surface.MeasureError(field, rounded_mesh, ecef, std::max(bound_m, kRounding_m), stop);
+    return surface.MeasureError(field, rounded_mesh, ecef, std::max(bound_m, kRounding_m), allowed, stop);
   };
   const std::size_t every_sample = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, every_sample, stop);
   if (!error) return tl::unexpected(error.error());
   placed.max_error_m = RoundPosition({error->max_m, 0, 0}).x;
   return placed;
+}
+
+// Removes the triangles in holes, and vertices that no other triangle has.
+void DropHoles(const dem::MeshDemands& demands, int width, tin::TinMesh& mesh,
+               std::vector<proto::MeshVertex>& vertices) {
+  const std::vector<std::uint8_t> in_hole = TrianglesInHoles(demands, width, mesh);
+  if (in_hole.empty()) return;
+  constexpr std::uint32_t kUnused = 0xffffffff;
+  std::vector<std::uint32_t> numbers(mesh.vertices.size(), kUnused);
+  tin::TinMesh kept;
+  std::vector<proto::MeshVertex> kept_vertices;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    if (in_hole[t] != 0) continue;
+    auto triangle = mesh.triangles[t];
+    for (auto& corner : triangle) {
+      if (numbers[corner] == kUnused) {
+        numbers[corner] = static_cast<std::uint32_t>(kept.vertices.size());
+        kept.vertices.push_back(mesh.vertices[corner]);
+        kept_vertices.push_back(vertices[corner]);
+      }
+      corner = numbers[corner];
+    }
+    kept.triangles.push_back(triangle);
+  }
+  mesh = std::move(kept);
+  vertices = std::move(kept_vertices);
+}
+
+// Whether all tiles of a level that touch the area exist.
+bool IsCovered(const dem::DemSource& source, const AreaRequest& area, int level) {
+  constexpr std::int64_t kMost = 1 << 16;  // tiles; levels that edits have added are small
+  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+  const auto at = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / side)); };
+  const std::int64_t west = at(area.west + 180), east = at(area.east + 180), south = at(area.south + 90),
+                     north = std::min(at(area.north + 90), geo::TileRows(level) - 1), around = geo::TileColumns(level);
+  if ((east - west + 1) * (north - south + 1) > kMost) return false;
+  for (std::int64_t y = south; y <= north; ++y) {
+    for (std::int64_t x = west; x <= east; ++x) {
+      if (!source.IsAvailable({level, (x % around + around) % around, y})) return false;
+    }
+  }
+  return true;
 }
 
 }  // namespace
@@ -165,7 +211,10 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
                      bounds.south, bounds.east, bounds.north);
   }
   AreaPlan plan;
-  while (plan.level < source.max_level() && geo::DefaultError(plan.level, error_fraction) > area.error_m) ++plan.level;
+  const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };
+  while (plan.level < source.finest_level() && is_coarse()) ++plan.level;
+  // Deeper levels exist around edits alone.
+  while (plan.level < source.max_level() && is_coarse() && IsCovered(source, *clipped, plan.level + 1)) ++plan.level;
   const NodeCounts nodes = NodesAt(source.LatticeOf(plan.level), *clipped);
   if (!ExceededLimits(nodes, max_samples).empty()) {
     return TooLarge(source, error_fraction, *clipped, plan.level, max_samples);
@@ -191,6 +240,9 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   const AreaSurface surface(source.LatticeOf(plan.level), plan.window);
   tin::GreedyOptions options;
   if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
+  dem::MeshDemands demands = source.DemandsOf(plan.level, plan.window);
+  options.limits = LimitsOf(demands);
+  const tin::SampleLimits limits = options.limits;
   tin::GreedyTriangulation greedy(*field, std::move(options));
   const double bound_m =
       area.coordinates == AreaCoordinates::kGeographic ? area.error_m : std::min(area.error_m, kMaxSag_m);
@@ -205,8 +257,12 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
   if (area.coordinates == AreaCoordinates::kEnu) frame = Frame::At(plan.centre);
   Result<PlacedMesh> placed = area.coordinates == AreaCoordinates::kGeographic
                                   ? PlaceFlat(*field, mesh, surface, stop)
-                                  : PlaceInSpace(*field, mesh, surface, frame, bound_m, stop);
+                                  : PlaceInSpace(*field, mesh, surface, frame, bound_m, limits, stop);
   if (!placed || stop.stop_requested()) return cancelled();
+  DropHoles(demands, plan.window.columns, mesh, placed->vertices);
+  if (mesh.triangles.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument, "all of the area lies in a hole of the dataset's edits");
+  }
   std::ostringstream out;
   if (auto written = proto::WriteMesh(out, area.format, std::move(placed->vertices), mesh.triangles, {}, {}, stop);
       !written) {

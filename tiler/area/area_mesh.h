@@ -27,7 +27,8 @@ struct AreaRequest {
 };
 
 // The samples that an area is meshed from: nodes of the lattice of the first level whose default error is at most the
-// requested error, or of the deepest level. The area is clipped to the source's bounds, then extended to whole cells.
+// requested error, or of the deepest level: of the deepest one without edits, unless all tiles that the area touches
+// exist on a deeper one. The area is clipped to the source's bounds, then extended to whole cells.
 struct AreaPlan {
   int level = 0;
   dem::NodeWindow window;
@@ -39,9 +40,10 @@ struct AreaPlan {
 Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 
-// Reads, meshes, measures and encodes. EncodedTile::max_error_m is measured at every sample, along the vertical, on the
-// flat triangles of the positions in the file (on those of longitude, latitude and height for kGeographic), before a
-// GLB's rounding to 32 bits. Errors: those of PlanArea and DemSource; kCancelled: stopped.
+// Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
+// the flat triangles of the file. They are flat in the file's coordinates: in space, or for kGeographic in longitude,
+// latitude and height. Rounding to 32 bits in a GLB is not included. Errors: those of PlanArea and DemSource;
+// kCancelled: stopped.
 Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 

@@ -100,7 +100,7 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
 
 proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
                                            const std::vector<geo::Vec3>& ecef, double bound_m,
-                                           const std::stop_token& stop) const {
+                                           std::span<const float> allowed, const std::stop_token& stop) const {
   proto::TileError error;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     if (t % kStopPeriod == 0 && stop.stop_requested()) break;
@@ -109,15 +109,18 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                         mesh.vertices[triangle[2]]};
     std::optional<tin::SamplePosition> miss;
-    double worst = bound_m;
+    double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: times its bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
         const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));
         error.max_m = std::max(error.max_m, off);
-        if (off <= worst || !IsInside(column, row)) continue;
+        const std::size_t k =
+            static_cast<std::size_t>(row) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(column);
+        const double counted = allowed.empty() ? off : off / static_cast<double>(allowed[k]);
+        if (counted <= worst || !IsInside(column, row)) continue;
         const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
         if (std::find(corners.begin(), corners.end(), sample) != corners.end()) continue;
-        worst = off;
+        worst = counted;
         miss = sample;
       }
     });

@@ -1,6 +1,7 @@
 // The positions of an area's samples in space, and the distance between flat triangles and the samples.
 #pragma once
 
+#include <span>
 #include <stop_token>
 #include <vector>
 
@@ -29,10 +30,11 @@ class AreaSurface {
   void AddCurvature(tin::GreedyOptions& options) const;
 
   // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
-  // misses are, for each triangle that exceeds the bound, the worst sample that can be inserted. If `stop` is
-  // requested, returns what was measured until then.
+  // misses are, for each triangle that exceeds the bound, the worst sample that can be inserted. `allowed`: the bounds
+  // by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was measured until then.
   proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
-                                const std::vector<geo::Vec3>& ecef, double bound_m, const std::stop_token& stop) const;
+                                const std::vector<geo::Vec3>& ecef, double bound_m, std::span<const float> allowed,
+                                const std::stop_token& stop) const;
 
  private:
   geo::Vec3 Up(int column, int row) const;

@@ -16,7 +16,10 @@ double MeshError(double error_m) {
 }
 
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key) {
-  dem::MeshDemands demands = source.DemandsOf(key);
+  return LimitsOf(source.DemandsOf(key));
+}
+
+tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
   for (float& cap : demands.caps) cap = static_cast<float>(MeshError(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
@@ -51,9 +54,12 @@ proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, doubl
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh) {
-  const dem::MeshDemands demands = source.DemandsOf(key);
+  return TrianglesInHoles(source.DemandsOf(key), source.LatticeOf(key.level).cells + 1, mesh);
+}
+
+std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh) {
   if (demands.hole.empty()) return {};
-  const auto side = static_cast<std::size_t>(source.LatticeOf(key.level).cells) + 1;
+  const auto side = static_cast<std::size_t>(width);
   std::vector<std::uint8_t> in_hole(mesh.triangles.size(), 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const auto& [a, b, c] = mesh.triangles[t];

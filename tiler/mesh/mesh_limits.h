@@ -12,26 +12,31 @@
 
 namespace terrace::tiler {
 
-// The error bound of a tile's mesh that keeps `error_m` to the ground: heights at nodes are rounded to 2^-10 m, and
-// their positions are inexact.
+// The error that the mesh of a tile must keep to its nodes so that its error to the ground is at most `error_m`: the
+// heights of nodes are rounded to 2^-10 m, and their positions are inexact.
 double MeshError(double error_m);
 
-// Empty if no edit asks for anything. Depends on edits, key and nodes alone.
+// The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);
+
+tin::SampleLimits LimitsOf(dem::MeshDemands demands);
 
 // The error that each sample may have in a tile of this error, row by row; empty: `error_m` everywhere.
 std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m);
 
-// The smallest of them on each side and at each corner. Neighbours have the same numbers for what they share.
+// The smallest allowed error on each side and at each corner. Neighbours have equal values for shared sides and
+// corners.
 proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m);
 
 // Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if all of its samples are,
 // or are vertices of the hole's outline.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
+// The same of a field of `width` nodes a row.
+std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh);
 
-// Removes these triangles. Vertices of the tile's edges stay: a triangle of one point refers to each that no other
-// triangle has, because clients need the lists of edges.
+// Removes the triangles in holes. Vertices on the tile's edges stay, because clients need the lists of edges: a
+// triangle whose corners are all that vertex is added for each one that no triangle refers to.
 void LeaveOut(const std::vector<std::uint8_t>& in_hole, const tin::TinMesh& mesh, int cells,
               std::vector<std::array<std::uint32_t, 3>>& triangles);
 

@@ -93,6 +93,7 @@ tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const pr
     tin::BorderOptions& border = options.borders[static_cast<std::size_t>(side)];
     border.weight = 16.0 / 15;
     border.padding_m = PositionRounding(lattice, side);
+    border.rounding = lattice.cells() / (2.0 * proto::kQuantizedMax);
     border.step_m = needed.Coarsest(side) / 2;
     border.sagitta_m = BorderSagitta(lattice, side);
   }

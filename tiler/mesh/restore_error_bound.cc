@@ -21,7 +21,8 @@ Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& mea
 }  // namespace
 
 // In a Delaunay triangulation, a vertex is joined to its four neighbours if they are vertices, because the circle over
-// each of these edges is empty. In other triangulations an edge may pass between.
+// each of these edges is empty. In other triangulations an edge may pass between them (is_cut_through): then the mesh
+// is made Delaunay.
 Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
                                            const std::stop_token& stop) {
   Result<proto::TileError> error = InsertMisses(mesh, measure, max_vertices, stop);

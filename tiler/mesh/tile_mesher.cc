@@ -59,20 +59,21 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   return meshed;
 }
 
-// Makes a mesh within the format's limit of vertices, with `coarser` times the error inside the tile, or more if that
-// is not enough. Edges do not depend on the inside: they keep the threshold of the requested error and its seeds
-// exactly, because scaling by a power of two is exact. Sets the error that was reached.
-Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double coarser,
+// Makes a mesh within the format's limit of vertices. Inside the tile it has `scale` times the error, a power of two,
+// which doubles until the vertices suffice. Edges do not depend on the inside: they keep the threshold of the requested
+// error and its seeds exactly, because scaling by a power of two is exact. `error_m`: in, the requested error; out, the
+// error that was reached inside.
+Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double scale,
                                         double& error_m, const std::stop_token& stop) {
-  for (;; coarser *= 2) {
+  for (;; scale *= 2) {
     tin::GreedyOptions options = plan;
     options.record = false;
-    for (tin::BorderOptions& border : options.borders) border.scale = coarser;
-    options.limits_scale = coarser;
-    for (tin::SeedGrid& grid : options.seeds) grid.below_error *= coarser;
+    for (tin::BorderOptions& border : options.borders) border.scale = scale;
+    options.limits_scale = scale;
+    for (tin::SeedGrid& grid : options.seeds) grid.below_error *= scale;
     tin::GreedyTriangulation greedy(field, std::move(options));
     tin::GreedyGoal goal;
-    goal.max_error = error_m * coarser;
+    goal.max_error = error_m * scale;
     goal.max_points = proto::kMaxTileVertices + 1;
     if (!greedy.Run(goal, stop)) return Cancelled();
     if (greedy.vertex_count() > proto::kMaxTileVertices) continue;

@@ -1,4 +1,4 @@
-// Tiles that were made ahead and are kept in an archive. archive/ implements it.
+// The interface of an archive of baked tiles. archive/ implements it.
 #pragma once
 
 #include <cstddef>
@@ -17,14 +17,15 @@ namespace terrace::tiler {
 
 // The extent of a dataset without sources: what its documents say instead of dem::DemInfo.
 struct BakedExtent {
-  std::vector<TileFormat> formats;  // what there are tiles of
+  std::vector<TileFormat> formats;  // of which there are tiles
   std::vector<std::vector<geo::TileRange>> available;
   dem::GeoBounds bounds;
   dem::HeightRange heights;
   double floor_m = 0;
   bool has_datum = true;
-  std::size_t sources = 0;                      // that it was baked from
+  std::size_t sources = 0;                      // number of sources that it was baked from
   int deepest_level = 0;                        // of the sources' dataset, also if the archive ends above it
+  int finest_level = 0;                         // likewise, without edits (dem::DemSource::finest_level)
   int max_mercator_depth = 0;                   // of the height tiles in the archive
   bool normals = false, water_mask = false;     // extensions that the tiles of quantized-mesh have
   int metadata_levels = 0;                      // likewise; 0: none

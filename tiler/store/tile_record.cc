@@ -44,7 +44,7 @@ std::string_view GetText(ByteReader& reader) {
 std::string RecordKey(const CacheKey& key) {
   const auto& [request, generation, edits] = key;
   const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, height_size] = request;
+               height_encoding, height_size, map] = request;
   static_cast<void>(dataset);  // the generation identifies it
   ByteWriter writer;
   writer.Put(generation);
@@ -59,6 +59,15 @@ std::string RecordKey(const CacheKey& key) {
   writer.Put(static_cast<std::uint8_t>(metadata));
   writer.Put(static_cast<std::uint8_t>(height_encoding));
   writer.Put(static_cast<std::int32_t>(height_size));
+  if (IsForMaps(format)) {
+    const auto& [picture, azimuth_deg, altitude_deg, z_factor_hundredths, slope_style, interval_cm] = map;
+    writer.Put(static_cast<std::uint8_t>(picture));
+    writer.Put(azimuth_deg);
+    writer.Put(altitude_deg);
+    writer.Put(z_factor_hundredths);
+    writer.Put(static_cast<std::uint8_t>(slope_style));
+    writer.Put(interval_cm);
+  }
   writer.Put(edits);
   return writer.Take();
 }
@@ -88,7 +97,7 @@ bool IsSelected(const TileSelection& selection, std::string_view record_key) {
   bool is_mercator = false;
   if (reader.remaining() > sizeof(std::uint64_t)) {  // a tile's
     reader.Get<std::int32_t>();
-    is_mercator = reader.Get<std::uint8_t>() == static_cast<std::uint8_t>(TileFormat::kHeightPng);
+    is_mercator = IsMercator(static_cast<TileFormat>(reader.Get<std::uint8_t>()));
   }
   return reader.ok() && selection.Contains(generation, tile, is_mercator);
 }

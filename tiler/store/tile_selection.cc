@@ -3,6 +3,7 @@
 #include "tiler/tile_bounds.h"
 
 namespace terrace::tiler {
+
 bool TileSelection::Contains(std::uint64_t generation_of_key, const geo::TileKey& key, bool is_mercator) const {
   if (generation_of_key != generation || key.level < min_level || key.level > max_level) return false;
   const dem::GeoBounds tile = TileBounds(key, is_mercator);

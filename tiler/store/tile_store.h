@@ -1,5 +1,5 @@
 // The interface of a cache tier for tiles and refinements. A tier is a class that implements it and a row where the
-// program lists its tiers; look-ups, metrics and the stop go through the list.
+// program lists its tiers. Look-ups, metrics and shutdown iterate over the list.
 //
 // Implementations are thread-safe. Find and Erase may block on a disk or a network. The others return at once.
 #pragma once
@@ -35,7 +35,7 @@ struct CacheKeyHash {
 };
 
 inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
-  return selection.Contains(key.generation, key.request.key, key.request.format == TileFormat::kHeightPng);
+  return selection.Contains(key.generation, key.request.key, IsMercator(key.request.format));
 }
 inline bool IsSelected(const TileSelection& selection, const RefinedTileKey& key) {
   return selection.Contains(key.generation, key.key, /*is_mercator=*/false);

@@ -31,7 +31,8 @@ DrawnMesh::DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles)
     : key_(key),
       positions_(std::move(triangles.positions)),
       triangles_(std::move(triangles.triangles)),
-      in_hole_(std::move(triangles.in_hole)) {
+      in_hole_(std::move(triangles.in_hole)),
+      lacks_holes_(triangles.lacks_holes) {
   if (!positions_.empty()) origin_ = positions_.front();
   for (geo::Vec3& position : positions_) position = position - origin_;
   FillBuckets(triangles.places);
@@ -42,10 +43,10 @@ std::size_t DrawnMesh::bytes() const {
          (bucket_starts_.size() + bucket_triangles_.size()) * sizeof(std::uint32_t);
 }
 
-// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are no straight lines in
-// degrees, so boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds
-// nothing. Boxes of triangles of shallow levels and near the poles cover many buckets; then buckets are larger, so that
-// their memory stays proportional to that of the triangles.
+// Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are not straight in degrees, so
+// boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds nothing. On
+// shallow levels and near the poles a box covers many buckets; then buckets are larger, so that their memory stays
+// proportional to that of the triangles.
 void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   constexpr int kMaxSide = 256;
   side_ = std::clamp(static_cast<int>(std::sqrt(static_cast<double>(triangles_.size()))), 1, kMaxSide);
@@ -167,11 +168,24 @@ std::optional<DrawnPoint> DrawnMesh::AtBucket(const dem::GeoPosition& point) con
   return best.inside < -kSlack ? std::nullopt : std::optional(PointOf(best));
 }
 
+// Whether a point is farther from the tile's northern and southern edge than any chord of these parallels is.
+bool DrawnMesh::IsFarFromParallels(const dem::GeoPosition& point) const {
+  const double v = PlaceOf(point)[1], side = geo::ToRadians(SideDegrees(key_));
+  const double latitude = std::min(89.9, std::abs(point.latitude) + SideDegrees(key_));
+  const double chord = side * std::tan(geo::ToRadians(latitude)) / 8;  // in tiles: side^2 cos sin / 8 over side
+  return v > chord + 1e-6 && v < 1 - chord - 1e-6;
+}
+
 DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
   const PlumbLine line = LineAt(point);
   Meeting best;
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) Meet(line, t, best);
-  return PointOf(best);
+  DrawnPoint nearest = PointOf(best);
+  if (lacks_holes_ && nearest.is_beside && IsFarFromParallels(point)) {
+    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+    return {kNone, {kNone, kNone, kNone}, false};
+  }
+  return nearest;
 }
 
 }  // namespace terrace::tiler

@@ -21,6 +21,7 @@ struct DrawnTriangles {
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
   std::vector<std::uint8_t> in_hole;  // whether clients do not draw a triangle, for each triangle; empty: they draw all
+  bool lacks_holes = false;  // triangles in holes are not among them: where there are none inside the tile, is a hole
 };
 
 struct DrawnPoint {
@@ -35,12 +36,12 @@ class DrawnMesh {
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
   // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
-  // is rare except near the tile's edge. Where it meets several triangles, the one that it meets farthest inside
-  // counts.
+  // is rare except near the tile's edge. Of several triangles, the one that it meets farthest inside counts.
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
-  // The same among all triangles, in time proportional to their number; beside the mesh on the plane of the nearest
-  // triangle. The edge of a tile is a parallel, and the triangles end at chords of it: in the north a tile reaches
-  // beyond its northern edge and not to all of its southern one.
+  // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
+  // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles
+  // end at chords of them: in the northern hemisphere they exceed the northern edge, and leave out a strip at the
+  // southern one.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.
@@ -65,6 +66,7 @@ class DrawnMesh {
  private:
   struct Meeting;
   struct PlumbLine;
+  bool IsFarFromParallels(const dem::GeoPosition& point) const;
   void FillBuckets(const std::vector<std::array<double, 2>>& places);
   std::array<double, 2> PlaceOf(const dem::GeoPosition& point) const;
   PlumbLine LineAt(const dem::GeoPosition& point) const;
@@ -76,7 +78,8 @@ class DrawnMesh {
   geo::Vec3 origin_;
   std::vector<geo::Vec3> positions_;  // from the origin
   std::vector<std::array<std::uint32_t, 3>> triangles_;
-  std::vector<std::uint8_t> in_hole_;         // as in DrawnTriangles
+  std::vector<std::uint8_t> in_hole_;  // as in DrawnTriangles
+  bool lacks_holes_ = false;
   int side_ = 1;                              // buckets along an edge
   std::vector<std::uint32_t> bucket_starts_;  // side * side + 1
   std::vector<std::uint32_t> bucket_triangles_;

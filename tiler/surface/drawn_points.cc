@@ -17,19 +17,19 @@ constexpr std::size_t kStopPeriod = 1024;
 
 tl::unexpected<Error> Stopped() { return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more"); }
 
-geo::TileKey DeepestAt(const dem::DemSource& source, const dem::GeoPosition& point, int level) {
+geo::TileKey DeepestAt(const HasTile& has_tile, const dem::GeoPosition& point, int level) {
   geo::TileKey key = TileAt(point, level);
-  while (level > 0 && !source.IsAvailable(key)) key = TileAt(point, --level);
+  while (level > 0 && !has_tile(key)) key = TileAt(point, --level);
   return key;
 }
 
 // The tile beyond the northern or southern edge that the point is nearest to.
-std::optional<geo::TileKey> NeighbourOf(const dem::DemSource& source, const geo::TileKey& key,
+std::optional<geo::TileKey> NeighbourOf(const HasTile& has_tile, const geo::TileKey& key,
                                         const dem::GeoPosition& point) {
   const double row = (point.latitude + 90) / 180 * static_cast<double>(geo::TileRows(key.level));
   const std::int64_t step = row - static_cast<double>(key.y) < 0.5 ? -1 : 1;
   const geo::TileKey neighbour{key.level, key.x, key.y + step};
-  return geo::IsValid(neighbour) && source.IsAvailable(neighbour) ? std::optional(neighbour) : std::nullopt;
+  return geo::IsValid(neighbour) && has_tile(neighbour) ? std::optional(neighbour) : std::nullopt;
 }
 
 std::array<float, 3> EastNorthUp(const geo::Vec3& normal, const dem::GeoPosition& point) {
@@ -62,7 +62,7 @@ Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fra
   return level;
 }
 
-Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, std::span<const dem::GeoPosition> points,
+Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop) {
   PointHeights read;
   read.heights.resize(points.size());
@@ -89,7 +89,7 @@ Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, st
   // All tiles are counted before the first is made.
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % kStopPeriod == 0 && stop.stop_requested()) return Stopped();
-    const Result<std::uint32_t> number = number_of(DeepestAt(source, points[i], level));
+    const Result<std::uint32_t> number = number_of(DeepestAt(has_tile, points[i], level));
     if (!number) return tl::unexpected(number.error());
     read.tile_of_point[i] = *number;
   }
@@ -110,7 +110,7 @@ Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, st
       if (stop.stop_requested()) return Stopped();
       drawn = meshes[own]->Nearest(points[i]);
     }
-    const auto key = drawn->is_beside ? NeighbourOf(source, read.tiles[own], points[i]) : std::nullopt;
+    const auto key = drawn->is_beside ? NeighbourOf(has_tile, read.tiles[own], points[i]) : std::nullopt;
     // One more than the limit is no fault of the client's points.
     if (key && (numbers.contains(*key) || read.tiles.size() < kMaxDrawnTiles)) {
       const Result<std::uint32_t> other = number_of(*key);

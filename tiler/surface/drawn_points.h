@@ -29,7 +29,7 @@ struct DrawnSurface {
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
 };
 
-// Points of one request may lie in this many tiles, because each of them may have to be made.
+// Limit of the tiles that the points of one request lie in: each of them may have to be made.
 inline constexpr std::size_t kMaxDrawnTiles = 64;
 
 // Level of the surface. kInvalidArgument: the dataset has no such level.
@@ -38,11 +38,14 @@ Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fra
 // The mesh of an available tile.
 using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
 
+// Whether a tile exists.
+using HasTile = std::function<bool(const geo::TileKey&)>;
+
 // Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
 // available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between
 // two tiles to the eastern and the northern one. In holes heights and normals are NaN. `normals`: adds normals.
 // kInvalidArgument: too many tiles.
-Result<PointHeights> ReadDrawnPoints(const dem::DemSource& source, int level, std::span<const dem::GeoPosition> points,
+Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
 
 // The tile of a level that contains a point.

@@ -28,7 +28,7 @@ struct Along {
     const double a = 2 * (first + last) - 4 * middle;
     return (a * s + last - first - a) * s + first;
   }
-  // Where it is `value`, between a place with less and one with more.
+  // The s with At(s) = value, for At(low) < value <= At(high); `low` may be larger than `high`.
   double Solve(double value, double low, double high) const {
     for (int step = 0; step < 50 && low != high; ++step) {
       const double half = (low + high) / 2;
@@ -77,10 +77,11 @@ class Clearances {
   bool has_gaps_ = false;
 };
 
+// Follows rays over the meshes of tiles.
 class Walk {
  public:
-  Walk(const dem::DemSource& source, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
-      : source_(source), level_(level), options_(options), mesh_of_(mesh_of) {}
+  Walk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
+      : has_tile_(has_tile), level_(level), options_(options), mesh_of_(mesh_of) {}
 
   Result<dem::SightAnswer> Look(const dem::SightRay& ray, const std::stop_token& stop) {
     Clearances clearances;
@@ -96,7 +97,7 @@ class Walk {
  private:
   Result<const DrawnMesh*> MeshAt(const dem::GeoPosition& point) {
     geo::TileKey key = TileAt(point, level_);
-    for (int level = level_; level > 0 && !source_.IsAvailable(key);) key = TileAt(point, --level);
+    for (int level = level_; level > 0 && !has_tile_(key);) key = TileAt(point, --level);
     if (last_ != nullptr && last_->key() == key) return last_;
     auto& mesh = meshes_[key];
     if (mesh == nullptr) {
@@ -114,7 +115,7 @@ class Walk {
     return last_ = mesh.get();
   }
 
-  // Divides a part where it leaves a bucket of a mesh.
+  // Divides a part of a ray where it leaves a bucket of a mesh.
   Result<void> AddPart(const dem::SightRay& ray, double start, double length, Clearances& clearances) {
     const auto at = [&](double s) { return dem::PointAt(ray, start + s * length, options_); };
     const dem::SightPoint first = at(0), last = at(1);
@@ -182,7 +183,7 @@ class Walk {
     clearances.Add({clearance_m, clearance_m, clearance_m}, 0, 1, start, length);
   }
 
-  const dem::DemSource& source_;
+  const HasTile& has_tile_;
   const int level_;
   const dem::SightOptions& options_;
   const MeshOfTile& mesh_of_;
@@ -205,11 +206,11 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
       samples, kMaxSamplesAlong);
 }
 
-Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const dem::DemSource& source, int level,
+Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,
                                                      const std::stop_token& stop) {
-  Walk walk(source, level, options, mesh_of);
+  Walk walk(has_tile, level, options, mesh_of);
   std::vector<dem::SightAnswer> answers;
   answers.reserve(rays.size());
   for (const dem::SightRay& ray : rays) {

@@ -19,7 +19,7 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
 
 // As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:
 // the rays cross more than kMaxDrawnTiles tiles. Other errors: those of `mesh_of`.
-Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const dem::DemSource& source, int level,
+Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,
                                                      const std::stop_token& stop);

@@ -1,6 +1,10 @@
 #include "tiler/surface/drawn_triangles.h"
 
+#include <array>
+#include <cstdint>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/tile_mesher.h"
@@ -8,11 +12,9 @@
 
 namespace terrace::tiler {
 
-Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop) {
-  Result<MeshedTile> meshed = MeshTile(*input.dataset.source, input.lattice(), input.refined->refinement,
-                                       input.dataset.mesh_options, input.error_m, stop);
-  if (!meshed) return tl::unexpected(std::move(meshed).error());
-  const proto::QuantizedTile& tile = meshed->tile;
+namespace {
+
+DrawnTriangles Placed(const proto::QuantizedTile& tile) {
   const geo::TileKey& key = tile.key;
   const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
   const double west = static_cast<double>(key.x) * side - 180, south = static_cast<double>(key.y) * side - 90;
@@ -25,8 +27,36 @@ Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std
     drawn.positions.push_back(geo::ToEcef(west + u * side, south + v * side, height_m));
     drawn.places.push_back({u, v});
   }
-  drawn.triangles = std::move(meshed->tile.triangles);
-  drawn.in_hole = TrianglesInHoles(*input.dataset.source, key, meshed->mesh);
+  drawn.triangles = tile.triangles;
+  return drawn;
+}
+
+}  // namespace
+
+Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop) {
+  const Result<MeshedTile> meshed = MeshTile(*input.dataset.source, input.lattice(), input.refined->refinement,
+                                             input.dataset.mesh_options, input.error_m, stop);
+  if (!meshed) return tl::unexpected(meshed.error());
+  DrawnTriangles drawn = Placed(meshed->tile);
+  drawn.in_hole = TrianglesInHoles(*input.dataset.source, meshed->tile.key, meshed->mesh);
+  return drawn;
+}
+
+Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key) {
+  std::optional<proto::QuantizedTile> tile = proto::ReadQuantizedMesh(bytes, key);
+  if (!tile) {
+    return MakeError(ErrorCode::kUnavailable, "tile {} of the archive is no quantized-mesh; bake it again",
+                     geo::ToString(key));
+  }
+  const auto is_point = [](const std::array<std::uint32_t, 3>& t) { return t[0] == t[1] && t[1] == t[2]; };
+  const bool has_holes = std::erase_if(tile->triangles, is_point) > 0;
+  std::int64_t covered = 0;  // twice the area
+  for (const auto& [a, b, c] : tile->triangles) {
+    covered += (std::int64_t{tile->u[b]} - tile->u[a]) * (std::int64_t{tile->v[c]} - tile->v[a]) -
+               (std::int64_t{tile->v[b]} - tile->v[a]) * (std::int64_t{tile->u[c]} - tile->u[a]);
+  }
+  DrawnTriangles drawn = Placed(*tile);
+  drawn.lacks_holes = has_holes || covered != std::int64_t{2} * proto::kQuantizedMax * proto::kQuantizedMax;
   return drawn;
 }
 

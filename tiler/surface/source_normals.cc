@@ -9,7 +9,7 @@
 namespace terrace::tiler {
 namespace {
 
-// Of the heights on both sides of a point, `reach_m` away.
+// The slope at a point, from the heights `reach_m` before and after it.
 double Slope(double before, double here, double after, double reach_m) {
   if (!std::isnan(before) && !std::isnan(after)) return (after - before) / (2 * reach_m);
   return (std::isnan(after) ? here - before : after - here) / reach_m;
@@ -26,7 +26,7 @@ Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& so
   std::vector<dem::GeoPosition> around;
   around.reserve(points.size() * kSides);
   for (const auto& [longitude, latitude] : points) {
-    // Near a pole there is no east within a sample.
+    // Near a pole half a sample may be more than a turn.
     const double east = std::min(90.0, reach_m / std::max(1.0, geo::MetresPerDegreeEast(latitude)));
     const double north = reach_m / geo::MetresPerDegreeNorth(latitude);
     const auto turned = [](double degrees) { return std::remainder(degrees, 360); };

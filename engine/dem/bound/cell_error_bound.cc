@@ -7,6 +7,10 @@
 namespace terrace::dem {
 namespace {
 
+// Lines between nodes deviate from straight lines by much less than this fraction of the cell: a margin that exceeds
+// the curvature of its edges.
+constexpr double kBulge = 1.0 / 32;
+
 // The samples whose centres lie in a box of pixels, moved by `shift` columns.
 SampleBox CentresIn(const PixelBounds& box, double shift) {
   const auto first = [](double pixel) { return static_cast<std::int64_t>(std::ceil(pixel - 0.5)); };
@@ -25,8 +29,6 @@ class CellSurface {
         east_{corners[1].x - origin_.x, corners[1].y - origin_.y},
         north_{corners[2].x - origin_.x, corners[2].y - origin_.y},
         twist_{corners[3].x - corners[1].x - north_.x, corners[3].y - corners[1].y - north_.y} {
-    // Lines between nodes deviate from straight lines by much less than this fraction of the cell.
-    constexpr double kBulge = 1.0 / 32;
     const double bulge = is_separable ? 0 : kBulge;
     const auto extent = [](double east, double north, double twist) {
       return std::abs(east) + std::abs(north) + std::abs(twist);
@@ -217,6 +219,46 @@ bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
   return meets(turn) || meets(-turn);
 }
 
+// One query for the box in place of one for each cell: the samples around a cell are among those around the box.
+bool CellErrorBound::HasNoSamples(const CellBox& box) const {
+  const bool has_turns = grid_.georeference().is_geographic_grid();
+  const bool is_separable = trace_.cells.positions().is_separable();  // then one row and one column tell all
+  const double turn = grid_.georeference().period(), middle = grid_.columns() / 2.0;
+  PixelBounds at;
+  for (int j = box.south; j <= box.north; ++j) {
+    for (int i = box.west; i <= (is_separable && j > box.south ? box.west : box.east); ++i) {
+      const std::int64_t column = tile_.window.column + 1 + i, row = tile_.window.row + 1 + j;
+      // The places of a pole's nodes are those of the rows beside it, and far from the middle turns may be added.
+      if (has_turns && (row <= 0 || row >= tile_.lattice.rows())) return false;
+      const Position corner = trace_.cells.positions().OfNode(column, row);
+      if (!std::isfinite(corner.x) || !std::isfinite(corner.y)) return false;
+      if (has_turns && turn > 0 && std::abs(corner.x - middle) >= turn / 4) return false;
+      at.Add(corner.x, corner.y);
+    }
+  }
+  const Position& off = tables_.misplacement();
+  at.Grow((at.east - at.west) * kBulge + off.x, (at.south - at.north) * kBulge + off.y);
+  if (grid_.wraps() || IsOnBothEnds(at)) return false;
+  const SampleBox in = CentresIn(at, 0);
+  if (in.empty()) return true;
+  const BlockRange range = tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north),
+                                          static_cast<double>(in.east), static_cast<double>(in.south));
+  if (range.min > range.max) return true;
+  // The tables' blocks are large: samples that were read tell more.
+  const GridWindow& window = trace_.window;
+  const SampleBox near = Clipped(in);
+  if (near.empty()) return true;
+  if (trace_.factor > 1 || near.west < window.column || near.east >= window.column + window.columns ||
+      near.north < window.row || near.south >= window.row + window.rows) {
+    return false;
+  }
+  for (std::int64_t row = near.north; row <= near.south; ++row) {
+    const auto first = trace_.samples.begin() + (row - window.row) * window.columns + (near.west - window.column);
+    if (!std::all_of(first, first + near.columns(), [](float sample) { return std::isnan(sample); })) return false;
+  }
+  return true;
+}
+
 double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
                                            std::optional<CellSamples>& place) const {
   const HeightRange& all = grid_.heights();
@@ -224,8 +266,7 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   if (!corners) return DistanceBound(cell, all.min, all.max);
   PixelBounds box;
   for (const Position& corner : *corners) box.Add(corner.x, corner.y);
-  // A margin that exceeds the curvature of the cell's edges. Samples are at the pixels' centres.
-  constexpr double kBulge = 1.0 / 32;
+  // Samples are at the pixels' centres.
   const double halo = may_blend ? 1 : 0;
   const Position& off = tables_.misplacement();
   box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/dem/bound/tile_cells.h"
+#include "engine/dem/crs/undulation_grid.h"
 #include "engine/dem/crs/undulations.h"
 
 namespace terrace::dem {
@@ -29,6 +30,21 @@ class GeoidErrorBound {
   }
 
  private:
+  // The steps between nodes along one axis of the tile. Step k has the stops first[k] to first[k + 1] - 1: its ends and
+  // the geoid's grid lines between them, in grid steps.
+  struct Steps {
+    std::vector<double> stops;
+    std::vector<NodePlace> places;
+    std::vector<std::size_t> first = {0};
+    std::vector<int> crossed;  // by a line, or beside a pole, ascending
+
+    std::size_t count(int step) const {
+      return first[static_cast<std::size_t>(step) + 1] - first[static_cast<std::size_t>(step)];
+    }
+  };
+
+  void FindLines(const UndulationGrid& grid);
+  bool IsAtPole(int row_of_cells) const;
   double OverNodes(const CellBox& box) const;
   double OverNodes(const TileCell& cell) const;
   double OverCoarse(const CellBox& box) const;
@@ -41,7 +57,9 @@ class GeoidErrorBound {
   // For a geoid that is a grid: the positions of the tile's columns and rows on the grid, in grid steps, and the grid
   // nodes around them. Empty if the grid is much denser than the tile.
   std::vector<double> columns_, rows_;
+  Steps column_steps_, row_steps_;
   std::optional<UndulationPatch> patch_;
+  bool is_whole_ = false;  // all nodes of the patch and of the tile have undulations, and none is outside the grid
 };
 
 }  // namespace terrace::dem

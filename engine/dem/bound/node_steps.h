@@ -1,4 +1,4 @@
-// Steps between the places of neighbouring nodes, in vectors. Results are bit-equal on all sets of instructions.
+// Steps between the places of neighbouring nodes, with SIMD. Results are bit-equal on all instruction sets.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +7,8 @@
 
 namespace terrace::dem {
 
-// Largest steps between neighbouring nodes of a box (east_*, north_*), and largest change from a node's one step to its
-// next one, as double the deviation of a position from even steps (bend_*).
+// Largest steps between neighbouring nodes of a box (east_*, north_*), and largest difference between two steps that
+// follow each other (bend_*): twice the distance of the middle node from the midpoint of its neighbours.
 struct NodeSteps {
   double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
 };

@@ -65,8 +65,8 @@ class SmoothErrorBound {
   bool is_separable_ = false;
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
-  // Of rows `top` to `bottom` of the averages, by column of the trace's window: the largest differences, as in Bends,
-  // between this average and the next ones to the east and to the south; and the sum, NaN if one of them is void.
+  // By column of the trace's window, over rows `top` to `bottom` of the averages: the largest differences, as in Bends,
+  // of each average from the next ones to the east and to the south. And the sum of the averages; NaN if one is void.
   struct Band {
     std::int64_t top = 0, bottom = -1;
     std::vector<float> x, y, xx, yy, xy, sum;

@@ -186,13 +186,27 @@ class GridErrorBound {
     const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
     const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
-    if (!std::isfinite(error)) return Divide(box, may_blend);
+    if (!std::isfinite(error)) {
+      if (!tile_.blends_ && HasNoHeights(box) && single_.HasNoSamples(box)) return;
+      return Divide(box, may_blend);
+    }
     Raise(error);
     if (may_blend) return;
     for (int j = box.south; j < box.north; ++j) {
       const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
       std::fill_n(first, box.east - box.west, 1);
     }
+  }
+
+  // Whether no node of the box took its height from the raster grid.
+  bool HasNoHeights(const CellBox& box) const {
+    for (int j = box.south; j <= box.north; ++j) {
+      const auto first = trace_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeOf(box.west, j));
+      if (!std::all_of(first, first + (box.east - box.west + 1), [](float height) { return std::isnan(height); })) {
+        return false;
+      }
+    }
+    return true;
   }
 
   void Divide(const CellBox& box, bool may_blend) {

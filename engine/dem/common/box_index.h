@@ -7,8 +7,9 @@
 
 namespace terrace::dem {
 
+// In pixels or in degrees. In pixels, `south` is the first row.
 struct Box {
-  double west = 0, south = 0, east = 0, north = 0;  // in pixels, `south` is the first row
+  double west = 0, south = 0, east = 0, north = 0;
 
   void Grow(double x, double y) { west -= x, east += x, south -= y, north += y; }
 };

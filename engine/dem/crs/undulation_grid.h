@@ -81,6 +81,10 @@ class UndulationPatch {
 
   // Interpolates bilinearly between the nodes that have values, as PROJ does; NaN if none has, or outside the grid.
   double At(const NodePlace& column, const NodePlace& row) const;
+  // Interpolates along one row, for each column.
+  void At(std::span<const NodePlace> columns, const NodePlace& row, std::span<double> out) const;
+  // Whether all nodes of the patch have values.
+  bool is_whole() const { return is_whole_; }
   // Whether all four nodes around the place have values.
   bool IsWhole(const NodePlace& column, const NodePlace& row) const;
 
@@ -89,6 +93,7 @@ class UndulationPatch {
 
   int first_column_ = 0, first_row_ = 0, columns_ = 0;
   std::vector<float> heights_;
+  bool is_whole_ = true;
 };
 
 }  // namespace terrace::dem

@@ -316,19 +316,16 @@ Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window
     rows.push_back(is_inside ? nodes.AtRow(nodes.RowOf(latitude)) : NodePlace{});
   }
   for (std::size_t first = 0; first < rows.size();) {
-    std::size_t count = 1;
+    // All rows that are left, unless that is too much.
+    std::size_t count = rows.size() - first;
     const auto strip = [&] { return std::span(rows).subspan(first, count); };
-    while (first + count < rows.size()) {
-      ++count;
-      if (UndulationPatch::CountNodes(columns, strip()) <= kMaxNodes) continue;
-      --count;
-      break;
-    }
+    while (count > 1 && UndulationPatch::CountNodes(columns, strip()) > kMaxNodes) count = (count + 1) / 2;
     const auto patch = UndulationPatch::Read(nodes, columns, strip());
     if (!patch) return tl::unexpected(patch.error());
     double* to = out.data() + first * columns.size();
     for (const NodePlace& row : strip()) {
-      for (const NodePlace& column : columns) *to++ = patch->At(column, row);
+      patch->At(columns, row, {to, columns.size()});
+      to += columns.size();
     }
     first += count;
   }

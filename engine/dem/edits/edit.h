@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,13 @@ inline const char* NameOf(EditOp op) { return kEditOpNames[static_cast<std::size
 // The height of a flatten.
 enum class FlatHeight : std::uint8_t { kGiven, kMean, kMedian };
 
+// What the heights of an edit count from.
+enum class EditDatum : std::uint8_t {
+  kNone,        // not stated: the ellipsoid
+  kEllipsoid,   // of WGS 84
+  kOrthometric  // the geoid of the sources; EGM96 where they refer to the ellipsoid
+};
+
 // Metres east and north of the origin of an edit's plane.
 struct PlanPoint {
   double x = 0, y = 0;
@@ -46,6 +54,16 @@ struct EditPlane {
   double Y(double lat) const { return (lat - latitude) * north_m; }
 };
 
+// Heights of a geoid above the ellipsoid around an edit, bilinear between nodes on its plane.
+struct EditUndulations {
+  PlanPoint south_west;
+  double step_x = 1, step_y = 1;  // metres
+  std::size_t columns = 0, rows = 0;
+  std::vector<double> values;  // row by row from the south-western one
+
+  double At(PlanPoint point) const;  // of points beyond the patch: of the nearest one on it
+};
+
 struct Edit {
   EditOp op = EditOp::kFlatten;
   std::string file;         // as configured
@@ -53,8 +71,8 @@ struct Edit {
   bool is_area = true;      // polygons; else lines
 
   EditPlane plane;
-  // Closed rings of polygons, without the repeated first point; the inside is where an odd number of rings is around.
-  // Or lines. `heights`: of the points, for slope, carve and raise; else empty.
+  // Lines, or closed rings of polygons without the repeated first point. A point is inside if an odd number of rings
+  // encloses it. `heights`: of the points, for slope, carve and raise; else empty.
   std::vector<std::vector<PlanPoint>> rings;
   std::vector<std::vector<double>> heights;
   // Of slope: corners of the first ring; empty: the plane h = gradient . (x, y) + level.
@@ -64,7 +82,10 @@ struct Edit {
   double blend_m = 0;
   double half_width_m = 0;  // of lines
   FlatHeight flat = FlatHeight::kGiven;
-  double height_m = 0;                                       // of flatten
+  double height_m = 0;                 // of flatten
+  EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
+  // If the heights are orthometric: is added to them. Null until the sources are known, and for the ellipsoid.
+  std::shared_ptr<const EditUndulations> undulations;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
@@ -77,9 +98,8 @@ struct Edit {
   double low_m = 0, high_m = 0;  // of the target heights
   double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;
-  // Edges by bands of equal height in y, so that a row scans few of them: of band b, which begins at
-  // `bands_from` + b / `bands_per_m`, `band_edges` [`band_begins`[b], `band_begins`[b + 1]), in order of rings and
-  // edges: those within reach of the band.
+  // Edges by bands in y, so that a row scans few of them. Band b begins at y = bands_from + b / bands_per_m. The edges
+  // within reach of it are band_edges[i] for band_begins[b] <= i < band_begins[b + 1], in the order of rings and edges.
   struct EdgeNumber {
     std::uint32_t ring, edge;
   };
@@ -89,8 +109,11 @@ struct Edit {
   ContentHash hash;
 
   double reach_m() const { return half_width_m + blend_m; }
+  bool has_heights() const {
+    return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
+  }
   bool changes_heights() const { return op <= EditOp::kRaise; }
-  // The share of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
+  // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double ShareAt(double distance_m) const {
     const double beyond = distance_m - half_width_m;
     if (beyond <= 0) return 1;

@@ -12,8 +12,8 @@ namespace {
 // beyond a polygon is that of the nearest point of its outline, which for a convex one is no further away than the
 // points themselves.
 double TargetError(const Edit& edit, double diagonal_m, double furthest_m) {
-  if (edit.op == EditOp::kFlatten || edit.op == EditOp::kOffset) return 0;
-  const double range = edit.high_m - edit.low_m;
+  if (edit.op == EditOp::kOffset) return 0;
+  const double range = edit.high_m - edit.low_m;  // of flatten: of the geoid
   if (edit.is_convex) return std::min(range, 2 * edit.steepest * diagonal_m);
   if (edit.is_area && edit.triangles.empty()) {
     return std::min(range, 2 * edit.steepest * (diagonal_m + 2 * furthest_m));
@@ -52,7 +52,8 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
         is_above |= node->height > low;
         is_below |= node->height < high;
       }
-      // Distances change by no more than the way; any point of the cell is within half a diagonal of a node.
+      // A distance changes by at most the length of a move, and each point of the cell is within half a diagonal of a
+      // node.
       const double high_share = edit.ShareAt(std::max(nearest - diagonal_m / 2, 0.0));
       const double low_share = edit.ShareAt(furthest + diagonal_m / 2);
       if (high_share <= 0) continue;

@@ -28,7 +28,7 @@ struct ReplacedHeights {
   std::vector<float> heights;
   double error_m = 0;  // of the surface between them, to that source's samples
 };
-// The result stays until the application ends.
+// The result stays valid until Apply returns.
 using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
 
 // The last row of each edit, by its number: points on one parallel share it.
@@ -44,7 +44,7 @@ class EditSet {
   // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order. Each thread remembers
   // the last box without edits: a tile asks for its surroundings first, and then for many boxes within these.
   std::vector<std::size_t> Find(const Box& degrees) const;
-  // Whether there are any: takes no longer for many edits.
+  // Whether Find would find any; faster if it would find many.
   bool Any(const Box& degrees) const;
 
   // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
@@ -56,8 +56,8 @@ class EditSet {
                      std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
                      double* error_m = nullptr) const;
 
-  // The same at a position; NaN: no height. `replaced`: of an edit, at this position. `rows`: of the positions before,
-  // at first empty. Holes have no height.
+  // The same for one position. `height` and the result: NaN if there is none, as in holes. `replaced`: the height of a
+  // replacement at this position. `rows`: kept from one position to the next, empty at first.
   double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
                  const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
 
@@ -76,9 +76,9 @@ class EditSet {
   std::uint64_t number_;  // no other set of this process has it
 };
 
-// Calls visit(column, row) for the lattice's nodes that a line passes: of each segment the nearest node in each column,
-// or in each row if it is steeper. Of other nodes than those in the window, or around the Earth from it, it calls for
-// few. Global columns continue beyond the last one.
+// Calls visit(column, row) for the nodes of the window along the line from `a` to `b`: the nearest node in each column,
+// or in each row if the line is steeper than a diagonal. Also calls it for a few nodes beside the window. Columns count
+// on beyond a turn around the Earth.
 void ForNodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const EditPlane& plane, PlanPoint a,
                    PlanPoint b, const std::function<void(std::int64_t, std::int64_t)>& visit);
 

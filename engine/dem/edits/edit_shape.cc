@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "engine/geo/ellipsoid.h"
 
@@ -91,7 +92,23 @@ EditPlace EditRow::At(double x) const {
   return place;
 }
 
-double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
+double EditUndulations::At(PlanPoint point) const {
+  const auto place = [](double steps, std::size_t nodes) {
+    const double clamped = std::clamp(steps, 0.0, static_cast<double>(nodes - 1));
+    const std::size_t node = std::min(static_cast<std::size_t>(clamped), nodes - 2);
+    return std::pair(node, clamped - static_cast<double>(node));
+  };
+  const auto [i, x] = place((point.x - south_west.x) / step_x, columns);
+  const auto [j, y] = place((point.y - south_west.y) / step_y, rows);
+  const double* const south = &values[j * columns + i];
+  const double* const north = south + columns;
+  return (1 - y) * ((1 - x) * south[0] + x * south[1]) + y * ((1 - x) * north[0] + x * north[1]);
+}
+
+namespace {
+
+// Above the edit's own datum.
+double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place) {
   if (edit.op == EditOp::kFlatten) return edit.height_m;
   if (!place.is_inside) {
     const auto& heights = edit.heights[place.ring];
@@ -116,29 +133,57 @@ double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
   return slope[0] * point.x + slope[1] * point.y + slope[2];
 }
 
+}  // namespace
+
+double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
+  const double stated = StatedTarget(edit, point, place);
+  return edit.undulations == nullptr ? stated : stated + edit.undulations->At(point);
+}
+
+// The lowest point that is an ear is cut off next. Of every other corner of the right turn, a point is known that lies
+// in its triangle: only when that point or a neighbour goes, the corner is tested again, from that point on. So a
+// corner meets each point once for each of its triangles, of which there are at most 3 n in all: O(n^2).
 std::vector<std::array<std::uint32_t, 3>> CutEars(const std::vector<PlanPoint>& ring) {
-  std::vector<std::uint32_t> left(ring.size());
-  std::iota(left.begin(), left.end(), 0U);
+  constexpr std::uint32_t kEar = 0xffffffff, kNever = 0xfffffffe;  // kNever: until a neighbour goes
+  const auto n = static_cast<std::uint32_t>(ring.size());
   const double sign = Sign(ring);
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-  while (left.size() >= 3) {
-    const std::size_t n = left.size();
-    std::size_t ear = n;
-    for (std::size_t i = 0; i < n && ear == n; ++i) {
-      const std::uint32_t a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
-      const double area = sign * Cross(ring[a], ring[b], ring[c]);
-      if (area < 0 || (area == 0 && n > 3)) continue;
-      const bool is_free = std::ranges::none_of(left, [&](std::uint32_t k) {
-        if (k == a || k == b || k == c) return false;
-        return sign * Cross(ring[a], ring[b], ring[k]) >= 0 && sign * Cross(ring[b], ring[c], ring[k]) >= 0 &&
-               sign * Cross(ring[c], ring[a], ring[k]) >= 0;
-      });
-      if (is_free) ear = i;
+  std::vector<std::uint32_t> before(n), after(n), inside(n);
+  std::vector<std::uint8_t> is_left(n, 1);
+  std::uint32_t left = n;
+  for (std::uint32_t i = 0; i < n; ++i) before[i] = (i + n - 1) % n, after[i] = (i + 1) % n;
+  const auto find_inside = [&](std::uint32_t b, std::uint32_t from) {
+    const std::uint32_t a = before[b], c = after[b];
+    for (std::uint32_t k = from; k < n; ++k) {
+      if (is_left[k] == 0 || k == a || k == b || k == c) continue;
+      if (sign * Cross(ring[a], ring[b], ring[k]) >= 0 && sign * Cross(ring[b], ring[c], ring[k]) >= 0 &&
+          sign * Cross(ring[c], ring[a], ring[k]) >= 0) {
+        return k;
+      }
     }
+    return kEar;
+  };
+  const auto test = [&](std::uint32_t b) {
+    const double area = sign * Cross(ring[before[b]], ring[b], ring[after[b]]);
+    inside[b] = area < 0 || (area == 0 && left > 3) ? kNever : find_inside(b, 0);
+  };
+  for (std::uint32_t i = 0; i < n; ++i) test(i);
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  while (left >= 3) {
+    std::uint32_t ear = 0;
+    while (ear < n && (is_left[ear] == 0 || inside[ear] != kEar)) ++ear;
     if (ear == n) return {};
-    const std::uint32_t a = left[(ear + n - 1) % n], b = left[ear], c = left[(ear + 1) % n];
-    if (Cross(ring[a], ring[b], ring[c]) != 0) triangles.push_back({a, b, c});
-    left.erase(left.begin() + static_cast<std::ptrdiff_t>(ear));
+    const std::uint32_t a = before[ear], c = after[ear];
+    if (Cross(ring[a], ring[ear], ring[c]) != 0) triangles.push_back({a, ear, c});
+    is_left[ear] = 0;
+    --left;
+    after[a] = c;
+    before[c] = a;
+    for (std::uint32_t i = 0; i < n; ++i) {
+      if (is_left[i] != 0 && inside[i] == ear) inside[i] = find_inside(i, ear + 1);
+    }
+    test(a);
+    test(c);
+    if (left == 3) test(after[c]);
   }
   return triangles;
 }
@@ -174,6 +219,24 @@ void MeasureTarget(Edit& edit) {
         edit.steepest = std::max(edit.steepest, std::abs(edit.heights[r][next] - edit.heights[r][e]) / length);
     }
   }
+}
+
+// The range and the steepest slope of the undulations are added to those of the heights.
+void AddUndulations(Edit& edit) {
+  if (edit.undulations == nullptr) return;
+  const EditUndulations& patch = *edit.undulations;
+  const auto [low, high] = std::ranges::minmax(patch.values);
+  edit.low_m += low;
+  edit.high_m += high;
+  double east = 0, north = 0;
+  for (std::size_t j = 0; j < patch.rows; ++j) {
+    for (std::size_t i = 0; i < patch.columns; ++i) {
+      const double* const at = &patch.values[j * patch.columns + i];
+      if (i + 1 < patch.columns) east = std::max(east, std::abs(at[1] - at[0]) / patch.step_x);
+      if (j + 1 < patch.rows) north = std::max(north, std::abs(at[patch.columns] - at[0]) / patch.step_y);
+    }
+  }
+  edit.steepest += std::hypot(east, north);
 }
 
 // As many bands as leave each edge in four on average: tall edges and wide blends are in many.
@@ -214,6 +277,7 @@ void DivideIntoBands(Edit& edit, double south, double north) {
 void HashContent(Edit& edit) {
   ContentHasher hasher;
   hasher.Add(static_cast<std::uint8_t>(edit.op));
+  if (edit.op == EditOp::kPrecision) hasher.Add(std::uint8_t{2});  // of the rule of borders (tin::BorderOptions)
   hasher.Add(edit.is_area);
   for (const double value : {edit.plane.longitude, edit.plane.latitude, edit.blend_m, edit.half_width_m, edit.height_m,
                              edit.offset_m, edit.error_m, edit.factor}) {
@@ -229,6 +293,9 @@ void HashContent(Edit& edit) {
   }
   for (const auto& heights : edit.heights) {
     for (const double height : heights) hasher.Add(height);
+  }
+  if (edit.undulations != nullptr) {
+    for (const double value : edit.undulations->values) hasher.Add(value);
   }
   edit.hash = hasher.Hash();
 }
@@ -254,6 +321,7 @@ void Complete(Edit& edit) {
   DivideIntoBands(edit, south, north);
   edit.is_convex = edit.is_area && edit.rings.size() == 1 && IsConvex(edit.rings.front());
   MeasureTarget(edit);
+  AddUndulations(edit);
   HashContent(edit);
 }
 

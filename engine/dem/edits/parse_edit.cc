@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <boost/geometry/algorithms/correct.hpp>
 #include <boost/geometry/algorithms/intersects.hpp>
 #include <boost/geometry/algorithms/is_valid.hpp>
@@ -92,6 +93,7 @@ class Parser {
   void AddRing(const json& points);
   void CheckPolygon(std::size_t first_ring);
   void ReadOptions(const json& terrain);
+  void ReadDatum(const json& terrain);
   void ReadHeights(const json& terrain);
   void FitSlope(std::vector<std::optional<double>> heights);
   std::vector<std::optional<double>> HeightsOf(const json& terrain, const char* key, const Ring& ring);
@@ -130,6 +132,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   CheckKeys(*terrain);
   if (has_failed()) return std::nullopt;
   ReadOptions(*terrain);
+  ReadDatum(*terrain);
   PlaceOnPlane();
   ReadHeights(*terrain);
   if (has_failed()) return std::nullopt;
@@ -142,8 +145,8 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 }
 
 void Parser::CheckKeys(const json& terrain) {
-  static const std::vector<std::string_view> keys = {"op",     "blend_m", "height",  "heights", "metres",
-                                                     "source", "width_m", "error_m", "factor",  "min_level"};
+  static const std::vector<std::string_view> keys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
+                                                     "width_m", "error_m", "factor", "min_level", "vertical"};
   for (const auto& [key, value] : terrain.items()) {
     if (std::ranges::find(keys, key) == keys.end()) {
       Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, keys)));
@@ -282,6 +285,15 @@ void Parser::ReadOptions(const json& terrain) {
       return Fail("replace needs the path of a raster as \"source\"");
     edit_.source = (std::filesystem::path(file_).parent_path() / source->get<std::string>()).string();
   }
+}
+
+void Parser::ReadDatum(const json& terrain) {
+  const auto found = terrain.find("vertical");
+  if (found == terrain.end()) return;
+  const auto datum = ParseDatum(*found);
+  if (!datum) return Fail(datum.error());
+  if (!edit_.has_heights()) return Fail(fmt::format("vertical is of heights, and {} has none", NameOf(edit_.op)));
+  edit_.datum = *datum;
 }
 
 void Parser::PlaceOnPlane() {
@@ -431,6 +443,17 @@ void Parser::FitSlope(std::vector<std::optional<double>> heights) {
 }
 
 }  // namespace
+
+tl::expected<EditDatum, std::string> ParseDatum(const json& value) {
+  constexpr std::array<const char*, 2> kNames = {"ellipsoid", "orthometric"};
+  if (value == kNames[0]) return EditDatum::kEllipsoid;
+  if (value == kNames[1]) return EditDatum::kOrthometric;
+  const std::string hint = value.is_string() ? DidYouMean(value.get<std::string>(), kNames) : "";
+  return tl::unexpected(
+      fmt::format("vertical is {}; it must be \"ellipsoid\", or \"orthometric\" for heights above the geoid of the "
+                  "sources{}",
+                  value.dump(), hint));
+}
 
 std::optional<Edit> ParseEdit(const json& feature, const std::string& file, std::size_t index,
                               std::vector<EditFault>& faults) {

@@ -6,14 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "engine/core/result.h"
 #include "engine/dem/edits/edit.h"
 #include "engine/dem/edits/read_edits.h"
 
 namespace terrace::dem {
 
-// A feature without properties.terrain is no edit: nothing. `file` and `feature` name it. Appends what is wrong; then
-// there is no edit either.
+// Returns nothing for a feature without properties.terrain, and for a wrong one, whose faults are appended. `file` and
+// `feature` name the feature in the edit and in faults.
 std::optional<Edit> ParseEdit(const nlohmann::json& json, const std::string& file, std::size_t feature,
                               std::vector<EditFault>& faults);
+
+// The value of a member "vertical"; or what is wrong with it.
+tl::expected<EditDatum, std::string> ParseDatum(const nlohmann::json& value);
 
 }  // namespace terrace::dem

@@ -6,6 +6,7 @@
 #include <exception>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <utility>
 
 #include "engine/dem/edits/parse_edit.h"
@@ -27,6 +28,31 @@ std::string TextOf(const std::vector<EditFault>& faults) {
   return text;
 }
 
+namespace {
+
+// The member "terrain" of a collection: {"vertical": ...} for all features that do not state their own.
+void ReadCommon(const nlohmann::json& common, const std::string& path, std::span<Edit> edits,
+                std::vector<EditFault>& faults) {
+  const auto fail = [&](std::string message) { faults.push_back({path, {}, {}, std::move(message)}); };
+  if (!common.is_object()) return fail(R"(its "terrain" must be an object, such as {"vertical": "orthometric"})");
+  for (const auto& [key, value] : common.items()) {
+    if (key != "vertical") {
+      fail(fmt::format("unknown member \"{}\" of its \"terrain\"; it may have \"vertical\"", key));
+      continue;
+    }
+    const auto datum = ParseDatum(value);
+    if (!datum) {
+      fail(datum.error());
+      continue;
+    }
+    for (Edit& edit : edits) {
+      if (edit.has_heights() && edit.datum == EditDatum::kNone) edit.datum = *datum;
+    }
+  }
+}
+
+}  // namespace
+
 void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<EditFault>& faults) {
   using nlohmann::json;
   std::ifstream stream(path, std::ios::binary);
@@ -35,6 +61,7 @@ void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<Ed
     return;
   }
   std::size_t features = 0;
+  const std::size_t first = edits.size();
   bool in_features = false, has_features = false;
   const auto take = [&](const json& feature) {
     if (auto edit = ParseEdit(feature, path, features, faults)) edits.push_back(*std::move(edit));
@@ -61,6 +88,8 @@ void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<Ed
     } else if (type != "FeatureCollection" || !has_features) {
       faults.push_back({path, {}, {}, "is no GeoJSON FeatureCollection; edits are its features (RFC 7946)"});
     }
+    if (is_object && root.contains("terrain"))
+      ReadCommon(root["terrain"], path, std::span(edits).subspan(first), faults);
     if (is_object && root.contains("crs")) {
       const std::string crs = root["crs"].dump();
       if (crs.find("CRS84") == std::string::npos && crs.find("4326") == std::string::npos) {

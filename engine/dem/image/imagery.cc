@@ -1,5 +1,7 @@
 #include "engine/dem/image/imagery.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -13,6 +15,7 @@
 #include "engine/dem/gdal/raster_file.h"
 #include "engine/dem/image/image_bins.h"
 #include "engine/dem/image/image_pool.h"
+#include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
 namespace {
@@ -31,10 +34,20 @@ class Imagery::Impl {
  public:
   Impl(ImagePool images, Georeference where) : pool(std::move(images)), georeference(std::move(where)) {}
 
+  // The factor by which pixels are averaged: the wanted one, or the largest that the memory allows.
+  int FactorOf(int wanted) { return std::min(wanted, pool.LargestFactor()); }
+
+  // The colours at positions in pixels of the full image, which are changed; empty if none of them lies in the image.
+  // `what`: for error messages.
+  Result<std::vector<ColorSample>> ColorsAt(std::vector<Position>& positions, int factor, const std::string& what,
+                                            const std::stop_token& stop);
+  Result<std::vector<ColorSample>> ColorsOfCells(const geo::TileKey& key, int side, const std::stop_token& stop);
+
   ImagePool pool;
   const Georeference georeference;
   SourceSpacing spacing;
   Footprint footprint;  // padded; there is no picture outside
+  GeoBounds bounds;     // without the padding
   std::uint64_t fingerprint = 0;
 };
 
@@ -62,6 +75,7 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   auto impl = std::make_unique<Impl>(ImagePool(*std::move(image), *std::move(files)), *std::move(georeference));
   impl->spacing = *spacing;
   impl->footprint = footprint.Padded();
+  impl->bounds = footprint.Bounds();
   const auto fingerprint = impl->georeference.FingerprintWith(impl->pool.files(), content);
   if (!fingerprint) return tl::unexpected(fingerprint.error());
   impl->fingerprint = *fingerprint;
@@ -76,47 +90,105 @@ int Imagery::SideOf(int level, int most) const {
   return side;
 }
 
-Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int side, std::stop_token stop) const {
+// The colours of a tile's lattice cells, row by row from the south-western one; empty if the image shows none of them.
+Result<std::vector<ColorSample>> Imagery::Impl::ColorsOfCells(const geo::TileKey& key, int side,
+                                                              const std::stop_token& stop) {
   TERRACE_CHECK(geo::IsValid(key) && IsSide(side));
-  ImagePool& pool = impl_->pool;
-  const Georeference& georeference = impl_->georeference;
-  const Footprint& footprint = impl_->footprint;
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   const geo::Lattice lattice{key.level, side};
-  const double extent = lattice.cells * lattice.StepDegrees();
-  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key)), extent,
-                         extent)) {
-    return std::nullopt;
+  const double size = lattice.cells * lattice.StepDegrees();
+  if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key)), size,
+                         size)) {
+    return std::vector<ColorSample>();
   }
-  const int factor = std::min(AveragingFactor(SamplesPerCell(lattice, impl_->spacing)), pool.LargestFactor());
-  auto image = pool.Borrow(factor);
-  if (!image) return tl::unexpected(image.error());
-
+  const int factor = FactorOf(AveragingFactor(SamplesPerCell(lattice, spacing)));
   std::vector<Position> positions =
       CellCentrePositions(georeference, footprint, lattice, key, kPositionTolerance * factor);
+  return ColorsAt(positions, factor, "tile " + geo::ToString(key), stop);
+}
+
+Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int side, std::stop_token stop) const {
+  const auto colors = impl_->ColorsOfCells(key, side, stop);
+  if (!colors) return tl::unexpected(colors.error());
+  const auto pixels = static_cast<std::size_t>(side);
+  TilePicture picture;
+  picture.side = side;
+  picture.rgb.resize(3 * colors->size());
+  bool is_there = false;
+  for (std::size_t i = 0; i < colors->size(); ++i) {
+    const ColorSample color = (*colors)[i];
+    is_there = is_there || color[3] != 0;
+    std::uint8_t* const out = picture.rgb.data() + 3 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
+    std::copy_n(color[3] != 0 ? color.data() : kNoPicture.data(), 3, out);
+  }
+  return is_there ? std::optional(std::move(picture)) : std::nullopt;
+}
+
+Result<std::vector<ColorSample>> Imagery::Impl::ColorsAt(std::vector<Position>& positions, int factor,
+                                                         const std::string& what, const std::stop_token& stop) {
+  if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  auto image = pool.Borrow(factor);
+  if (!image) return tl::unexpected(image.error());
   bool is_there = false;
   for (Position& p : positions) {
     const bool is_inside = p.x >= 0 && p.x <= georeference.width() && p.y >= 0 && p.y <= georeference.height();
     is_there = is_there || is_inside;
     p = is_inside ? Position{p.x / image->size->across, p.y / image->size->down} : Position{NAN, NAN};
   }
-  if (!is_there) return std::nullopt;
+  std::vector<ColorSample> colors;
+  if (!is_there) return colors;
   const auto bins = ImageBins::Read(*image->image, factor / image->size->factor, positions, stop);
-  if (!bins) return MakeError(bins.error().code, "tile {}: {}", geo::ToString(key), bins.error().message);
+  if (!bins) return MakeError(bins.error().code, "{}: {}", what, bins.error().message);
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  colors.reserve(positions.size());
+  for (const Position& p : positions) colors.push_back(bins->At(p));
+  return colors;
+}
 
-  TilePicture picture;
-  picture.side = side;
-  picture.rgb.resize(3 * positions.size());
-  is_there = false;
-  for (std::size_t i = 0; i < positions.size(); ++i) {
-    const ColorSample color = bins->At(positions[i]);
-    is_there = is_there || color[3] != 0;
-    const auto pixels = static_cast<std::size_t>(side);
-    std::uint8_t* const out = picture.rgb.data() + 3 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
-    std::copy_n(color[3] != 0 ? color.data() : kNoPicture.data(), 3, out);
+Result<MapPicture> Imagery::ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
+                                         std::stop_token stop) const {
+  const geo::MercatorGrid grid{depth};
+  TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && IsSide(side));
+  TERRACE_CHECK(column >= 0 && column + side <= grid.columns() && row >= 0 && row + side <= grid.rows());
+  const int factor = impl_->FactorOf(MercatorFactor(depth, impl_->spacing));
+  const NodePositions found = NodePositions::Of(impl_->georeference, impl_->footprint, grid,
+                                                NodeWindow{column, row, side, side}, kPositionTolerance * factor);
+  std::vector<Position> positions;
+  positions.reserve(Area(side, side));
+  for (std::size_t j = 0; j < found.rows(); ++j) {
+    for (std::size_t i = 0; i < found.columns(); ++i) positions.push_back(found.At(i, j));
   }
-  return is_there ? std::optional(std::move(picture)) : std::nullopt;
+  const auto colors = impl_->ColorsAt(positions, factor, fmt::format("Mercator pixels of depth {}", depth), stop);
+  if (!colors) return tl::unexpected(colors.error());
+  MapPicture picture{side, std::vector<std::uint8_t>(4 * positions.size())};
+  for (std::size_t i = 0; i < colors->size(); ++i) {
+    if ((*colors)[i][3] != 0) std::copy_n((*colors)[i].data(), 4, picture.rgba.data() + 4 * i);
+  }
+  return picture;
+}
+
+Result<MapPicture> Imagery::ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop) const {
+  const auto read = impl_->ColorsOfCells(key, side, stop);
+  if (!read) return tl::unexpected(read.error());
+  const auto pixels = static_cast<std::size_t>(side);
+  MapPicture picture{side, std::vector<std::uint8_t>(4 * pixels * pixels)};
+  for (std::size_t i = 0; i < read->size(); ++i) {
+    std::uint8_t* const out = picture.rgba.data() + 4 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
+    if ((*read)[i][3] != 0) std::copy_n((*read)[i].data(), 4, out);
+  }
+  return picture;
+}
+
+ImageExtent Imagery::extent() const {
+  constexpr double kSlack = 1.01;  // as in SideOf
+  ImageExtent extent;
+  extent.bounds = impl_->bounds;
+  extent.max_mercator_depth = DeepestMercator(impl_->spacing);
+  while (extent.max_geodetic_level < geo::kMaxLevel &&
+         SamplesPerCell({extent.max_geodetic_level, kMapSide}, impl_->spacing) > kSlack) {
+    ++extent.max_geodetic_level;
+  }
+  return extent;
 }
 
 std::uint64_t Imagery::fingerprint() const { return impl_->fingerprint; }

@@ -24,6 +24,19 @@ struct TilePicture {
   std::vector<std::uint8_t> rgb;  // 3 * side * side
 };
 
+// The same with alpha: 0 where the image has no colour, which is then black.
+struct MapPicture {
+  int side = 0;
+  std::vector<std::uint8_t> rgba;  // 4 * side * side
+};
+
+// Where an image lies, and the first levels of its map tiles whose pixels are as fine as its own.
+struct ImageExtent {
+  GeoBounds bounds;
+  int max_mercator_depth = 1;  // of a geo::MercatorGrid
+  int max_geodetic_level = 0;  // of tiles of kMapSide pixels in the scheme of terrain tiles
+};
+
 class Imagery {
  public:
   static constexpr int kMinSide = 64, kMaxSide = 1024;
@@ -46,6 +59,16 @@ class Imagery {
   // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; a side
   // as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
+
+  // Pictures for maps, by the rules of Read: `side` x `side` pixels of a Web Mercator grid, the first in `column` and
+  // `row`, or of a tile in the scheme of terrain tiles. Transparent where the image has no colour. Preconditions: the
+  // pixels lie in the grid; a valid key; a side as above. Errors: those of Read.
+  Result<MapPicture> ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
+                                  std::stop_token stop = {}) const;
+  Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
+
+  static constexpr int kMapSide = 256;
+  ImageExtent extent() const;
 
   // A hash of the bytes of its files and of their georeference. Copies have the same hash.
   std::uint64_t fingerprint() const;

@@ -33,6 +33,14 @@ Ranges Merged(Ranges ranges, const Ranges& others) {
   return geo::Disjoint(std::move(ranges));
 }
 
+// Four children or none; few ranges.
+void Complete(Ranges& tiles, int level) {
+  tiles = Down(Up(tiles, 1), 1);
+  for (int coarser = 1; tiles.size() > kMaxBlocks && coarser <= level; ++coarser) {
+    tiles = geo::Disjoint(Down(Up(tiles, coarser), coarser));
+  }
+}
+
 }  // namespace
 
 std::vector<Ranges> AvailableTiles(std::span<const SourceExtent> sources) {
@@ -52,13 +60,28 @@ std::vector<Ranges> AvailableTiles(std::span<const SourceExtent> sources) {
     wanted = Merged(std::move(wanted), worth[static_cast<std::size_t>(level)]);
     here = Up(wanted, up);
     if (level < deepest) here = Merged(std::move(here), Up(levels[static_cast<std::size_t>(level) + 1], 1));
-    here = Down(Up(here, 1), 1);
-    for (int coarser = 1; here.size() > kMaxBlocks && coarser <= level; ++coarser) {
-      here = geo::Disjoint(Down(Up(here, coarser), coarser));
-    }
+    Complete(here, level);
   }
   levels[0] = {{0, 0, 1, 0}};
   return levels;
+}
+
+void AddTiles(std::vector<Ranges>& levels, std::span<const FinerTiles> finer) {
+  if (finer.empty()) return;
+  const int deepest = std::ranges::max_element(finer, {}, &FinerTiles::level)->level;
+  levels.resize(std::max(levels.size(), static_cast<std::size_t>(deepest) + 1));
+  std::vector<Ranges> own(static_cast<std::size_t>(deepest) + 1);
+  for (const FinerTiles& of_level : finer) {
+    Ranges& those = own[static_cast<std::size_t>(of_level.level)];
+    those.insert(those.end(), of_level.tiles.begin(), of_level.tiles.end());
+  }
+  Ranges parents;  // of the tiles of the level below
+  for (int level = deepest; level > 0; --level) {
+    Ranges& here = levels[static_cast<std::size_t>(level)];
+    here = Merged(Merged(std::move(here), own[static_cast<std::size_t>(level)]), parents);
+    Complete(here, level);
+    parents = Up(here, 1);
+  }
 }
 
 }  // namespace terrace::dem

@@ -15,6 +15,12 @@ struct SourceExtent {
   int depth = 0;
 };
 
+// Tiles of a level that exist for another reason than a source's resolution.
+struct FinerTiles {
+  int level = 0;
+  std::vector<geo::TileRange> tiles;
+};
+
 // For each level from 0 to the deepest: ranges of tiles without overlap, sorted by row, then column, that contain
 // - every tile that touches a source of at least this depth;
 // - every ancestor of such a tile, and both roots;
@@ -23,5 +29,9 @@ struct SourceExtent {
 // A level with too many ranges for its documents gets fewer and larger ones, which include tiles outside all sources.
 // Precondition: `sources` is not empty.
 std::vector<std::vector<geo::TileRange>> AvailableTiles(std::span<const SourceExtent> sources);
+
+// Adds tiles to a result of AvailableTiles, also on deeper levels, with the ancestors and siblings that the rules above
+// ask for.
+void AddTiles(std::vector<std::vector<geo::TileRange>>& levels, std::span<const FinerTiles> finer);
 
 }  // namespace terrace::dem

@@ -180,9 +180,11 @@ GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& ind
   }
 }
 
-bool GridVoids::IsHole(const GridMember& member, std::size_t index, std::int64_t column, std::int64_t row) const {
-  const auto region = member.raster->rim_voids().At(column, row);
-  return !region || closed_[index][*region] != 0;
+bool GridVoids::IsHole(const GridMember& member, std::size_t index, std::int64_t column, std::int64_t row,
+                       std::int64_t& last_column) const {
+  const RimVoids::Stretch stretch = member.raster->rim_voids().StretchAt(column, row);
+  last_column = stretch.last_column;
+  return !stretch.region || closed_[index][*stretch.region] != 0;
 }
 
 std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& members, const BoxIndex& index, int factor,
@@ -195,21 +197,37 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
                {window.column * factor, window.row * factor, (window.column + window.columns) * factor,
                 (window.row + window.rows) * factor});
   constexpr std::size_t kFew = 16;
+  // What was found last in a member's row: runs are much longer than a pixel.
+  struct Found {
+    bool is_hole = false;
+    std::int64_t first_column = 0, last_column = -1;
+  };
+  std::vector<Found> found(all.size());
   std::size_t i = 0;
   for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
+    std::ranges::fill(found, Found{});
     for (std::int64_t column = window.column; column < window.column + window.columns; ++column, ++i) {
       if (!std::isnan(heights[i])) continue;
       const std::int64_t canonical = turn_ > 0 ? FloorMod(column, columns) : column;
       const std::int64_t x = canonical * factor, y = row * factor;
-      const auto look = [&](const std::vector<Placed>& placed) {
-        for (const Placed& p : placed) {
-          // Of several members, one hole is enough.
-          if (p.Has(x, y) && IsHole(*p.member, p.index, x - p.column, y - p.member->row)) return true;
+      const auto is_hole = [&](const Placed& p, Found& known) {
+        if (!p.Has(x, y)) return false;
+        const std::int64_t at = x - p.column;
+        if (at < known.first_column || at > known.last_column) {
+          known.first_column = at;
+          known.is_hole = IsHole(*p.member, p.index, at, y - p.member->row, known.last_column);
         }
-        return false;
+        return known.is_hole;
       };
-      const bool is_few = all.size() <= kFew && canonical == column;
-      holes[i] = look(is_few ? all : PlacedIn(members, index, turn_, {x, y, x, y})) ? 1 : 0;
+      // Of several members, one hole is enough.
+      if (all.size() <= kFew && canonical == column) {
+        for (std::size_t k = 0; k < all.size() && holes[i] == 0; ++k) holes[i] = is_hole(all[k], found[k]) ? 1 : 0;
+        continue;
+      }
+      for (const Placed& p : PlacedIn(members, index, turn_, {x, y, x, y})) {
+        Found unknown;
+        if (is_hole(p, unknown)) holes[i] = 1;
+      }
     }
   }
   return holes;

@@ -37,7 +37,9 @@ class GridVoids {
   std::size_t looks() const { return looks_; }
 
  private:
-  bool IsHole(const GridMember& member, std::size_t index, std::int64_t column, std::int64_t row) const;
+  // Sets `last_column` to the last column of the row for which the result is the same.
+  bool IsHole(const GridMember& member, std::size_t index, std::int64_t column, std::int64_t row,
+              std::int64_t& last_column) const;
 
   std::int64_t turn_ = 0;
   std::size_t looks_ = 0;

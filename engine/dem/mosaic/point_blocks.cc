@@ -96,6 +96,11 @@ bool PointBlockCache::Note(const PointBlockKey& key) {
   return std::exchange(noted_[Hash{}(key) % kNoted], key) == key;
 }
 
+std::size_t PointBlockCache::count() const {
+  const std::lock_guard lock(mutex_);
+  return entries_.size();
+}
+
 std::size_t PointBlockCache::bytes() const {
   const std::lock_guard lock(mutex_);
   return bytes_;

@@ -42,8 +42,8 @@ struct PointBlock {
 };
 using PointBlockPtr = std::shared_ptr<const PointBlock>;
 
-// The number of a block: of its cells' columns (one before the first column may have cells where columns wrap) and
-// rows.
+// The position of a block in its grid. Column 1 begins at the first column of cells, row 0 at the first row; column 0
+// holds the cells before the first column, which exist where columns wrap.
 struct PointBlockKey {
   std::uint64_t grid = 0;  // RasterGrid's number in this process
   std::int64_t column = 0, row = 0;
@@ -54,8 +54,8 @@ struct PointBlockKey {
 // The most recently used blocks of all raster grids of the process. Thread-safe.
 class PointBlockCache {
  public:
-  // 500 blocks of whole metres or 250 of others, if they have no voids: a raster of 4,000 x 4,000 floats. Of those of
-  // one height about 60,000.
+  // Without voids: 500 blocks of whole metres, or 250 blocks of other heights (a raster of 4,000 x 4,000 floats), or
+  // about 60,000 blocks of one height.
   static constexpr std::size_t kCapacityBytes = std::size_t{64} << 20;
 
   explicit PointBlockCache(std::size_t capacity_bytes = kCapacityBytes) : capacity_bytes_(capacity_bytes) {}
@@ -68,6 +68,7 @@ class PointBlockCache {
   // points, is not worth reading as a whole.
   bool Note(const PointBlockKey& key);
 
+  std::size_t count() const;
   std::size_t bytes() const;
 
  private:

@@ -267,7 +267,7 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   if (!core) return tl::unexpected(core.error());
   if (measured != nullptr) *measured = *core;
   Bridged bridged{*std::move(core), 0};
-  bridged.voids = static_cast<std::uint64_t>(std::ranges::count_if(bridged.heights, IsVoid));
+  bridged.voids = CountVoids(bridged.heights);
   const int gap = options_.max_void_gap / factor;
   if (gap < 2 || bridged.voids == 0) return bridged;
   const GridWindow voids = HullOfVoids(bridged.heights, window), wide = Grown(voids, gap, factor);
@@ -338,11 +338,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   const std::span<float> heights = nodes.heights, weights = nodes.weights, smooth = nodes.smooth;
   const bool traces_others = trace != nullptr && !weights.empty();
   std::vector<std::uint8_t> wanted(inside.size());
-  bool is_any_wanted = false;
-  for (std::size_t n = 0; n < wanted.size(); ++n) {
-    wanted[n] = inside[n] & static_cast<std::uint8_t>(IsVoid(heights[n]));
-    is_any_wanted |= wanted[n] != 0;
-  }
+  const bool is_any_wanted = WantVoids(inside, heights, wanted);
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   NodeCells cells(std::move(positions), Axes(factor));
   if (!is_any_wanted) {
@@ -359,7 +355,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   if (!smoothed) return tl::unexpected(smoothed.error());
   const bool has_holes = !smoothed->empty();
   const std::vector<float>& samples = has_holes ? *smoothed : bridged->heights;
-  const auto left = static_cast<std::uint64_t>(bridged->voids == 0 ? 0 : std::ranges::count_if(samples, IsVoid));
+  const auto left = static_cast<std::uint64_t>(bridged->voids == 0 ? 0 : CountVoids(samples));
   counts_->measured += samples.size() - bridged->voids;
   counts_->filled += bridged->voids - left;
   counts_->voids += left;

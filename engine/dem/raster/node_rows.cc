@@ -160,6 +160,39 @@ bool AreAllKnown(const float* heights, std::size_t count) {
   return are_known;
 }
 
+std::size_t VoidsAmong(const float* heights, std::size_t count) {
+  const hn::CappedTag<float, 16> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t i = 0, voids = 0;
+  for (; i + lanes <= count; i += lanes) voids += hn::CountTrue(d, hn::IsNaN(hn::LoadU(d, heights + i)));
+  for (; i < count; ++i) voids += heights[i] != heights[i] ? 1 : 0;
+  return voids;
+}
+
+bool MarkVoids(const std::uint8_t* inside, const float* heights, std::size_t count, std::uint8_t* wanted) {
+  const hn::CappedTag<float, 16> d;
+  const hn::RebindToSigned<decltype(d)> words;
+  const hn::Rebind<std::int16_t, decltype(d)> halves;
+  const hn::Rebind<std::int8_t, decltype(d)> bytes;
+  const hn::RebindToUnsigned<decltype(bytes)> marks;
+  const std::size_t lanes = hn::Lanes(d);
+  auto all = hn::Zero(marks);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const auto is_void = hn::VecFromMask(words, hn::RebindMask(words, hn::IsNaN(hn::LoadU(d, heights + i))));
+    const auto here =
+        hn::And(hn::BitCast(marks, hn::DemoteTo(bytes, hn::DemoteTo(halves, is_void))), hn::LoadU(marks, inside + i));
+    hn::StoreU(here, marks, wanted + i);
+    all = hn::Or(all, here);
+  }
+  bool is_any = !hn::AllTrue(marks, hn::Eq(all, hn::Zero(marks)));
+  for (; i < count; ++i) {
+    wanted[i] = heights[i] != heights[i] ? inside[i] : 0;
+    is_any |= wanted[i] != 0;
+  }
+  return is_any;
+}
+
 // Coordinates in turn, x and y, in the lanes of one vector.
 PositionHull Hull(const Position* positions, std::size_t count) {
   const hn::CappedTag<double, 8> d;
@@ -209,6 +242,8 @@ HWY_EXPORT(InterpolateLines);
 HWY_EXPORT(Round);
 HWY_EXPORT(Places);
 HWY_EXPORT(AreAllKnown);
+HWY_EXPORT(VoidsAmong);
+HWY_EXPORT(MarkVoids);
 HWY_EXPORT(Hull);
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
@@ -275,6 +310,14 @@ bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, st
 
 bool HasVoids(std::span<const float> heights) {
   return !HWY_DYNAMIC_DISPATCH(AreAllKnown)(heights.data(), heights.size());
+}
+
+std::size_t CountVoids(std::span<const float> heights) {
+  return HWY_DYNAMIC_DISPATCH(VoidsAmong)(heights.data(), heights.size());
+}
+
+bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted) {
+  return HWY_DYNAMIC_DISPATCH(MarkVoids)(inside.data(), heights.data(), heights.size(), wanted.data());
 }
 
 PositionHull HullOf(std::span<const Position> positions) {

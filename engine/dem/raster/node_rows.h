@@ -1,5 +1,5 @@
-// Rows of nodes: the places of their samples and the heights between them, in vectors. Results are bit-equal on all
-// sets of instructions, and to those of GridAxes::CellAt and Interpolate for each node.
+// Rows of nodes: the places of their samples and the heights between them, with SIMD. Results are bit-equal on all
+// instruction sets, and to those of GridAxes::CellAt and Interpolate for each node.
 #pragma once
 
 #include <array>
@@ -49,6 +49,12 @@ void RoundHeights(std::span<const double> heights, std::span<const double> added
 
 // Whether a height is NaN.
 bool HasVoids(std::span<const float> heights);
+
+std::size_t CountVoids(std::span<const float> heights);
+
+// Marks the nodes whose height is wanted: 1 where `inside` is 1 and the height is NaN, else 0. Returns whether there is
+// one. Precondition: all spans have one entry per node.
+bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted);
 
 // The places of nodes in samples, index plus weight on each axis, in the cells of GridAxes::CellAt. NaN where the
 // height is NaN, and where a place is not between 0 and `limit`. Returns false if CellAt must be asked for some of

@@ -16,8 +16,10 @@ constexpr double kMeasured = 2;
 constexpr double kUndulationPart = 500;
 // Samples between places that are measured first.
 constexpr double kProbes = 24;
-// Metres: over the largest change of a ray's height between the ends of a part in a cell and its lowest place.
-constexpr double kSag = 1e-4;
+// Samples: parts of a ray that cross at most this many, none of them void, are walked along.
+constexpr double kWalked = 64;
+// Metres: over the rounding of heights.
+constexpr double kSlack = 1e-6;
 // Parts of a cell with voids: its heights are no polynomial.
 constexpr int kRimParts = 16;
 
@@ -154,10 +156,12 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   const bool is_in_block = (west / kPointBlockCells == east / kPointBlockCells) && east < grid_.columns() &&
                            cells.north / kPointBlockCells == cells.south / kPointBlockCells;
   CellsBound bound{0, true};
+  const SightBlock* within = nullptr;
   if (is_in_block) {
     const Result<const SightBlock*> block = blocks_.At(west, cells.north, scan.stop);
     if (!block) return tl::unexpected(block.error());
-    bound = (*block)->Over(west, cells.north, east, cells.south);
+    within = *block;
+    bound = within->Over(west, cells.north, east, cells.south);
   } else if (east < grid_.columns() && size > kPointBlockCells / 8) {
     // Without reading the samples.
     const BlockRange range = grid_.Ranges({static_cast<double>(west), static_cast<double>(cells.north),
@@ -173,6 +177,10 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
     scan.Open(first, last);
     return {};
   }
+  const bool is_between = x.min >= 0 && y.min >= 0 && x.max <= grid_.columns() - 1 && y.max <= grid_.rows() - 1;
+  if (within != nullptr && size <= kWalked && !bound.has_voids && is_between && blocks_.includes_undulations()) {
+    return Walk(scan, *within, static_cast<double>(cells.west - west), first, last, size);
+  }
   const double length_m = (last - first) * scan.piece.length_m;
   if (size <= kMeasured && (blocks_.includes_undulations() || length_m <= kUndulationPart)) {
     return Measure(scan, first, last);
@@ -180,6 +188,38 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   const double middle = (first + last) / 2;
   if (const Result<void> done = Halve(scan, first, middle); !done) return done;
   return Halve(scan, middle, last);
+}
+
+// Steps of less than a sample lie in 2 x 2 cells. A step is measured unless it is above their largest corner.
+// `turn`: columns of whole turns around the Earth.
+Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size) {
+  // With A = |curvature| (last - first)^2, a step is at most (size + A) / count long, and its polynomial at most
+  // A / (4 count^2) beside its chord.
+  const double curvature = std::max(std::abs(scan.on_grid.x.curvature()), std::abs(scan.on_grid.y.curvature()));
+  const int count = static_cast<int>((size + 4 * curvature * (last - first) * (last - first)) * 1.125) + 1;
+  const double step = (last - first) / count;
+  const auto bulge = [step](const Quadratic& q) { return std::abs(q.curvature()) * step * step / 4; };
+  const Quadratic &on_x = scan.on_grid.x, &on_y = scan.on_grid.y, &height_m = scan.piece.height_m;
+  const GridWindow& window = block.window();
+  const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
+  const double north = static_cast<double>(window.row) + bulge(on_y) + kSlack;
+  const double slack_m = bulge(height_m) + kSlack;
+  const float* const largest = block.largest().data();
+  const auto stride = static_cast<std::size_t>(window.columns);
+  double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
+  for (int i = 1; i <= count; ++i) {
+    const double next = i == count ? last : first + step * i;
+    const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
+    // Positions before the window's first sample are cut off by no more than the bulge.
+    const auto column = static_cast<std::size_t>(std::max(std::min(x, next_x), 0.0));
+    const auto row = static_cast<std::size_t>(std::max(std::min(y, next_y), 0.0));
+    const auto highest = static_cast<double>(largest[row * stride + column]);
+    if (!scan.search.IsSettled(std::min(h, next_h) - highest, scan.ShareOf(s))) {
+      if (const Result<void> done = Measure(scan, s, next); !done) return done;
+    }
+    s = next, x = next_x, y = next_y, h = next_h;
+  }
+  return {};
 }
 
 // Divides a part where it crosses the lines of the grid.
@@ -239,7 +279,9 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
     MeasureRim(scan, block, column, row, first, last);
     return {};
   }
-  const double slack_m = blocks_.includes_undulations() ? kSag : SightBlocks::kMaxUndulation;
+  // The lowest place of a ray in a cell may lie below both ends of its part.
+  const double length = last - first, sag_m = std::abs(scan.piece.height_m.curvature()) * length * length / 4;
+  const double slack_m = sag_m + (blocks_.includes_undulations() ? kSlack : SightBlocks::kMaxUndulation);
   const double lowest_m = std::min(scan.piece.height_m.At(first), scan.piece.height_m.At(last));
   if (scan.search.IsSettled(lowest_m - std::max(std::max(nw, ne), std::max(sw, se)) - slack_m, scan.ShareOf(first))) {
     return {};

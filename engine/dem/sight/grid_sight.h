@@ -1,7 +1,8 @@
 // Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
 //
 // Branch and bound: a part of a ray that is higher above the largest height below it than the smallest clearance found
-// so far is skipped; others are halved until they cross two cells. There the clearance is a polynomial of the second
+// so far is skipped; others are halved until they are short. Then the cells along them are compared one by one, and
+// in those that may matter the clearance is a polynomial of the second
 // degree between the lines of the grid, and its minimum is exact.
 #pragma once
 
@@ -66,6 +67,7 @@ class GridSight {
 
   Result<void> Probe(Scan& scan);
   Result<void> Halve(Scan& scan, double first, double last);
+  Result<void> Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);
   void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,

@@ -10,6 +10,29 @@ namespace {
 // Metres between positions at which undulations are read.
 constexpr double kUndulationStep = 240;
 
+float Larger(float a, float b) { return b > a ? b : a; }  // of a void and a height: the height
+
+// SightBlock::largest.
+std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_t width, std::int64_t height) {
+  std::vector<float> across(heights.size()), largest(heights.size());
+  const auto lowest = [](float h) { return std::isnan(h) ? -std::numeric_limits<float>::infinity() : h; };
+  for (std::int64_t row = 0; row < height; ++row) {
+    const float* const from = &heights[static_cast<std::size_t>(row * width)];
+    float* const to = &across[static_cast<std::size_t>(row * width)];
+    std::int64_t i = 0;
+    for (; i + 2 < width; ++i) to[i] = Larger(Larger(lowest(from[i]), from[i + 1]), from[i + 2]);
+    for (; i < width; ++i) to[i] = i + 1 < width ? Larger(lowest(from[i]), from[i + 1]) : lowest(from[i]);
+  }
+  for (std::int64_t row = 0; row < height; ++row) {
+    const float* const from = &across[static_cast<std::size_t>(row * width)];
+    const float* const next = row + 1 < height ? from + width : from;
+    const float* const last = row + 2 < height ? next + width : next;
+    float* const to = &largest[static_cast<std::size_t>(row * width)];
+    for (std::int64_t i = 0; i < width; ++i) to[i] = Larger(Larger(from[i], next[i]), last[i]);
+  }
+  return largest;
+}
+
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
@@ -17,16 +40,29 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
+  largest_ = LargestOfThree(heights_, width, height);
   Level level{(width + 1) / 2, (height + 1) / 2, {}};
   level.cells.resize(static_cast<std::size_t>(level.columns * level.rows));
   for (std::int64_t row = 0; row < level.rows; ++row) {
-    for (std::int64_t column = 0; column < level.columns; ++column) {
-      CellsBound& bound = level.cells[static_cast<std::size_t>(row * level.columns + column)];
-      for (std::int64_t y = 2 * row; y <= std::min(2 * row + 2, height - 1); ++y) {
-        for (std::int64_t x = 2 * column; x <= std::min(2 * column + 2, width - 1); ++x) {
-          const auto at = static_cast<std::size_t>(y * width + x);
-          bound.has_voids |= std::isnan(owned_[at]) || std::isnan(heights_[at]);
-          if (heights_[at] > bound.max) bound.max = heights_[at];
+    const float* const from = &largest_[static_cast<std::size_t>(2 * row * width)];
+    CellsBound* const to = &level.cells[static_cast<std::size_t>(row * level.columns)];
+    for (std::int64_t column = 0; column < level.columns; ++column) to[column].max = from[2 * column];
+  }
+  const auto has_voids = [](const std::vector<float>& heights) {
+    bool has = false;
+    for (const float h : heights) has |= std::isnan(h);
+    return has;
+  };
+  for (const std::vector<float>* const heights : {&heights_, &owned_}) {
+    if (!has_voids(*heights)) continue;
+    for (std::int64_t y = 0; y < height; ++y) {
+      for (std::int64_t x = 0; x < width; ++x) {
+        if (!std::isnan((*heights)[static_cast<std::size_t>(y * width + x)])) continue;
+        // Cells on both sides have a sample between them.
+        for (std::int64_t row = std::max<std::int64_t>(y - 1, 0) / 2; row <= y / 2; ++row) {
+          for (std::int64_t column = std::max<std::int64_t>(x - 1, 0) / 2; column <= x / 2; ++column) {
+            level.cells[static_cast<std::size_t>(row * level.columns + column)].has_voids = true;
+          }
         }
       }
     }

@@ -35,6 +35,9 @@ class SightBlock {
 
   // Of the cells between two of the block, inclusive; possibly of more.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
+  // By sample, as heights(): the largest height of the 3 x 3 samples from it to the south-east, which are the corners
+  // of 2 x 2 cells; voids do not count.
+  const std::vector<float>& largest() const { return largest_; }
 
  private:
   struct Level {
@@ -43,7 +46,7 @@ class SightBlock {
   };
 
   GridWindow window_;
-  std::vector<float> heights_, owned_;
+  std::vector<float> heights_, owned_, largest_;
   std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
 };
 

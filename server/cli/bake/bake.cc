@@ -153,6 +153,9 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
   command.add_option("--lease", arguments.lease)
       ->check(NumberAbove0("a number of seconds above 0"))
       ->group("");  // for tests: how long a worker may be silent
+  command.add_option("--queue-timeout", arguments.queue_timeout)
+      ->check(NumberAbove0("a number of seconds above 0"))
+      ->group("");  // for tests: how long Redis may take for a reply
   command
       .add_option("--update", arguments.update,
                   "An older bake in chunks: what did not change is copied from it, the rest is baked")
@@ -160,6 +163,9 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
       ->group(kHow);
   command.add_flag("--json", arguments.json, "Prints one line of JSON for each file, and a summary")->group(kHow);
   command.add_flag("--yes", arguments.yes, "Bakes more than 1,000,000,000 tiles without asking")->group(kHow);
+}
+
+void AddPlanning(CLI::App& command, BakeArguments& arguments) {
   command
       .add_flag("--dry-run", arguments.dry_run,
                 "Bakes nothing: tells levels, tiles, files, bytes and core-hours, from a few tiles that are built")
@@ -207,6 +213,7 @@ void AddBake(CLI::App& app, int& exit_code) {
       "2 wrong arguments; 130 or 143 stopped by a signal.");
   AddWhat(*command, *arguments);
   AddHow(*command, *arguments);
+  AddPlanning(*command, *arguments);
   std::vector<config::OptionInfo> about_dataset = config::DatasetOptions();
   std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked"; });
   AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "config/common/working_directory.h"
@@ -181,6 +182,10 @@ Result<bake::Shard> ShardOf(const std::string& text) {
     return MakeError(ErrorCode::kInvalidArgument, "--shard {}: must be I/N with I from 0 to N-1, such as 0/8", text);
   }
   return shard;
+}
+
+unsigned ThreadsOf(const BakeArguments& arguments) {
+  return arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
 }
 
 Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::ConfigError>& errors) {

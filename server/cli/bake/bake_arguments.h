@@ -28,23 +28,27 @@ struct BakeArguments {
   unsigned threads = 0;                                      // 0: one for each processor
   std::string shard;
   std::string queue, job, queue_password_file, queue_ca;  // empty: not given
-  double lease = 30;                                      // seconds
+  double lease = 30, queue_timeout = 10;                  // seconds
   bool finish = false, dry_run = false, json = false, yes = false, no_gzip = false;
   std::string catalogue;
   double arc_seconds = 1, bytes_per_tile = 2000, milliseconds_per_tile = 2;
   std::map<std::string, std::string> dataset_flags, cache_flags;  // by option key
 };
 
-// kInvalidArgument: the message names the flag and what would be right. Checks what needs no source.
+// Check everything that needs no source. kInvalidArgument: the message names the flag and valid values.
 Result<bake::Order> OrderOf(const BakeArguments& arguments);
 Result<bake::Shard> ShardOf(const std::string& text);
 Result<std::vector<tiler::Coding>> CodingsOf(const std::string& text);
 
-// The dataset, and the configuration of the program: of a file, or of DEMs that form one dataset. All errors.
+// The number of threads to use.
+unsigned ThreadsOf(const BakeArguments& arguments);
+
+// The dataset, and the configuration of the program: from a file, or for DEMs that form one dataset.
 struct BakeInput {
   config::Config config;
   config::DatasetConfig dataset;
 };
+// `errors`: all errors of the configuration are appended.
 Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::ConfigError>& errors);
 
 }  // namespace terrace::cli

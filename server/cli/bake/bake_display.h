@@ -14,8 +14,6 @@
 
 namespace terrace::cli {
 
-// "1,234,567"
-std::string Grouped(std::uint64_t number);
 // "12.3 MB"
 std::string Bytes(double bytes);
 

@@ -133,6 +133,7 @@ Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments) {
   if (!password->empty()) place.address.password = *std::move(password);
   place.ca_file = arguments.queue_ca;
   place.name = arguments.job;
+  place.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(arguments.queue_timeout * 1000));
   return place;
 }
 

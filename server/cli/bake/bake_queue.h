@@ -13,13 +13,14 @@
 
 namespace terrace::cli {
 
-// Where the job is, and the secrets to enter. kInvalidArgument: the flags; the message has no secret.
+// The place of the job, with its credentials. kInvalidArgument: the flags are wrong; the message has no secret.
 Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments);
 
-// Another one each time: host, process, and a random number, since processes of containers have equal numbers.
+// A new name at each call: host, process and a random number, because processes of several containers may have equal
+// numbers.
 std::string WorkerName();
 
-// Whether the bake in the place is finished. Says so.
+// Whether the bake in the place is finished. If so, prints that.
 bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets);
 
 struct QueuedBake {

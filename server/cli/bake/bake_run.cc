@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <memory>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 #include "archive/files/input_file.h"
@@ -163,7 +162,96 @@ void ListFailures(const std::vector<bake::UnitReport>& reports, const std::vecto
   }
 }
 
-// From the plan to the end.
+// A bake whose place is claimed.
+struct PlacedBake {
+  const BakeArguments& arguments;
+  const tiler::TilePipeline& pipeline;
+  std::vector<bake::Target>& targets;
+  const std::string& place;
+  const bake::BakeIdentity& identity;
+  const bake::UnitPlan& plan;
+  const bake::BakeOptions& options;
+  const bake::Shard& shard;
+  const StopSignals& signals;
+};
+
+// Bakes units of a job in a queue. Returns the exit code.
+int BakeJob(const PlacedBake& bake, const std::string& worker) {
+  const auto finish = [&](const std::vector<bake::UnitReport>& all) {
+    auto finished = Finish(bake.targets, all, bake.place, bake.identity);
+    if (finished) bake::RemoveLocksOfJob(bake.place, bake.arguments.job, worker);
+    return finished;
+  };
+  const Clock::time_point start = Clock::now();
+  bake::Counters counters;
+  std::vector<bake::UnitReport> reports;
+  const int code = BakeFromQueue(
+      {bake.arguments, bake.pipeline, bake.targets, bake.plan, bake.options, bake.place, worker, bake.identity, finish},
+      counters, reports);
+  if (bake.signals.signal() != 0) return StopCode(bake.signals);
+  BakeSummary summary =
+      Summarize(reports, counters, bake.place, std::chrono::duration<double>(Clock::now() - start).count());
+  summary.is_complete = code == kExitOk;
+  if (code == kExitUsage) return code;
+  fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
+  return code;
+}
+
+// Writes the manifests, and another form than chunks. Returns an exit code.
+int FinishAlone(const PlacedBake& bake, const std::vector<bake::UnitReport>& reports, BakeSummary& summary) {
+  if (const auto finished = Finish(bake.targets, reports, bake.place, bake.identity); !finished) {
+    return Fail(finished.error());
+  }
+  summary.is_complete = true;
+  if (bake.arguments.form == kChunks) return kExitOk;
+  summary.place = bake.arguments.out;
+  const auto exported = Export(bake.arguments, bake.place, bake.signals.token());
+  if (exported) return kExitOk;
+  return bake.signals.signal() != 0 ? StopCode(bake.signals) : Fail(exported.error());
+}
+
+// Bakes the units of the shard, or all. Returns the exit code.
+int BakeAlone(const PlacedBake& bake) {
+  const Clock::time_point start = Clock::now();
+  bake::Counters counters;
+  std::vector<bake::UnitReport> reports;
+  {
+    const BakeDisplay display(bake.pipeline.datasets().front().name, bake.plan.tiles, bake.plan.files, counters);
+    reports = bake::Bake(bake.pipeline, bake.targets, bake.plan, bake.options, counters);
+  }
+  BakeSummary summary =
+      Summarize(reports, counters, bake.place, std::chrono::duration<double>(Clock::now() - start).count());
+  const std::uint64_t done = summary.baked + summary.kept + summary.copied;
+  if (bake.signals.signal() != 0) {
+    std::fprintf(stderr, "terrace: stopped: %s of %s files are done; run the same command again to go on\n",
+                 Grouped(done).c_str(), Grouped(bake.plan.files).c_str());
+    return StopCode(bake.signals);
+  }
+  ListFailures(reports, bake.targets);
+  const bool is_whole = done == bake.plan.files;
+  if (is_whole && bake.shard.count == 1) {
+    if (const int code = FinishAlone(bake, reports, summary); code != kExitOk) return code;
+  }
+  fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
+  if (!is_whole) {
+    std::fprintf(
+        stderr,
+        "terrace: the bake is not complete: %s of %s files are missing, and there is no manifest; run %s to go "
+        "on\n",
+        Grouped(bake.plan.files - done).c_str(), Grouped(bake.plan.files).c_str(),
+        bake.arguments.finish ? "the shards that baked them again" : "the same command again");
+    return kExitFailure;
+  }
+  if (bake.shard.count > 1) {
+    std::fprintf(
+        stderr,
+        "terrace: shard %u of %u is done; when all are, run the same command with --finish instead of --shard\n",
+        bake.shard.index, bake.shard.count);
+  }
+  return kExitOk;
+}
+
+// Claims the place, plans the units and bakes them. Returns the exit code.
 int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets,
              const bake::Shard& shard, const StopSignals& signals) {
   const tiler::Dataset& dataset = pipeline.datasets().front();
@@ -186,9 +274,8 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
     if (const auto read = ReadOld(arguments.update, targets); !read) return Fail(read.error());
   }
   const bake::UnitPlan plan = bake::UnitPlan::Make(targets, shard);
-  bake::Counters counters;
   bake::BakeOptions options;
-  options.threads = arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
+  options.threads = ThreadsOf(arguments);
   options.only_verify = arguments.finish;
   options.stop = signals.token();
   if (arguments.json) {
@@ -197,65 +284,8 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
       std::fflush(stdout);
     };
   }
-  const Clock::time_point start = Clock::now();
-  std::vector<bake::UnitReport> reports;
-  if (!worker.empty()) {
-    const auto finish = [&](const std::vector<bake::UnitReport>& all) {
-      auto finished = Finish(targets, all, place, identity);
-      if (finished) bake::RemoveLocksOfJob(place, arguments.job, worker);
-      return finished;
-    };
-    const int code = BakeFromQueue({arguments, pipeline, targets, plan, options, place, worker, identity, finish},
-                                   counters, reports);
-    if (signals.signal() != 0) return StopCode(signals);
-    BakeSummary summary =
-        Summarize(reports, counters, place, std::chrono::duration<double>(Clock::now() - start).count());
-    summary.is_complete = code == kExitOk;
-    if (code != kExitUsage) fmt::print("{}\n", arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
-    return code;
-  }
-  {
-    const BakeDisplay display(dataset.name, plan.tiles, plan.files, counters);
-    reports = bake::Bake(pipeline, targets, plan, options, counters);
-  }
-  BakeSummary summary =
-      Summarize(reports, counters, place, std::chrono::duration<double>(Clock::now() - start).count());
-  const std::uint64_t done = summary.baked + summary.kept + summary.copied;
-  if (signals.signal() != 0) {
-    std::fprintf(stderr, "terrace: stopped: %s of %s files are done; run the same command again to go on\n",
-                 Grouped(done).c_str(), Grouped(plan.files).c_str());
-    return StopCode(signals);
-  }
-  ListFailures(reports, targets);
-  const bool is_whole = done == plan.files;
-  if (is_whole && shard.count == 1) {
-    if (const auto finished = Finish(targets, reports, place, identity); !finished) return Fail(finished.error());
-    summary.is_complete = true;
-    if (!is_chunked) {
-      summary.place = arguments.out;
-      if (const auto exported = Export(arguments, place, signals.token()); !exported) {
-        if (signals.signal() != 0) return StopCode(signals);
-        return Fail(exported.error());
-      }
-    }
-  }
-  fmt::print("{}\n", arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
-  if (!is_whole) {
-    std::fprintf(
-        stderr,
-        "terrace: the bake is not complete: %s of %s files are missing, and there is no manifest; run %s to go "
-        "on\n",
-        Grouped(plan.files - done).c_str(), Grouped(plan.files).c_str(),
-        arguments.finish ? "the shards that baked them again" : "the same command again");
-    return kExitFailure;
-  }
-  if (shard.count > 1) {
-    std::fprintf(
-        stderr,
-        "terrace: shard %u of %u is done; when all are, run the same command with --finish instead of --shard\n",
-        shard.index, shard.count);
-  }
-  return kExitOk;
+  const PlacedBake bake{arguments, pipeline, targets, place, identity, plan, options, shard, signals};
+  return worker.empty() ? BakeAlone(bake) : BakeJob(bake, worker);
 }
 
 // 10^9 tiles are the planet at 30 m a few times over: more is likely a mistake.

@@ -5,8 +5,8 @@
 
 namespace terrace::cli {
 
-// Returns the exit code: 0 the bake is complete, or the shard is; 1 units failed or are missing; 2 the arguments make
-// no sense; 128 and the number of the signal that stopped it.
+// Returns the exit code: 0 the bake, or its shard, is complete; 1 units failed or are missing; 2 the arguments are
+// wrong; 128 plus the number of the signal that stopped it.
 int Bake(const BakeArguments& arguments);
 
 }  // namespace terrace::cli

@@ -17,6 +17,7 @@
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/bake/bake_queue.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/progress.h"
 
 namespace terrace::cli {
 namespace {

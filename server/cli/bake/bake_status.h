@@ -7,11 +7,12 @@ namespace terrace::cli {
 
 struct StatusView {
   bool json = false;
-  bool watch = false;   // again and again until the job has ended
-  bool remove = false;  // forgets the job instead
+  bool watch = false;   // prints repeatedly until the job has ended
+  bool remove = false;  // removes the job instead
 };
 
-// Returns the exit code: 0; 1 there is no such job, it ended incomplete, or Redis cannot be reached; 2 the arguments.
+// Returns the exit code: 0; 1 there is no such job, it ended incomplete, or Redis cannot be reached; 2 the arguments
+// are wrong.
 int ShowStatus(const BakeArguments& arguments, const StatusView& view);
 
 }  // namespace terrace::cli

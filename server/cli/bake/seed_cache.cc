@@ -10,13 +10,13 @@
 #include <memory>
 #include <stop_token>
 #include <system_error>
-#include <thread>
 #include <utility>
 
 #include "archive/tile_writer.h"
 #include "bake/order.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/progress.h"
 #include "server/store/disk_cache.h"
 
 namespace terrace::cli {
@@ -24,21 +24,21 @@ namespace {
 
 using tiler::CacheKey;
 
-// What one seeding knows of its cache.
+// The cache that is filled.
 struct Seed {
   explicit Seed(const tiler::Dataset& seeded) : dataset(seeded) {}
 
   const tiler::Dataset& dataset;
   std::shared_ptr<tiler::TileStore> store;
   std::size_t capacity_bytes = 0;
-  std::atomic<std::uint64_t> bytes{0};  // in the cache, about
-  std::stop_source stop;                // also: the cache is full
+  std::atomic<std::uint64_t> bytes{0};  // in the cache, approximate
+  std::stop_source stop;                // requested by signals, and when the cache is full
 
-  // The cache deletes its oldest records when it is full, and a file of them at a time.
-  // As the server asks for the tile.
+  // The key under which a server looks the tile up.
   CacheKey KeyOf(const tiler::TileRequest& request) const {
     return {request, dataset.cache_generation(), tiler::TileEdits(*dataset.source, request)};
   }
+  // A full cache deletes a whole file of its oldest records: the margin keeps it from that.
   bool is_full() const { return bytes >= capacity_bytes - capacity_bytes / 8; }
 };
 
@@ -89,25 +89,8 @@ std::uint64_t BytesOfFiles(const std::filesystem::path& folder) {
   return bytes;
 }
 
-}  // namespace
-
-std::vector<archive::Manifest> InCodings(const std::vector<archive::Manifest>& manifests,
-                                         const std::vector<tiler::Coding>& codings) {
-  std::vector<archive::Manifest> all;
-  for (const archive::Manifest& manifest : manifests) {
-    const bool is_compressed = manifest.kind.coding != tiler::Coding::kIdentity;
-    for (const tiler::Coding coding : is_compressed ? codings : std::vector{tiler::Coding::kIdentity}) {
-      all.push_back(manifest);
-      all.back().kind.coding = coding;
-    }
-  }
-  return all;
-}
-
-int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& limits,
-              const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets, const bake::Shard& shard,
-              const StopSignals& signals) {
-  const std::string& folder = arguments.into_cache;
+// Returns an exit code, after a message.
+int OpenSeed(const std::string& folder, const config::DiskCacheConfig& limits, Seed& seed) {
   config::DiskCacheConfig tiles_alone = limits;
   tiles_alone.directory = folder;
   tiles_alone.refinement_bytes = 0;
@@ -129,40 +112,18 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
     return cli::Fail(fmt::format("--into-cache: {}; a server must not run meanwhile", cache.error().message),
                      kExitUsage);
   }
-  Seed seed(pipeline.datasets().front());
   seed.store = cache->tiles;
   seed.capacity_bytes = limits.tile_bytes;
   seed.bytes = seed.store->stats().bytes;
-  if (!seed.store->stats().on) {
-    return cli::Fail(fmt::format("--into-cache {}: cannot be opened; see the warning above", folder), kExitFailure);
-  }
-  for (bake::Target& target : targets) {
-    target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::TileWriter>> {
-      return std::make_unique<SeedWriter>(seed, manifest);
-    };
-    target.has = [&seed](const tiler::TileRequest& request) {
-      return seed.store->Find(seed.KeyOf(request)).has_value();
-    };
-  }
-  const std::stop_callback stop(signals.token(), [&seed] { seed.stop.request_stop(); });
-  const bake::UnitPlan plan = bake::UnitPlan::Make(targets, shard);
-  bake::Counters counters;
-  bake::BakeOptions options;
-  options.threads = arguments.threads > 0 ? arguments.threads : std::max(std::thread::hardware_concurrency(), 1U);
-  options.stop = seed.stop.get_token();
-  std::vector<bake::UnitReport> reports;
-  {
-    const BakeDisplay display(pipeline.datasets().front().name, plan.tiles, plan.files, counters);
-    reports = bake::Bake(pipeline, targets, plan, options, counters);
-  }
-  seed.store->Flush();
+  if (seed.store->stats().on) return kExitOk;
+  return cli::Fail(fmt::format("--into-cache {}: cannot be opened; see the warning above", folder), kExitFailure);
+}
+
+// Prints the result of a run that was not stopped. Returns the exit code.
+int ReportSeed(const BakeArguments& arguments, const Seed& seed, const bake::UnitPlan& plan,
+               const std::vector<bake::UnitReport>& reports, const bake::Counters& counters) {
+  const std::string& folder = arguments.into_cache;
   const std::uint64_t built = counters.tiles, kept = counters.passed;
-  if (signals.signal() != 0) {
-    std::fprintf(stderr,
-                 "terrace: stopped after %s tiles, which stay in the cache; run the same command again to go on\n",
-                 Grouped(built).c_str());
-    return 128 + signals.signal();
-  }
   if (seed.is_full()) {
     return cli::Fail(fmt::format("{}: is full after {} of {} tiles; raise disk_cache.tile_bytes ({} now) in the "
                                  "configuration of the server, and give it with --config, or limit --levels or --bbox",
@@ -184,6 +145,55 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
                Bytes(static_cast<double>(counters.bytes)), Grouped(kept));
   }
   return is_whole ? kExitOk : kExitFailure;
+}
+
+}  // namespace
+
+std::vector<archive::Manifest> InCodings(const std::vector<archive::Manifest>& manifests,
+                                         const std::vector<tiler::Coding>& codings) {
+  std::vector<archive::Manifest> all;
+  for (const archive::Manifest& manifest : manifests) {
+    const bool is_compressed = manifest.kind.coding != tiler::Coding::kIdentity;
+    for (const tiler::Coding coding : is_compressed ? codings : std::vector{tiler::Coding::kIdentity}) {
+      all.push_back(manifest);
+      all.back().kind.coding = coding;
+    }
+  }
+  return all;
+}
+
+int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& limits,
+              const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets, const bake::Shard& shard,
+              const StopSignals& signals) {
+  Seed seed(pipeline.datasets().front());
+  if (const int code = OpenSeed(arguments.into_cache, limits, seed); code != kExitOk) return code;
+  for (bake::Target& target : targets) {
+    target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::TileWriter>> {
+      return std::make_unique<SeedWriter>(seed, manifest);
+    };
+    target.has = [&seed](const tiler::TileRequest& request) {
+      return seed.store->Find(seed.KeyOf(request)).has_value();
+    };
+  }
+  const std::stop_callback stop(signals.token(), [&seed] { seed.stop.request_stop(); });
+  const bake::UnitPlan plan = bake::UnitPlan::Make(targets, shard);
+  bake::Counters counters;
+  bake::BakeOptions options;
+  options.threads = ThreadsOf(arguments);
+  options.stop = seed.stop.get_token();
+  std::vector<bake::UnitReport> reports;
+  {
+    const BakeDisplay display(pipeline.datasets().front().name, plan.tiles, plan.files, counters);
+    reports = bake::Bake(pipeline, targets, plan, options, counters);
+  }
+  seed.store->Flush();
+  if (signals.signal() != 0) {
+    std::fprintf(stderr,
+                 "terrace: stopped after %s tiles, which stay in the cache; run the same command again to go on\n",
+                 Grouped(counters.tiles).c_str());
+    return 128 + signals.signal();
+  }
+  return ReportSeed(arguments, seed, plan, reports, counters);
 }
 
 }  // namespace terrace::cli

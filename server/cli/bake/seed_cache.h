@@ -19,8 +19,8 @@ std::vector<archive::Manifest> InCodings(const std::vector<archive::Manifest>& m
 
 // Builds the tiles of the targets that the cache in the folder `into_cache` does not have, under the keys by which a
 // server of this build finds them. `limits`: the server's disk_cache. Returns the exit code: 0 all tiles are there; 1
-// some are not, because they cannot be built, or the disk fails, or the cache has no room for them; 2 the folder is no
-// cache or in use; 128 and the number of the signal that stopped it.
+// some are not, because they cannot be built, the disk fails, or the cache has no room for them; 2 the folder is not a
+// cache or is in use; 128 plus the number of the signal that stopped it.
 int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& limits,
               const tiler::TilePipeline& pipeline, std::vector<bake::Target> targets, const bake::Shard& shard,
               const StopSignals& signals);

@@ -7,8 +7,8 @@
 
 namespace terrace::cli {
 
-// Create it before other threads: they inherit that the signals are blocked. The second signal ends the process at
-// once.
+// Blocks the signals in this thread and in threads that are created later, so create it first. The second signal ends
+// the process at once.
 class StopSignals {
  public:
   StopSignals();

@@ -261,6 +261,30 @@ int Mesh(const MeshArguments& arguments) {
   return kExitOk;
 }
 
+// Options of how triangles are connected.
+void AddCriterionOptions(CLI::App& command, MeshArguments& arguments) {
+  command
+      .add_option("--criterion", arguments.criterion,
+                  "How triangles are connected: delaunay, or data-dependent (fewer vertices for the same error, "
+                  "thinner triangles, about twice the time to mesh)")
+      ->check(OneOf({"delaunay", kDataDependent}))
+      ->type_name("NAME")
+      ->capture_default_str();
+  command
+      .add_option("--measure", arguments.measure,
+                  "With data-dependent: how the fit of two triangles is measured: sum-max, sum-squares, max-max or "
+                  "normals; by default sum-max")
+      ->check(OneOf(kMeasures))
+      ->type_name("NAME");
+  command
+      .add_option(
+          "--qthresh", arguments.qthresh,
+          "With data-dependent: weight of the shape of triangles against their fit: 0 uses the fit alone, 1 the "
+          "shape wherever it differs; by default 0.5")
+      ->check(NumberFrom(0, 1, "a number from 0 to 1"))
+      ->type_name("SHARE");
+}
+
 }  // namespace
 
 void AddMesh(CLI::App& app, int& exit_code) {
@@ -300,26 +324,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
                    "by default crs if the raster has one")
       ->check(OneOf({"pixel", "crs"}))
       ->type_name("pixel|crs");
-  command
-      ->add_option("--criterion", arguments->criterion,
-                   "How triangles are connected: delaunay, or data-dependent (fewer vertices for the same error, "
-                   "thinner triangles, about twice the time to mesh)")
-      ->check(OneOf({"delaunay", kDataDependent}))
-      ->type_name("NAME")
-      ->capture_default_str();
-  command
-      ->add_option("--measure", arguments->measure,
-                   "With data-dependent: how the fit of two triangles is measured: sum-max, sum-squares, max-max or "
-                   "normals; by default sum-max")
-      ->check(OneOf(kMeasures))
-      ->type_name("NAME");
-  command
-      ->add_option(
-          "--qthresh", arguments->qthresh,
-          "With data-dependent: weight of the shape of triangles against their fit: 0 uses the fit alone, 1 the "
-          "shape wherever it differs; by default 0.5")
-      ->check(NumberFrom(0, 1, "a number from 0 to 1"))
-      ->type_name("SHARE");
+  AddCriterionOptions(*command, *arguments);
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh is the same with any number")
       ->check(NumberFrom(1, 256, "a number from 1 to 256"))
       ->type_name("N")

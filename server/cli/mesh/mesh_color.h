@@ -1,4 +1,4 @@
-// `terrace mesh` with colours: of a DEM and an image that covers it, or of an image.
+// `terrace mesh` with colours: of a DEM with an image that covers it, or of an image alone.
 #pragma once
 
 #include <string>

@@ -271,7 +271,8 @@ int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
   return FinishOutput(kExitOk);
 }
 
-int Fail(const Error& error) {
+// Exit code 1, also for kInvalidArgument: the command line was accepted.
+int FailToStart(const Error& error) {
   std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
   return kExitFailure;
 }
@@ -290,7 +291,7 @@ int Serve(const ServeArguments& arguments) {
   SetUpLog(config.log_level, config.log_format);
   if (arguments.check_config) return CheckConfig(arguments, config);
   const Result<std::optional<int>> passed = TakeListenSocket();
-  if (!passed) return Fail(passed.error());
+  if (!passed) return FailToStart(passed.error());
   // Until handlers are installed, these signals would end the process; log rotation may send them while sources are
   // being opened.
   MaskSignals(SIG_BLOCK, kAnsweredSignals);
@@ -311,14 +312,14 @@ int Serve(const ServeArguments& arguments) {
   ShutdownWatchdog watchdog;  // first, because it limits how long the others take to end
   Result<server::DiskCache> disk;
   if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
-  if (!disk) return Fail(disk.error());
+  if (!disk) return FailToStart(disk.error());
   // Archives first: the disk cache then keeps no copies of their tiles.
   const auto baked = std::make_shared<server::BakedStore>();
   options.tile_stores.push_back(baked);
   if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
   if (!config.shared_cache.url.empty()) {
     auto shared = server::OpenSharedCache(config.shared_cache, WorkerThreads(config));
-    if (!shared) return Fail(shared.error());
+    if (!shared) return FailToStart(shared.error());
     options.tile_stores.push_back(*std::move(shared));
   }
   options.refinements =
@@ -343,7 +344,7 @@ int Serve(const ServeArguments& arguments) {
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
   // Listens before sources are opened, which may take long; requests wait meanwhile.
   auto started = server::Server::Start(nullptr, options);
-  if (!started) return Fail(started.error());
+  if (!started) return FailToStart(started.error());
   const std::unique_ptr<server::Server> server = *std::move(started);
   NotifyOpening();
 
@@ -397,7 +398,7 @@ int Serve(const ServeArguments& arguments) {
   hooks.tell = [&](const std::map<std::string, std::string>& problems) { server->SetProblems(problems); };
   reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
   if (const Result<void> served = server->Replace(catalog_of(datasets), config); !served) {
-    return Fail(served.error());
+    return FailToStart(served.error());
   }
   datasets.clear();  // replaced files must not stay open
   reloader->Start(config.watch);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 #include <set>
@@ -110,6 +112,74 @@ TEST(BoxIndex, HasAnyWhereItFindsSome) {
   EXPECT_GT(with, 0);
   EXPECT_LT(with, 300);
   EXPECT_FALSE(BoxIndex().Any(box()));
+}
+
+// The algorithm without what is remembered: each ear is looked for from the first corner on.
+std::vector<std::array<std::uint32_t, 3>> EarsOf(const std::vector<PlanPoint>& ring) {
+  const auto cross = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    return (ring[b].x - ring[a].x) * (ring[c].y - ring[a].y) - (ring[b].y - ring[a].y) * (ring[c].x - ring[a].x);
+  };
+  double twice = 0;
+  for (std::uint32_t i = 0; i + 1 < ring.size(); ++i) twice += cross(0, i, i + 1);
+  const double sign = twice < 0 ? -1 : 1;
+  std::vector<std::uint32_t> left(ring.size());
+  for (std::uint32_t i = 0; i < left.size(); ++i) left[i] = i;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  while (left.size() >= 3) {
+    const std::size_t n = left.size();
+    std::size_t i = 0;
+    for (; i < n; ++i) {
+      const std::uint32_t a = left[(i + n - 1) % n], b = left[i], c = left[(i + 1) % n];
+      const double area = sign * cross(a, b, c);
+      if (area < 0 || (area == 0 && n > 3)) continue;
+      const auto is_inside = [&](std::uint32_t k) {
+        return k != a && k != b && k != c && sign * cross(a, b, k) >= 0 && sign * cross(b, c, k) >= 0 &&
+               sign * cross(c, a, k) >= 0;
+      };
+      if (std::ranges::none_of(left, is_inside)) break;
+    }
+    if (i == n) return {};
+    const std::array<std::uint32_t, 3> triangle = {left[(i + n - 1) % n], left[i], left[(i + 1) % n]};
+    if (cross(triangle[0], triangle[1], triangle[2]) != 0) triangles.push_back(triangle);
+    left.erase(left.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  return triangles;
+}
+
+TEST(CutEars, FindsTheEarsThatASearchFromTheStartFinds) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> radius(20, 100);
+  for (int k = 0; k < 200; ++k) {
+    const int corners = 3 + k % 40;
+    std::vector<PlanPoint> ring;
+    for (int i = 0; i < corners; ++i) {
+      const double angle = (k % 2 == 0 ? 1 : -1) * 2 * 3.14159265358979 * i / corners, r = radius(random);
+      // Rounded to few places, so that corners lie on lines and on each other's edges.
+      ring.push_back({std::round(r * std::cos(angle)), std::round(r * std::sin(angle))});
+    }
+    EXPECT_EQ(CutEars(ring), EarsOf(ring)) << k;
+  }
+}
+
+// A comb of a thousand deep teeth: most corners have another in their triangle.
+TEST(CutEars, TakesFiveThousandCorners) {
+  std::vector<PlanPoint> ring = {{0, 0}, {5'000, 0}};
+  for (int i = 2'499; i > 0; --i) {
+    ring.push_back({2.0 * i + 1, 1'000});
+    ring.push_back({2.0 * i, 1.0 + i % 7});
+  }
+  const auto triangles = CutEars(ring);
+  ASSERT_EQ(triangles.size(), ring.size() - 2);
+  double area = 0, of_ring = 0;
+  const auto cross = [](PlanPoint a, PlanPoint b, PlanPoint c) {
+    return (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+  };
+  for (const auto& [a, b, c] : triangles) {
+    EXPECT_GT(cross(ring[a], ring[b], ring[c]), 0);
+    area += cross(ring[a], ring[b], ring[c]);
+  }
+  for (std::size_t i = 1; i + 1 < ring.size(); ++i) of_ring += cross(ring[0], ring[i], ring[i + 1]);
+  EXPECT_NEAR(area, of_ring, 1e-6 * of_ring);
 }
 
 using Nodes = std::set<std::pair<std::int64_t, std::int64_t>>;

@@ -8,7 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "engine/dem/crs/geoid.h"
 #include "engine/dem/dem_source.h"
+#include "engine/geo/error_ladder.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -169,6 +171,39 @@ TEST_F(TerrainEdits, ShowInNodesAndPixels) {
   EXPECT_NE(source->fingerprint(), source->unedited_fingerprint());
 }
 
+// The source fills a part of the window. Where neither it nor an edit has a height, maps have none.
+TEST_F(TerrainEdits, ShowInMapPixelsAndLeaveTheRestAsItIs) {
+  const auto plain = OpenOrFail(slope_);
+  const auto edited = Open(Middle(R"({"op":"offset","metres":50})") + "," +
+                           Rectangle(R"({"op":"flatten","height":30})", 9.9, 50.1, 10.05, 50.2));
+  ASSERT_NE(edited, nullptr);
+  const int depth = 10;
+  const double pixels = 256.0 * 1024;
+  const NodeWindow window{static_cast<std::int64_t>((9.8 + 180) / 360 * pixels), 88'400, 600, 600};
+  const auto before = plain->ReadMercator(depth, window), after = edited->ReadMercator(depth, window);
+  ASSERT_TRUE(before && after);
+  for (const HeightDatum datum : {HeightDatum::kEllipsoid, HeightDatum::kSource}) {
+    const auto unedited = plain->ReadKnownMercator(depth, window, datum);
+    const auto known = edited->ReadKnownMercator(depth, window, datum);
+    ASSERT_TRUE(unedited && known);
+    int voids = 0, changed = 0, made = 0;
+    for (std::size_t i = 0; i < known->size(); ++i) {
+      if (std::isnan((*unedited)[i])) {
+        ASSERT_EQ((*before)[i], static_cast<float>(plain->info().floor));
+        ++(std::isnan((*known)[i]) ? voids : made);
+      } else {
+        ASSERT_EQ((*unedited)[i], (*before)[i]);
+      }
+      if (std::isnan((*known)[i])) continue;
+      ASSERT_NEAR((*known)[i], (*after)[i], 1e-4);
+      changed += (*after)[i] != (*before)[i] ? 1 : 0;
+    }
+    EXPECT_GT(voids, 10'000);
+    EXPECT_GT(changed, 1000);
+    EXPECT_GT(made, 100) << "an edit beside the source";
+  }
+}
+
 TEST_F(TerrainEdits, HeightsLieWithinRangeBounds) {
   const auto source =
       Open(Middle(R"({"op":"offset","metres":600,"blend_m":500})") + "," +
@@ -267,6 +302,147 @@ TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
   }
   EXPECT_GT(same, 0);
   EXPECT_GT(changed, 0);
+}
+
+// Deeper levels exist around the edit alone, with all ancestors and siblings, and lattices become finer on them.
+TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
+  const auto plain = OpenOrFail(slope_);
+  const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.5,"blend_m":300})", 10.35, 50.35, 10.36, 50.352));
+  const auto coarse = Open(Rectangle(R"({"op":"precision","error_m":50})", 10.35, 50.35, 10.36, 50.352));
+  ASSERT_TRUE(plain && edited && coarse);
+  const int finest = plain->max_level();
+  EXPECT_EQ(plain->finest_level(), finest);
+  EXPECT_EQ(coarse->Availability(), plain->Availability());
+  EXPECT_EQ(edited->finest_level(), finest);
+  EXPECT_GT(edited->max_level(), finest + 2);
+  EXPECT_LE(geo::DefaultError(edited->max_level()), 0.5);
+  EXPECT_GT(geo::DefaultError(edited->max_level() - 1), 0.5);
+  std::int64_t tiles = 0;
+  for (int level = 0; level <= edited->max_level(); ++level) {
+    if (level <= finest) {
+      EXPECT_EQ(edited->Available(level), plain->Available(level));
+      EXPECT_EQ(edited->LatticeOf(level).cells, plain->LatticeOf(level).cells);
+    } else {
+      EXPECT_EQ(edited->LatticeOf(level).StepDegrees(), edited->LatticeOf(level - 1).StepDegrees() / 2);
+    }
+    const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+    for (const geo::TileRange& range : edited->Available(level)) {
+      for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+        for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+          if (level > 0) {
+            EXPECT_TRUE(edited->IsAvailable({level - 1, x / 2, y / 2}));
+            for (const std::int64_t i : {0, 1, 2, 3})
+              EXPECT_TRUE(edited->IsAvailable({level, x / 2 * 2 + i % 2, y / 2 * 2 + i / 2}));
+          }
+          if (level <= finest) continue;
+          ++tiles;
+          // No further away than a sibling of a tile that touches it.
+          const double west = static_cast<double>(x) * side - 180, south = static_cast<double>(y) * side - 90;
+          EXPECT_TRUE(west + 3 * side > 10.35 && west - 2 * side < 10.36 && south + 3 * side > 50.35 &&
+                      south - 2 * side < 50.352);
+        }
+      }
+    }
+  }
+  EXPECT_GT(tiles, 50);
+  // Every tile of the deepest level that meets the polygon exists.
+  const int level = edited->max_level();
+  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+  for (double latitude = 50.35; latitude < 50.352; latitude += side / 2) {
+    for (double longitude = 10.35; longitude < 10.36; longitude += side / 2) {
+      EXPECT_TRUE(edited->IsAvailable({level, static_cast<std::int64_t>((longitude + 180) / side),
+                                       static_cast<std::int64_t>((latitude + 90) / side)}));
+    }
+  }
+  const geo::TileKey here{finest, static_cast<std::int64_t>((10.355 + 180) / 180 * double(geo::TileRows(finest))),
+                          static_cast<std::int64_t>((50.351 + 90) / 180 * double(geo::TileRows(finest)))};
+  const geo::TileKey there{finest, here.x - 3, here.y};
+  EXPECT_NE(edited->DeeperTilesOf(here), 0u);
+  EXPECT_EQ(edited->DeeperTilesOf(there), 0u);
+  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(here).size()), edited->max_level() + 1);
+  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(there).size()), finest + 1);
+  EXPECT_EQ(plain->ContentBelow(there, finest), edited->ContentBelow(there, finest));
+}
+
+TEST_F(TerrainEdits, GoNoDeeperThanSixLevels) {
+  const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.001})", 10.35, 50.35, 10.3502, 50.3502));
+  ASSERT_NE(edited, nullptr);
+  EXPECT_EQ(edited->max_level(), edited->finest_level() + 6);
+}
+
+// The geoid lies 47 m above the ellipsoid here, by EGM96; PROJ is asked apart from the code under test.
+TEST_F(TerrainEdits, CountFromTheGeoidOfTheSources) {
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {10, 50});
+  ASSERT_TRUE(geoid.has_value()) << geoid.error().message;
+  DemOptions options;
+  options.source.vertical = "egm96";
+  const auto open = [&](const std::string& terrain, const std::string& common = "") {
+    const std::string path = dir_.File("datum.geojson");
+    std::ofstream(path) << R"({"type":"FeatureCollection",)" << common << R"("features":[)" << Middle(terrain) << "]}";
+    options.edits = {path};
+    return OpenOrFail(slope_, options);
+  };
+  const std::string of_all = R"("terrain":{"vertical":"orthometric"},)";
+  const auto stated = open(R"({"op":"flatten","height":500,"vertical":"orthometric","blend_m":200})");
+  const auto of_file = open(R"({"op":"flatten","height":500,"blend_m":200})", of_all);
+  const auto own = open(R"({"op":"flatten","height":500,"vertical":"ellipsoid","blend_m":200})", of_all);
+  const auto plane = open(R"({"op":"slope","heights":[100,200,null,100],"vertical":"orthometric"})");
+  const auto mean = open(R"({"op":"flatten","height":"mean","vertical":"orthometric"})");
+  ASSERT_TRUE(stated && of_file && own && plane && mean);
+  EXPECT_EQ(stated->fingerprint(), of_file->fingerprint());
+  EXPECT_NE(stated->fingerprint(), own->fingerprint());
+  for (const GeoPosition at : {GeoPosition{10.151, 50.151}, GeoPosition{10.2, 50.2}, GeoPosition{10.249, 50.24}}) {
+    const double undulation = (*geoid)->Undulation({at.longitude, at.latitude});
+    EXPECT_GT(undulation, 40);
+    EXPECT_NEAR(At(*stated, at.longitude, at.latitude), 500 + undulation, 0.01);
+    EXPECT_EQ(At(*own, at.longitude, at.latitude), 500);
+    const double on_plane = 100 + (at.longitude - 10.15) * 1000;
+    EXPECT_NEAR(At(*plane, at.longitude, at.latitude), on_plane + undulation, 0.01);
+    EXPECT_NEAR(At(*mean, at.longitude, at.latitude), 299.5 + undulation, 0.02);
+    const auto above = stated->ReadPoints(std::array{at}, HeightDatum::kOrthometric);
+    ASSERT_TRUE(above.has_value());
+    EXPECT_NEAR(static_cast<double>(above->front()), 500, 0.01);
+  }
+  EXPECT_GE(stated->info().heights.max, 500 + 40);
+}
+
+TEST_F(TerrainEdits, RefuseDatumsThatTheyDoNotKnow) {
+  const std::string message = MessageOf(Middle(R"({"op":"flatten","height":500,"vertical":"orthometrc"})") + "," +
+                                        Middle(R"({"op":"offset","metres":5,"vertical":"orthometric"})") + "," +
+                                        Middle(R"({"op":"flatten","height":500,"vertical":"orthometric"})") +
+                                        R"(],"terrain":{"vertical":"msl","datum":1},"a":[)");
+  for (const char* part :
+       {"feature 0 at", "did you mean \"orthometric\"?", "feature 1 at", "vertical is of heights, and offset has none",
+        "feature 2 at", "vertical datum of the source there is not known", "vertical is \"msl\"",
+        "unknown member \"datum\""}) {
+    EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
+  }
+}
+
+// A mean is part of the edit's hash after it is known: a source that changes it changes the tiles of all of the
+// polygon.
+TEST_F(TerrainEdits, HaveAnotherHashIfTheMeanChanges) {
+  const auto open = [&](double height_in_the_west) {
+    RasterSpec spec;
+    spec.width = spec.height = 400;
+    spec.geo_transform = {10, 0.001, 0, 50.4, 0, -0.001};
+    spec.value = [&](int column, int) { return column < 180 ? height_in_the_west : 100.0 + column; };
+    DemOptions options;
+    options.edits = {WriteEdits(dir_, Middle(R"({"op":"flatten","height":"mean"})"))};
+    return OpenOrFail(WriteRaster(dir_, spec, "half.tif"), options);
+  };
+  const auto low = open(100);
+  ASSERT_NE(low, nullptr);
+  const geo::TileKey in_the_east{12, static_cast<std::int64_t>((10.24 + 180) / 180 * 4096),
+                                 static_cast<std::int64_t>((50.2 + 90) / 180 * 4096)};
+  const std::uint64_t before = low->EditsOf(in_the_east);
+  const ContentHash content = low->ContentBelow(in_the_east, 12);
+  const auto high = open(130);
+  ASSERT_NE(high, nullptr);
+  EXPECT_NE(before, 0u);
+  EXPECT_NE(high->EditsOf(in_the_east), before);
+  EXPECT_FALSE(high->ContentBelow(in_the_east, 12) == content);
+  EXPECT_NE(high->fingerprint(), low->fingerprint());
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <functional>
 #include <thread>
 
+#include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -214,6 +215,78 @@ TEST(Imagery, ReadsARealPhotoOfARealModel) {
     EXPECT_GT(std::count_if(picture->rgb.begin(), picture->rgb.end(), [](int level) { return level != 188; }), 3000);
   }
   EXPECT_GT(pictures, 0);
+}
+
+TEST(Imagery, MapPicturesOfTerrainTilesAreTheirTextures) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec(2);
+  spec.nodata = 0;
+  spec.color = [](int column, int row) { return column < 100 ? Color{0, 0, 0} : Color{column % 256, row % 256, 7}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  for (const geo::TileKey& key : {kTile, geo::TileKey{5, 32, 16}, geo::TileKey{8, 65 * 4 + 1, 32 * 4 + 2}}) {
+    const auto texture = ReadOrFail(*imagery, key, 256);
+    const auto map = imagery->ReadGeodetic(key, 256);
+    ASSERT_TRUE(texture && map);
+    for (std::size_t i = 0; i < 65536; ++i) {
+      const std::uint8_t* const rgba = map->rgba.data() + 4 * i;
+      ASSERT_TRUE(rgba[3] == 0 || rgba[3] == 255);
+      const Color own = rgba[3] == 0 ? kNone : Color{rgba[0], rgba[1], rgba[2]};
+      ASSERT_EQ(own, At(*texture, static_cast<int>(i / 256), static_cast<int>(i % 256))) << i;
+    }
+  }
+  EXPECT_EQ(imagery->ReadGeodetic({6, 3, 3}, 256)->rgba, std::vector<std::uint8_t>(4 * 65536)) << "transparent";
+}
+
+// The image tells its own position: a column is 2.8125 / 256 degrees.
+TEST(Imagery, MercatorPixelsShowTheirPlace) {
+  const TempDir dir;
+  ImageSpec spec = TileSpec();
+  spec.color = [](int column, int row) { return Color{column, row, 9}; };
+  const auto imagery = OpenImage(WriteImage(dir, spec));
+  const ImageExtent extent = imagery->extent();
+  EXPECT_NEAR(extent.bounds.west, 2.8125, 1e-9);
+  EXPECT_NEAR(extent.bounds.north, 2.8125, 1e-9);
+  EXPECT_EQ(extent.max_geodetic_level, 6);
+  EXPECT_EQ(extent.max_mercator_depth, 8) << "as for heights: its rows are a little closer than pixels of depth 7";
+  const geo::MercatorGrid grid{7};
+  const std::int64_t column = 65 * 256, row = 62 * 256 + 128;
+  const auto picture = imagery->ReadMercator(7, column, row, 256);
+  ASSERT_TRUE(picture) << picture.error().message;
+  int shown = 0;
+  for (int y = 0; y < 256; ++y) {
+    for (int x = 0; x < 256; ++x) {
+      const std::uint8_t* const rgba = picture->rgba.data() + 4 * (256 * y + x);
+      const double degrees = 2.8125 / 256;
+      const double east = (grid.Longitude(column + x) - 2.8125) / degrees,
+                   south = (2.8125 - grid.Latitude(row + y)) / degrees;
+      const bool is_inside = east > 0 && east < 256 && south > 0 && south < 256;
+      ASSERT_EQ(rgba[3], is_inside ? 255 : 0) << x << " " << y;
+      if (!is_inside) continue;
+      ++shown;
+      ASSERT_NEAR(rgba[0], std::clamp(east - 0.5, 0.0, 255.0), 0.51);
+      ASSERT_NEAR(rgba[1], std::clamp(south - 0.5, 0.0, 255.0), 0.51);
+    }
+  }
+  EXPECT_GT(shown, 10'000);
+}
+
+TEST(Imagery, MercatorPixelsAreAveragesAndDoNotDependOnTheTile) {
+  for (const bool has_overviews : {false, true}) {
+    const TempDir dir;
+    ImageSpec spec = TileSpec(8);
+    if (has_overviews) spec.overviews = {2, 4, 8};
+    spec.color = [](int column, int row) { return Color{(column + row) % 2 * 200, 40, 7}; };
+    const auto imagery = OpenImage(WriteImage(dir, spec));
+    const auto whole = imagery->ReadMercator(7, 65 * 256, 63 * 256, 256);
+    const auto part = imagery->ReadMercator(7, 65 * 256 + 64, 63 * 256 + 128, 64);
+    ASSERT_TRUE(whole && part);
+    for (std::size_t y = 0; y < 64; ++y) {
+      for (std::size_t i = 0; i < 4 * 64; ++i) {
+        ASSERT_EQ(part->rgba[4 * 64 * y + i], whole->rgba[4 * (256 * (y + 128) + 64) + i]);
+      }
+    }
+    EXPECT_NEAR(whole->rgba[4 * (256 * 128 + 128)], 100, 2) << "not one of the pixels";
+  }
 }
 
 TEST(Imagery, AnImageOfAnotherPlaceIsRefused) {

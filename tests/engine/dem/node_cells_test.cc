@@ -205,6 +205,28 @@ TEST(NodeRows, RoundsAsSingleHeights) {
   });
 }
 
+TEST(NodeRows, VoidsAreCountedAndWantedWhereNodesAreInside) {
+  std::mt19937 random(7);
+  tin::ForEachInstructionSet([&] {
+    for (std::size_t count = 0; count < 70; ++count) {
+      const unsigned voids = 1 + count % 9;  // one of so many
+      std::vector<float> heights(count);
+      std::vector<std::uint8_t> inside(count), wanted(count, 7), expected(count);
+      std::size_t counted = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const bool is_void = random() % voids == 0;
+        heights[i] = is_void ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(random() % 100);
+        inside[i] = random() % 3 != 0 ? 1 : 0;
+        counted += is_void ? 1 : 0;
+        expected[i] = is_void && inside[i] != 0 ? 1 : 0;
+      }
+      EXPECT_EQ(CountVoids(heights), counted);
+      EXPECT_EQ(WantVoids(inside, heights, wanted), std::ranges::count(expected, std::uint8_t{1}) > 0) << count;
+      EXPECT_EQ(wanted, expected);
+    }
+  });
+}
+
 TEST(NodeRows, PlacesAreThoseOfCells) {
   tin::ForEachInstructionSet([] {
     int known = 0, asked = 0;

@@ -211,6 +211,12 @@ TEST(VerticalDatum, TilesBoundsAndMercatorPixelsAreConvertedAlike) {
     const Position node{grid.Longitude(window.column + i % 64), grid.Latitude(window.row + i / 64)};
     EXPECT_NEAR((*after)[i], (*before)[i] + Egm96At(node), .004);
   }
+  // Contours have the heights of the source.
+  const auto lines = converted->ReadKnownMercator(12, window, HeightDatum::kSource);
+  ASSERT_TRUE(lines);
+  for (std::size_t i = 0; i < lines->size(); ++i) {
+    if (!std::isnan((*lines)[i])) EXPECT_EQ((*lines)[i], (*before)[i]);
+  }
 }
 
 TEST(VerticalDatum, NeighboursAgreeOnTheirEdge) {

@@ -38,6 +38,34 @@ TEST(FillVoids, ReproducesAPlane) {
   }
 }
 
+// A row at a time, a window has too few voids to mark those that cannot be bridged.
+TEST(FillVoids, IsTheSameForManyVoidsAndForFew) {
+  constexpr int kColumns = 70, kRows = 50;
+  std::mt19937 random(8);
+  const GridWindow whole{0, 0, kColumns, kRows};
+  int bridged = 0, left = 0;
+  for (const unsigned scarcity : {2U, 20U, 200U, 1500U}) {
+    for (const int gap : {2, 5, 16, 64}) {
+      std::vector<float> heights(kColumns * kRows, kVoid);
+      for (float& height : heights) {
+        if (random() % scarcity == 0) height = static_cast<float>(random() % 1000) / 7;
+      }
+      const std::vector<float> filled = FillVoids(heights, whole, whole, gap);
+      for (int row = 0; row < kRows; ++row) {
+        const std::vector<float> alone = FillVoids(heights, whole, {0, row, kColumns, 1}, gap);
+        for (int column = 0; column < kColumns; ++column) {
+          const float a = filled[static_cast<std::size_t>(row * kColumns + column)];
+          const float b = alone[static_cast<std::size_t>(column)];
+          ASSERT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << column << " " << row << " " << gap;
+          (std::isnan(a) ? left : bridged) += 1;
+        }
+      }
+    }
+  }
+  EXPECT_GT(bridged, 1000);
+  EXPECT_GT(left, 1000);
+}
+
 TEST(FillVoids, DoesNotDependOnTheWindow) {
   constexpr int kSide = 60, kGap = 9;
   std::mt19937 random(3);

@@ -60,6 +60,14 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(glb->key, route->key);
   EXPECT_EQ(glb->format->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(Routes().Match("/maui/3/7/0.png")->format->format, tiler::TileFormat::kHeightPng);
+  EXPECT_EQ(Routes().Match("/maui/hillshade/3/7/0.webp")->format->picture, proto::PictureFormat::kWebp);
+  EXPECT_EQ(Routes().Match("/maui/contours/3/7/0.mvt")->format->format, tiler::TileFormat::kContours);
+  EXPECT_EQ(Routes().Match("/maui/imagery/3/7/0.jpg")->format->format, tiler::TileFormat::kImagery);
+  const Result<Route> geodetic = Routes().Match("/maui/imagery/geodetic/3/15/7.webp");
+  ASSERT_TRUE(geodetic) << "two roots";
+  EXPECT_EQ(geodetic->format->format, tiler::TileFormat::kGeodeticImagery);
+  EXPECT_EQ(geodetic->key, (geo::TileKey{3, 15, 7}));
+  EXPECT_EQ(Routes().Match("/maui/slope/tiles.json")->format->format, tiler::TileFormat::kSlope);
   EXPECT_EQ(Routes().Match("/viewer/a/b.js")->file, "a/b.js");
   EXPECT_EQ(Routes().Match("/")->file, "index.html");
   EXPECT_EQ(Routes().Match("/viewer/")->file, "index.html");
@@ -93,6 +101,15 @@ TEST(Router, RefusesWhatIsNoUrl) {
       "/maui/1/0/2.png",
       "/maui/1/2/0.png",
       "/maui/25/0/0.png",
+      "/maui/hillshade/0/1/0.png",
+      "/maui/hillshade/0/0/0.jpg",
+      "/maui/slope/0/0/0.mvt",
+      "/maui/contours/0/0/0.png",
+      "/maui/shade/0/0/0.png",
+      "/maui/imagery/geodetic/0/2/0.webp",
+      "/maui/hillshade/geodetic/0/0/0.png",
+      "/maui/imagery/geodetic/tiles.json",
+      "/maui/hillshade/layer.json",
       "/tiles.json",
       "/maui/heights/",
       "/maui/0/0/.terrain",

@@ -210,6 +210,59 @@ TEST(NegotiateTile, HeightTilesAreThoseThatMeetTheBounds) {
   EXPECT_EQ(find("/maui/0/0/0.png?size=3").error().code, ErrorCode::kInvalidArgument);
 }
 
+TEST(NegotiateTile, MapTilesAreCanonical) {
+  std::array<DatasetView, 2> datasets;
+  datasets[0].name = "maui";
+  datasets[0].max_mercator_depth = 12;
+  datasets[1] = datasets[0];
+  datasets[1].name = "photo";
+  datasets[1].imagery = dem::ImageExtent{{170, 10, -160, 20}, 5, 4};
+  const auto find = [&](const char* target) {
+    Request request;
+    request.fields.Set(&RequestFields::accept_encoding, "gzip");
+    return NegotiateTile(TestContext(target, request).context, datasets);
+  };
+  const auto same = [&](const char* a, const char* b) {
+    const auto one = find(a), other = find(b);
+    EXPECT_TRUE(one && other) << a;
+    return one && other && *one == *other;
+  };
+  EXPECT_TRUE(same("/maui/hillshade/3/1/1.png",
+                   "/maui/hillshade/3/1/1.png?azimuth=315&altitude=45&zfactor=1.001&size=256&v=1"));
+  EXPECT_TRUE(same("/maui/hillshade/3/1/1.png?azimuth=0", "/maui/hillshade/3/1/1.png?azimuth=360"));
+  EXPECT_FALSE(same("/maui/hillshade/3/1/1.png", "/maui/hillshade/3/1/1.webp"));
+  EXPECT_TRUE(same("/maui/slope/3/1/1.png", "/maui/slope/3/1/1.png?style=colors"));
+  EXPECT_TRUE(same("/maui/contours/12/1/1.mvt", "/maui/contours/12/1/1.mvt?interval=50"));
+  EXPECT_EQ(find("/maui/contours/12/1/1.mvt")->coding, tiler::Coding::kGzip);
+  EXPECT_EQ(find("/maui/hillshade/3/1/1.png")->coding, tiler::Coding::kIdentity);
+  EXPECT_EQ(find("/maui/contours/12/1/1.mvt?interval=2.5")->map.interval_cm, 250u);
+  for (const char* wrong :
+       {"/maui/contours/12/1/1.mvt?interval=2.4", "/maui/contours/12/1/1.mvt?interval=0.04",
+        "/maui/contours/12/1/1.mvt?interval=10001", "/maui/contours/12/1/1.mvt?interval=nan",
+        "/maui/contours/12/1/1.mvt?size=512", "/maui/hillshade/3/1/1.png?azimuth=-1",
+        "/maui/hillshade/3/1/1.png?azimuth=1.5", "/maui/hillshade/3/1/1.png?zfactor=0.004",
+        "/maui/hillshade/3/1/1.png?zfactor=1e300", "/maui/hillshade/3/1/1.png?format=png",
+        "/maui/slope/3/1/1.png?style=degrees&style=degrees", "/photo/imagery/0/0/0.jpg?quality=9"}) {
+    const auto tile = find(wrong);
+    ASSERT_FALSE(tile) << wrong;
+    EXPECT_EQ(tile.error().code, ErrorCode::kInvalidArgument) << wrong;
+  }
+  for (const char* there :
+       {"/photo/imagery/5/31/14.webp", "/photo/imagery/5/1/15.jpg", "/photo/imagery/4/15/7.jpg?size=512",
+        "/photo/imagery/geodetic/4/31/9.webp", "/photo/imagery/geodetic/4/0/9.webp", "/photo/hillshade/12/5/5.png"}) {
+    const auto tile = find(there);
+    EXPECT_TRUE(tile) << there;
+  }
+  for (const char* missing :
+       {"/photo/imagery/5/16/14.webp", "/photo/imagery/6/63/29.webp", "/photo/imagery/5/31/14.webp?size=512",
+        "/photo/imagery/geodetic/4/16/9.webp", "/photo/imagery/geodetic/5/63/19.webp", "/maui/imagery/0/0/0.webp",
+        "/maui/imagery/geodetic/0/0/0.webp", "/maui/hillshade/13/5/5.png", "/maui/hillshade/12/5/5.png?size=512"}) {
+    const auto tile = find(missing);
+    ASSERT_FALSE(tile) << missing;
+    EXPECT_EQ(tile.error().code, ErrorCode::kNotFound) << missing;
+  }
+}
+
 TEST(NegotiateTile, MakesACanonicalRequest) {
   std::array<DatasetView, 2> datasets;
   datasets[0].name = "etopo";

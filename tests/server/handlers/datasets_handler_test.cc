@@ -41,6 +41,8 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"tiles", base + "/{z}/{x}/{y}.terrain?v=0a1b2c3d4e5f"},
                                              {"tiles_json", base + "/tiles.json"},
                                              {"heights", base + "/heights"},
+                                             {"grid", base + "/grid"},
+                                             {"sight", base + "/sight"},
                                              {"mesh", base + "/mesh"}}));
 }
 

@@ -25,6 +25,12 @@ class TileJsonHandlerTest : public testing::Test {
     const TestHandlers handlers(datasets_);
     return std::get<Response>(AnswerTileJson(handlers.all, TestContext(target, request).context));
   }
+  Response GetMap(const char* target) {
+    Request request;
+    request.fields.Set(&RequestFields::host, "h");
+    const TestHandlers handlers(datasets_);
+    return std::get<Response>(AnswerMapTileJson(handlers.all, TestContext(target, request).context));
+  }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 
   std::vector<DatasetView> datasets_{1};
@@ -51,6 +57,33 @@ TEST_F(TileJsonHandlerTest, WritesParametersIntoTheTemplate) {
   EXPECT_EQ(json["encoding"], "terrarium");
   EXPECT_EQ(Parse(Get("/a%20b/tiles.json?size=256&encoding=mapbox"))["tiles"][0],
             "http://example.test:8080/a%20b/{z}/{x}/{y}.png?v=0a1b2c3d4e5f");
+}
+
+TEST_F(TileJsonHandlerTest, DescribesLayersForMaps) {
+  auto json = Parse(GetMap("/a%20b/hillshade/tiles.json?altitude=30&zfactor=2.5"));
+  EXPECT_EQ(json["tiles"][0], "http://h/a%20b/hillshade/{z}/{x}/{y}.png?v=0a1b2c3d4e5f&altitude=30&zfactor=2.5");
+  EXPECT_EQ(json["type"], "raster");
+  EXPECT_FALSE(json.contains("encoding"));
+  json = Parse(GetMap("/a%20b/slope/tiles.json?format=webp&style=degrees&size=512"));
+  EXPECT_EQ(json["tiles"][0], "http://h/a%20b/slope/{z}/{x}/{y}.webp?v=0a1b2c3d4e5f&style=degrees&size=512");
+  EXPECT_EQ(json["format"], "webp");
+  EXPECT_EQ(json["maxzoom"], 11);
+  json = Parse(GetMap("/a%20b/contours/tiles.json?interval=12.5"));
+  EXPECT_EQ(json["tiles"][0], "http://h/a%20b/contours/{z}/{x}/{y}.mvt?v=0a1b2c3d4e5f&interval=12.5");
+  EXPECT_EQ(json["vector_layers"][0]["id"], "contour");
+  EXPECT_EQ(json["type"], "vector");
+  EXPECT_EQ(GetMap("/a%20b/imagery/tiles.json").status, 404);
+  datasets_[0].imagery = dem::ImageExtent{{1, 2, 3, 4}, 9, 8};
+  datasets_[0].imagery_attribution = "A. Pilot";
+  json = Parse(GetMap("/a%20b/imagery/tiles.json?format=jpg"));
+  EXPECT_EQ(json["tiles"][0], "http://h/a%20b/imagery/{z}/{x}/{y}.jpg?v=0a1b2c3d4e5f");
+  EXPECT_EQ(json["bounds"], nlohmann::json({1, 2, 3, 4}));
+  EXPECT_EQ(json["maxzoom"], 9);
+  EXPECT_EQ(json["attribution"], "A. Pilot");
+  EXPECT_EQ(GetMap("/a%20b/imagery/tiles.json?format=png").status, 400);
+  EXPECT_EQ(GetMap("/a%20b/hillshade/tiles.json?format=jpg").status, 400);
+  EXPECT_EQ(GetMap("/a%20b/hillshade/tiles.json?interval=3").status, 400);
+  EXPECT_EQ(GetMap("/nope/slope/tiles.json").status, 404);
 }
 
 TEST_F(TileJsonHandlerTest, RefusesWhatItCannotServe) {

@@ -4,12 +4,15 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::tiler {
@@ -236,7 +239,9 @@ TEST_F(AreaMeshTest, ClipsToTheDataset) {
   area.west = -90;
   area.north = 89;
   area.error_m = 20;
-  for (const geo::Vec3& v : ReadObj(Build(area).bytes).vertices) {
+  const auto vertices = ReadObj(Build(area).bytes).vertices;
+  ASSERT_FALSE(vertices.empty());
+  for (const geo::Vec3& v : vertices) {
     ASSERT_GT(v.x, -84.43);
     ASSERT_LT(v.y, 36.46);
   }
@@ -316,6 +321,83 @@ TEST_F(AreaMeshTest, StopsWhenAsked) {
   const auto mesh = BuildAreaMesh(*source_, *plan, area_, stop.get_token());
   ASSERT_FALSE(mesh);
   EXPECT_EQ(mesh.error().code, ErrorCode::kCancelled);
+}
+
+// A rectangle in the middle of `area_`, with the edits in a file.
+class EditedAreaMesh : public AreaMeshTest {
+ protected:
+  void Edit(const std::string& terrain, const std::string& geometry) {
+    const std::string path = dir_.path() / "edits.geojson";
+    std::ofstream(path) << R"({"type":"FeatureCollection","features":[{"type":"Feature","properties":{"terrain":)"
+                        << terrain << R"(},"geometry":)" << geometry << "}]}";
+    dem::DemOptions options;
+    options.edits = {path};
+    auto opened = dem::DemSource::Open({{test_support::SourceDir() / "config/samples/jacksboro.tif"}}, options);
+    ASSERT_TRUE(opened) << opened.error().message;
+    source_ = *std::move(opened);
+  }
+  static constexpr const char* kPolygon =
+      R"({"type":"Polygon","coordinates":[[[-84.235,36.262],[-84.215,36.264],[-84.214,36.278],[-84.236,36.276],[-84.235,36.262]]]})";
+
+  const test_support::ScratchDirectory dir_;
+};
+
+TEST_F(EditedAreaMesh, KeepsThePrecisionAtEverySample) {
+  area_.error_m = 40;
+  const std::size_t plain = ReadObj(Build(area_).bytes).triangles.size();
+  Edit(R"({"op":"precision","error_m":0.5})", kPolygon);
+  for (const AreaCoordinates coordinates : {AreaCoordinates::kGeographic, AreaCoordinates::kEnu}) {
+    area_.coordinates = coordinates;
+    const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+    ASSERT_TRUE(plan);
+    const ObjMesh mesh = ReadObj(Build(area_).bytes);
+    EXPECT_GT(mesh.triangles.size(), 2 * plain);
+    if (coordinates != AreaCoordinates::kGeographic) continue;
+    const auto heights = source_->ReadNodes(plan->level, plan->window);
+    ASSERT_TRUE(heights);
+    const geo::Lattice lattice = source_->LatticeOf(plan->level);
+    int inside = 0;
+    for (int j = 0; j < plan->window.rows; ++j) {
+      for (int i = 0; i < plan->window.columns; ++i) {
+        const double x = lattice.Longitude(plan->window.column + i), y = lattice.Latitude(plan->window.row + j);
+        if (x < -84.234 || x > -84.216 || y < 36.2645 || y > 36.2755) continue;
+        ++inside;
+        const float sample = (*heights)[static_cast<std::size_t>(j * plan->window.columns + i)];
+        ASSERT_NEAR(HeightAt(mesh, x, y), static_cast<double>(sample), 0.5);
+      }
+    }
+    EXPECT_GT(inside, 200);
+  }
+}
+
+TEST_F(EditedAreaMesh, HasHolesAndBreaklines) {
+  area_.error_m = 40;
+  Edit(R"({"op":"hole"})", kPolygon);
+  const ObjMesh holed = ReadObj(Build(area_).bytes);
+  EXPECT_TRUE(std::isnan(HeightAt(holed, -84.225, 36.27)));
+  EXPECT_FALSE(std::isnan(HeightAt(holed, -84.245, 36.27)));
+  std::vector<bool> is_used(holed.vertices.size());
+  for (const auto& triangle : holed.triangles) {
+    for (const std::size_t k : triangle) is_used[k] = true;
+  }
+  EXPECT_TRUE(std::ranges::all_of(is_used, [](bool is) { return is; }));
+  AreaRequest within = area_;
+  within.west = -84.23, within.east = -84.22, within.south = 36.266, within.north = 36.272;
+  const auto plan = PlanArea(*source_, 0.5, within, kMany);
+  ASSERT_TRUE(plan);
+  const auto nothing = BuildAreaMesh(*source_, *plan, within, {});
+  ASSERT_FALSE(nothing);
+  EXPECT_EQ(nothing.error().code, ErrorCode::kInvalidArgument);
+
+  Edit(R"({"op":"breakline"})", R"({"type":"LineString","coordinates":[[-84.24,36.265],[-84.21,36.265]]})");
+  const auto line_plan = PlanArea(*source_, 0.5, area_, kMany);
+  ASSERT_TRUE(line_plan);
+  const ObjMesh lined = ReadObj(Build(area_).bytes);
+  const geo::Lattice lattice = source_->LatticeOf(line_plan->level);
+  const auto on_line = std::ranges::count_if(lined.vertices, [&](const geo::Vec3& vertex) {
+    return std::abs(vertex.y - 36.265) < 0.51 * lattice.StepDegrees() && vertex.x > -84.24 && vertex.x < -84.21;
+  });
+  EXPECT_GE(static_cast<double>(on_line), 0.03 / lattice.StepDegrees() - 2);
 }
 
 }  // namespace

@@ -96,8 +96,49 @@ TEST(TileRecord, KeysDifferWhereverTheBytesMay) {
   keys[13].request.height_encoding = proto::HeightEncoding::kTerrarium;
   keys[14].request.height_size = 512;
   std::set<std::string> different;
+  // Parameters of tiles for maps.
+  for (const TileFormat format : {TileFormat::kHillshade, TileFormat::kSlope, TileFormat::kContours,
+                                  TileFormat::kImagery, TileFormat::kGeodeticImagery}) {
+    std::vector<CacheKey> of_map(8);
+    of_map[1].request.map.picture = proto::PictureFormat::kWebp;
+    of_map[2].request.map.azimuth_deg = 1;
+    of_map[3].request.map.altitude_deg = 1;
+    of_map[4].request.map.z_factor_hundredths = 1;
+    of_map[5].request.map.slope_style = SlopeStyle::kDegrees;
+    of_map[6].request.map.interval_cm = 1;
+    of_map[7].edits = 1;
+    std::set<std::size_t> hashes;
+    for (CacheKey& key : of_map) {
+      key.request.format = format;
+      hashes.insert(CacheKeyHash{}(key));
+    }
+    EXPECT_EQ(hashes.size(), of_map.size());
+    keys.insert(keys.end(), of_map.begin(), of_map.end());
+  }
   for (const CacheKey& key : keys) different.insert(RecordKey(key));
   EXPECT_EQ(different.size(), keys.size());
+}
+
+TEST(TileRecord, SelectionsFindTilesOfBothSchemes) {
+  TileSelection north;
+  north.generation = 0;
+  north.max_level = 5;
+  north.box = {0, 40, 90, 80};
+  const auto selects = [&](TileFormat format) {
+    CacheKey key;
+    key.request.format = format;
+    key.request.key = {2, 2,
+                       1};  // 0 to 66.5 N in Web Mercator; from 45 S to the equator in the scheme of terrain tiles
+    EXPECT_EQ(IsSelected(north, key), IsSelected(north, RecordKey(key)));
+    return IsSelected(north, key);
+  };
+  for (const TileFormat format : {TileFormat::kHeightPng, TileFormat::kHillshade, TileFormat::kSlope,
+                                  TileFormat::kContours, TileFormat::kImagery}) {
+    EXPECT_TRUE(selects(format));
+  }
+  for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb, TileFormat::kGeodeticImagery}) {
+    EXPECT_FALSE(selects(format));
+  }
 }
 
 TEST(TileRecord, KeysHoldWhileOtherDatasetsComeAndGo) {

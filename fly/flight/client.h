@@ -11,10 +11,11 @@
 
 namespace terrace::fly {
 
-class Viewer {
+class Client {
  public:
-  // `number` counts from 0. All references outlive the viewer; its callbacks do not: they keep what they need.
-  Viewer(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics);
+  // `number` counts from 0. The references must outlive the client. Requests may end after it: their callbacks share
+  // ownership of what they use.
+  Client(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics);
 
   // Draws a frame at `now_s` seconds since the start of all clients. One thread at a time.
   void Frame(double now_s, bool is_late);
@@ -22,11 +23,11 @@ class Viewer {
   Phase phase() const { return phase_; }
 
  private:
-  enum class What { kDocument, kSubtree, kTile };
+  enum class Resource { kDocument, kSubtree, kTile };
 
-  // A reply, decoded on a worker.
-  struct Arrival {
-    What what = What::kTile;
+  // Made on a worker.
+  struct DecodedReply {
+    Resource resource = Resource::kTile;
     Tile* tile = nullptr;
     std::uint32_t version = 0;
     HttpReply reply;
@@ -37,24 +38,24 @@ class Viewer {
   };
   struct Inbox {
     std::mutex mutex;
-    std::vector<Arrival> arrivals;
+    std::vector<DecodedReply> replies;
   };
   struct Waiting {
     Tile* tile;
     double due_s;
   };
 
-  void Ask(What what, Tile* tile, const std::string& uri);
-  static void Decode(Format format, Arrival& arrival);
+  void SendRequest(Resource resource, Tile* tile, const std::string& uri);
+  static void Decode(Format format, DecodedReply& decoded);
   static Outcome OutcomeOf(const HttpReply& reply);
-  void TakeArrivals(double now_s);
-  void Take(Arrival& arrival, double now_s);
-  void TakeDocument(const Arrival& arrival, double now_s);
-  void TakeTile(const Arrival& arrival, double now_s);
+  void TakeReplies(double now_s);
+  void Take(DecodedReply& decoded, double now_s);
+  void TakeDocument(const DecodedReply& decoded, double now_s);
+  void TakeTile(const DecodedReply& decoded, double now_s);
   void TakeReady(Tile& tile);
-  void FailOrWait(const Arrival& arrival, double now_s);
-  double PauseFor(const Arrival& arrival, int attempts) const;
-  void CheckVersion(const Arrival& arrival, double now_s);
+  void FailOrWait(const DecodedReply& decoded, double now_s);
+  double PauseFor(const DecodedReply& decoded, int attempts) const;
+  void CheckVersion(const DecodedReply& decoded, double now_s);
   void WakeWaiting(double now_s);
   void StartLoads(const Selection& selection);
   void StartLoad(Tile& tile);
@@ -75,7 +76,7 @@ class Viewer {
   Phase phase_ = Phase::kOpening;
   ClientRecord record_;
   double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0;
-  bool asks_document_ = false;
+  bool is_document_requested_ = false;
   double document_due_s_ = 0;
   int document_attempts_ = 0;
   std::string document_problem_;  // of the last attempt

@@ -1,4 +1,4 @@
-#include "fly/flight/viewer.h"
+#include "fly/flight/client.h"
 
 #include <fmt/format.h>
 
@@ -15,16 +15,16 @@
 namespace terrace::fly {
 namespace {
 
-// As CesiumJS asks: with it servers know a client of terrain, and send normals.
+// The Accept header of CesiumJS, which asks for normals. Servers recognize terrain clients by it.
 constexpr const char* kAcceptTerrain =
     "application/vnd.quantized-mesh;extensions=octvertexnormals,application/octet-stream;q=0.9,*/*;q=0.01";
 constexpr const char* kAcceptJson = "application/json,*/*;q=0.01";
 
 constexpr std::uint64_t kCoveragePeriod = 6;  // frames
 constexpr std::uint64_t kTrackPeriod = 10;
-constexpr double kWorstPixels = 9999;                   // inside of a tile's volume the error has no bound
+constexpr double kWorstPixels = 9999;                   // limit: inside a tile's volume the error is infinite
 constexpr double kFirstPause = 0.5, kLongestPause = 8;  // seconds, where the server names none
-constexpr double kDocumentPause = 2;                    // between two looks at a document that has changed
+constexpr double kDocumentPause = 2;                    // seconds between two requests for the document
 constexpr int kDamagedAttempts = 2;
 
 // 0.75 to 1.25, spread evenly: clients that were refused together do not come back together.
@@ -49,10 +49,10 @@ std::string Describe(const HttpReply& reply, Outcome outcome) {
 
 }  // namespace
 
-Viewer::Viewer(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics)
+Client::Client(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics)
     : options_(options), number_(number), http_(http), workers_(workers), statistics_(statistics) {}
 
-Outcome Viewer::OutcomeOf(const HttpReply& reply) {
+Outcome Client::OutcomeOf(const HttpReply& reply) {
   switch (reply.failure) {
     case Failure::kNone:
       break;
@@ -71,35 +71,35 @@ Outcome Viewer::OutcomeOf(const HttpReply& reply) {
   return reply.status == 404 || reply.status == 410 ? Outcome::kNotFound : Outcome::kStatus;
 }
 
-void Viewer::Decode(Format format, Arrival& arrival) {
-  arrival.outcome = OutcomeOf(arrival.reply);
-  if (arrival.outcome != Outcome::kOk) {
-    arrival.message = terrace::fly::Describe(arrival.reply, arrival.outcome);
+void Client::Decode(Format format, DecodedReply& decoded) {
+  decoded.outcome = OutcomeOf(decoded.reply);
+  if (decoded.outcome != Outcome::kOk) {
+    decoded.message = terrace::fly::Describe(decoded.reply, decoded.outcome);
     return;
   }
-  const auto damaged = [&arrival](const Error& error) {
-    arrival.outcome = Outcome::kDamaged;
-    arrival.message = error.message;
+  const auto damaged = [&decoded](const Error& error) {
+    decoded.outcome = Outcome::kDamaged;
+    decoded.message = error.message;
   };
-  std::string& body = arrival.reply.body;
-  // Some servers leave the label out; the first bytes tell.
-  if (arrival.reply.is_gzip || IsGzip(body)) {
+  std::string& body = decoded.reply.body;
+  // Some servers omit Content-Encoding: the first bytes identify gzip as well.
+  if (decoded.reply.is_gzip || IsGzip(body)) {
     Result<std::string> plain = Gunzip(body);
     if (!plain) return damaged(plain.error());
     body = *std::move(plain);
   }
-  if (arrival.what != What::kTile) {
-    arrival.text = std::move(body);
+  if (decoded.resource != Resource::kTile) {
+    decoded.text = std::move(body);
     return;
   }
   Result<TileContent> content = format == Format::kTerrain ? DecodeQuantizedMesh(body) : DecodeGlb(body);
   body = {};
   if (!content) return damaged(content.error());
-  arrival.content = *content;
+  decoded.content = *content;
 }
 
-void Viewer::Ask(What what, Tile* tile, const std::string& uri) {
-  Result<Url> url = what == What::kDocument ? Result<Url>(options_.document) : Resolve(options_.document, uri);
+void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) {
+  Result<Url> url = resource == Resource::kDocument ? Result<Url>(options_.document) : Resolve(options_.document, uri);
   if (!url) {
     if (tile != nullptr) tile->state = LoadState::kFailed;
     statistics_.AddMessage(url.error().message);
@@ -108,84 +108,84 @@ void Viewer::Ask(What what, Tile* tile, const std::string& uri) {
   if (tile != nullptr) {
     tile->in_flight = true;
     ++active_;
-    if (what == What::kTile) statistics_.AddUrl(url->target);
+    if (resource == Resource::kTile) statistics_.AddUrl(url->target);
   }
   const bool is_terrain = options_.format == Format::kTerrain;
-  const char* accept = what == What::kDocument             ? kAcceptJson
-                       : what == What::kTile && is_terrain ? kAcceptTerrain
-                                                           : "*/*";
+  const char* accept = resource == Resource::kDocument             ? kAcceptJson
+                       : resource == Resource::kTile && is_terrain ? kAcceptTerrain
+                                                                   : "*/*";
   const auto version = static_cast<std::uint32_t>(versions_.size());
   http_.Get(number_, *std::move(url), accept,
-            [inbox = inbox_, &workers = workers_, format = options_.format, what, tile, version](HttpReply reply) {
-              auto arrival = std::make_shared<Arrival>();
-              arrival->what = what;
-              arrival->tile = tile;
-              arrival->version = version;
-              arrival->reply = std::move(reply);
-              workers.Post([inbox, format, arrival] {
-                Decode(format, *arrival);
+            [inbox = inbox_, &workers = workers_, format = options_.format, resource, tile, version](HttpReply reply) {
+              auto decoded = std::make_shared<DecodedReply>();
+              decoded->resource = resource;
+              decoded->tile = tile;
+              decoded->version = version;
+              decoded->reply = std::move(reply);
+              workers.Post([inbox, format, decoded] {
+                Decode(format, *decoded);
                 const std::lock_guard lock(inbox->mutex);
-                inbox->arrivals.push_back(std::move(*arrival));
+                inbox->replies.push_back(std::move(*decoded));
               });
             });
 }
 
-void Viewer::TakeArrivals(double now_s) {
-  std::vector<Arrival> arrivals;
+void Client::TakeReplies(double now_s) {
+  std::vector<DecodedReply> replies;
   {
     const std::lock_guard lock(inbox_->mutex);
-    arrivals.swap(inbox_->arrivals);
+    replies.swap(inbox_->replies);
   }
-  for (Arrival& arrival : arrivals) Take(arrival, now_s);
+  for (DecodedReply& decoded : replies) Take(decoded, now_s);
 }
 
-void Viewer::Take(Arrival& arrival, double now_s) {
-  if (arrival.tile != nullptr) {
-    arrival.tile->in_flight = false;
+void Client::Take(DecodedReply& decoded, double now_s) {
+  if (decoded.tile != nullptr) {
+    decoded.tile->in_flight = false;
     --active_;
   }
-  if (arrival.what == What::kSubtree && arrival.outcome == Outcome::kOk) {
-    const Result<void> taken = tree_->TakeSubtree(*arrival.tile, arrival.text);
+  if (decoded.resource == Resource::kSubtree && decoded.outcome == Outcome::kOk) {
+    const Result<void> taken = tree_->TakeSubtree(*decoded.tile, decoded.text);
     if (!taken) {
-      arrival.outcome = Outcome::kDamaged;
-      arrival.message = taken.error().message;
+      decoded.outcome = Outcome::kDamaged;
+      decoded.message = taken.error().message;
     }
   }
   RequestRecord record;
-  record.outcome = arrival.outcome;
-  record.is_tile = arrival.what == What::kTile;
-  record.tier = ParseCacheTier(arrival.reply.server_timing);
-  record.seconds = arrival.reply.seconds;
-  record.bytes = arrival.reply.bytes;
-  record.opened_connection = arrival.reply.opened_connection;
-  record.triangles = arrival.content.triangles;
-  record.is_incomplete = arrival.content.covered >= 0 && std::abs(arrival.content.covered - 1) > 1e-9;
+  record.outcome = decoded.outcome;
+  record.is_tile = decoded.resource == Resource::kTile;
+  record.tier = ParseCacheTier(decoded.reply.server_timing);
+  record.seconds = decoded.reply.seconds;
+  record.bytes = decoded.reply.bytes;
+  record.opened_connection = decoded.reply.opened_connection;
+  record.triangles = decoded.content.triangles;
+  record.is_incomplete = decoded.content.covered >= 0 && std::abs(decoded.content.covered - 1) > 1e-9;
   statistics_.AddRequest(now_s, record);
-  if (!arrival.message.empty()) {
+  if (!decoded.message.empty()) {
     constexpr const char* kNames[] = {"document", "subtree", "tile"};
-    statistics_.AddMessage(fmt::format("{}: {}", kNames[static_cast<std::size_t>(arrival.what)], arrival.message));
+    statistics_.AddMessage(fmt::format("{}: {}", kNames[static_cast<std::size_t>(decoded.resource)], decoded.message));
   }
-  if (arrival.what == What::kDocument) return TakeDocument(arrival, now_s);
-  if (arrival.outcome != Outcome::kOk) return FailOrWait(arrival, now_s);
-  arrival.tile->attempts = 0;
-  if (arrival.what == What::kTile) TakeTile(arrival, now_s);
+  if (decoded.resource == Resource::kDocument) return TakeDocument(decoded, now_s);
+  if (decoded.outcome != Outcome::kOk) return FailOrWait(decoded, now_s);
+  decoded.tile->attempts = 0;
+  if (decoded.resource == Resource::kTile) TakeTile(decoded, now_s);
 }
 
-void Viewer::TakeDocument(const Arrival& arrival, double now_s) {
-  asks_document_ = false;
+void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
+  is_document_requested_ = false;
   document_due_s_ = now_s + kDocumentPause;
-  if (arrival.outcome != Outcome::kOk) {
-    document_due_s_ = now_s + PauseFor(arrival, ++document_attempts_);
-    document_problem_ = arrival.message;
-    if (!tree_ && (!IsTransient(arrival.reply, arrival.outcome) ||
-                   (arrival.outcome != Outcome::kRefused && document_attempts_ >= options_.max_attempts))) {
-      GiveUp(fmt::format("{}: {}", options_.document.Text(), arrival.message));
+  if (decoded.outcome != Outcome::kOk) {
+    document_due_s_ = now_s + PauseFor(decoded, ++document_attempts_);
+    document_problem_ = decoded.message;
+    if (!tree_ && (!IsTransient(decoded.reply, decoded.outcome) ||
+                   (decoded.outcome != Outcome::kRefused && document_attempts_ >= options_.max_attempts))) {
+      GiveUp(fmt::format("{}: {}", options_.document.Text(), decoded.message));
     }
     return;
   }
   if (tree_) {
     const std::string before = tree_->version();
-    if (const Result<void> taken = tree_->TakeDocument(arrival.text); !taken) {
+    if (const Result<void> taken = tree_->TakeDocument(decoded.text); !taken) {
       statistics_.AddMessage(taken.error().message);
     }
     if (tree_->version() == before) return;
@@ -195,7 +195,7 @@ void Viewer::TakeDocument(const Arrival& arrival, double now_s) {
     return;
   }
   Result<std::unique_ptr<TileTree>> tree =
-      options_.format == Format::kTerrain ? MakeLayerTree(arrival.text) : MakeTilesetTree(arrival.text);
+      options_.format == Format::kTerrain ? MakeLayerTree(decoded.text) : MakeTilesetTree(decoded.text);
   if (!tree) return GiveUp(fmt::format("{}: {}", options_.document.Text(), tree.error().message));
   tree_ = *std::move(tree);
   versions_.push_back(tree_->version());
@@ -203,40 +203,41 @@ void Viewer::TakeDocument(const Arrival& arrival, double now_s) {
   phase_ = Phase::kFirstView;
 }
 
-void Viewer::TakeTile(const Arrival& arrival, double now_s) {
-  Tile& tile = *arrival.tile;
+void Client::TakeTile(const DecodedReply& decoded, double now_s) {
+  Tile& tile = *decoded.tile;
   tile_bytes_ -= tile.decoded_bytes;
-  tree_->TakeContent(tile, arrival.content);
-  tile.triangles = arrival.content.triangles;
-  tile.decoded_bytes = arrival.content.bytes;
+  tree_->TakeContent(tile, decoded.content);
+  tile.triangles = decoded.content.triangles;
+  tile.decoded_bytes = decoded.content.bytes;
   tile_bytes_ += tile.decoded_bytes;
-  tile.version = arrival.version;
-  tile.is_stale = arrival.version != versions_.size();
-  const std::string& stated = arrival.reply.max_error;
+  tile.version = decoded.version;
+  tile.is_stale = decoded.version != versions_.size();
+  const std::string& stated = decoded.reply.max_error;
   tile.stated_error_m = -1;
   std::from_chars(stated.data(), stated.data() + stated.size(), tile.stated_error_m);
-  if (tile.key) statistics_.AddAsked(now_s, *tile.key, ParseCacheTier(arrival.reply.server_timing));
+  if (tile.key) statistics_.AddLoadedTile(now_s, *tile.key, ParseCacheTier(decoded.reply.server_timing));
   TakeReady(tile);
-  CheckVersion(arrival, now_s);
+  CheckVersion(decoded, now_s);
 }
 
-void Viewer::TakeReady(Tile& tile) {
+void Client::TakeReady(Tile& tile) {
   if (tile.state != LoadState::kReady) ready_.push_back(&tile);
   tile.state = LoadState::kReady;
 }
 
-// A URL with a version that is not the current one is answered with the current tile, which must not be stored.
-void Viewer::CheckVersion(const Arrival& arrival, double now_s) {
+// terrace answers a URL of another version with the current tile and no-store. Such a reply means that the document has
+// changed.
+void Client::CheckVersion(const DecodedReply& decoded, double now_s) {
   const bool is_suspect =
-      arrival.outcome == Outcome::kNotFound || arrival.reply.cache_control.find("no-store") != std::string::npos;
-  if (!is_suspect || tree_->version().empty() || asks_document_ || now_s < document_due_s_) return;
-  asks_document_ = true;
-  Ask(What::kDocument, nullptr, "");
+      decoded.outcome == Outcome::kNotFound || decoded.reply.cache_control.find("no-store") != std::string::npos;
+  if (!is_suspect || tree_->version().empty() || is_document_requested_ || now_s < document_due_s_) return;
+  is_document_requested_ = true;
+  SendRequest(Resource::kDocument, nullptr, "");
 }
 
-double Viewer::PauseFor(const Arrival& arrival, int attempts) const {
+double Client::PauseFor(const DecodedReply& decoded, int attempts) const {
   double pause_s = std::min(kLongestPause, kFirstPause * std::exp2(std::min(attempts, 10) - 1));
-  const std::string& text = arrival.reply.retry_after;
+  const std::string& text = decoded.reply.retry_after;
   double stated = -1;
   std::from_chars(text.data(), text.data() + text.size(), stated);
   const std::uint64_t seed = static_cast<std::uint64_t>(number_) * 1000 + waiting_.size();
@@ -244,24 +245,24 @@ double Viewer::PauseFor(const Arrival& arrival, int attempts) const {
   return pause_s * Spread(seed);
 }
 
-void Viewer::FailOrWait(const Arrival& arrival, double now_s) {
-  Tile& tile = *arrival.tile;
+void Client::FailOrWait(const DecodedReply& decoded, double now_s) {
+  Tile& tile = *decoded.tile;
   ++tile.attempts;
-  CheckVersion(arrival, now_s);
-  const int limit = arrival.outcome == Outcome::kRefused ? 1'000'000  // a busy server is asked as long as it answers so
-                    : arrival.outcome == Outcome::kDamaged ? kDamagedAttempts
+  CheckVersion(decoded, now_s);
+  const int limit = decoded.outcome == Outcome::kRefused ? 1'000'000  // refusals are no failures: retried without limit
+                    : decoded.outcome == Outcome::kDamaged ? kDamagedAttempts
                                                            : options_.max_attempts;
-  if (IsTransient(arrival.reply, arrival.outcome) && tile.attempts < limit) {
+  if (IsTransient(decoded.reply, decoded.outcome) && tile.attempts < limit) {
     tile.waiting = true;
-    waiting_.push_back({&tile, now_s + PauseFor(arrival, tile.attempts)});
+    waiting_.push_back({&tile, now_s + PauseFor(decoded, tile.attempts)});
     statistics_.AddRetry();
     return;
   }
-  tile.is_stale = false;  // what it has stays
+  tile.is_stale = false;  // the outdated content stays
   if (tile.state != LoadState::kReady) tile.state = LoadState::kFailed;
 }
 
-void Viewer::WakeWaiting(double now_s) {
+void Client::WakeWaiting(double now_s) {
   std::erase_if(waiting_, [now_s](const Waiting& waiting) {
     if (waiting.due_s > now_s) return false;
     waiting.tile->waiting = false;
@@ -269,7 +270,7 @@ void Viewer::WakeWaiting(double now_s) {
   });
 }
 
-void Viewer::StartLoad(Tile& tile) {
+void Client::StartLoad(Tile& tile) {
   if (!tile.NeedsLoad()) return;
   if (tile.content == Content::kUpsampled) {
     Tile& parent = *tile.parent;
@@ -280,24 +281,24 @@ void Viewer::StartLoad(Tile& tile) {
     tile.state = LoadState::kReady;
     return;
   }
-  const TileRequest request = tree_->RequestFor(tile);
-  if (request.kind == TileRequest::Kind::kNothing) {
+  const NextRequest request = tree_->RequestFor(tile);
+  if (request.kind == NextRequest::Kind::kNothing) {
     tile.is_stale = false;
     tile.state = LoadState::kReady;
     return;
   }
-  Ask(request.kind == TileRequest::Kind::kSubtree ? What::kSubtree : What::kTile, &tile, request.uri);
+  SendRequest(request.kind == NextRequest::Kind::kSubtree ? Resource::kSubtree : Resource::kTile, &tile, request.uri);
 }
 
-void Viewer::StartLoads(const Selection& selection) {
+void Client::StartLoads(const Selection& selection) {
   for (const LoadTask& task : selection.loads) {
     if (active_ >= options_.max_loads) return;
     StartLoad(*task.tile);
   }
 }
 
-// The longest unseen tiles go first; what this frame visited stays.
-void Viewer::Unload(std::uint64_t frame) {
+// Unloads the tiles that were not visited for longest. Those that this frame visited stay.
+void Client::Unload(std::uint64_t frame) {
   if (tile_bytes_ <= options_.max_tile_bytes) return;
   std::sort(ready_.begin(), ready_.end(),
             [](const Tile* a, const Tile* b) { return a->visits[0].frame > b->visits[0].frame; });
@@ -310,7 +311,7 @@ void Viewer::Unload(std::uint64_t frame) {
   }
 }
 
-FrameRecord Viewer::Describe(const Selection& selection, const View& view) {
+FrameRecord Client::Describe(const Selection& selection, const View& view) {
   FrameRecord record;
   record.phase = phase_;
   record.is_refined = selection.IsRefined();
@@ -343,20 +344,20 @@ FrameRecord Viewer::Describe(const Selection& selection, const View& view) {
   return record;
 }
 
-double Viewer::FlownSeconds(double now_s) const {
+double Client::FlownSeconds(double now_s) const {
   const double offset = options_.path.duration_s() * number_ / options_.clients;
   if (phase_ == Phase::kFlying) return offset + now_s - takeoff_s_;
   return phase_ == Phase::kArrived ? offset + options_.duration_s : offset;
 }
 
-void Viewer::Advance(const FrameRecord& record, double now_s) {
+void Client::Advance(const FrameRecord& record, double now_s) {
   const Phase before = phase_;
   const double first_view_s = record_.first_view_s;
   AdvancePhase(record, now_s);
   if (phase_ != before || record_.first_view_s != first_view_s) statistics_.SetClient(number_, record_);
 }
 
-void Viewer::AdvancePhase(const FrameRecord& record, double now_s) {
+void Client::AdvancePhase(const FrameRecord& record, double now_s) {
   if (phase_ == Phase::kFirstView && (record.is_refined || now_s - start_s_ > options_.first_view_limit_s)) {
     if (record.is_refined) record_.first_view_s = now_s - start_s_;
     phase_ = Phase::kFlying;
@@ -365,7 +366,7 @@ void Viewer::AdvancePhase(const FrameRecord& record, double now_s) {
   if (phase_ == Phase::kFlying && now_s - takeoff_s_ >= options_.duration_s) {
     phase_ = Phase::kArrived;
     landing_s_ = now_s;
-    return;  // the next frame is the first at the end
+    return;  // the next frame is the first one from the final position
   }
   if (phase_ == Phase::kArrived) {
     if (record.is_refined && record_.arrival_s < 0) record_.arrival_s = now_s - landing_s_;
@@ -377,15 +378,15 @@ void Viewer::AdvancePhase(const FrameRecord& record, double now_s) {
     record_.first_view_s = now_s - start_s_;
 }
 
-void Viewer::GiveUp(const std::string& why) {
+void Client::GiveUp(const std::string& why) {
   record_.failure = why;
   phase_ = Phase::kDone;
   statistics_.SetClient(number_, record_);
 }
 
-void Viewer::Frame(double now_s, bool is_late) {
+void Client::Frame(double now_s, bool is_late) {
   if (start_s_ < 0) start_s_ = now_s;
-  TakeArrivals(now_s);
+  TakeReplies(now_s);
   if (phase_ == Phase::kDone) return;
   if (!tree_) {
     if (now_s - start_s_ > options_.first_view_limit_s) {
@@ -393,9 +394,9 @@ void Viewer::Frame(double now_s, bool is_late) {
       return GiveUp(fmt::format("{}: no document within {} s{}{}", options_.document.Text(),
                                 options_.first_view_limit_s, problem.empty() ? "" : "; ", problem));
     }
-    if (!asks_document_ && now_s >= document_due_s_) {
-      asks_document_ = true;
-      Ask(What::kDocument, nullptr, "");
+    if (!is_document_requested_ && now_s >= document_due_s_) {
+      is_document_requested_ = true;
+      SendRequest(Resource::kDocument, nullptr, "");
     }
     return;
   }

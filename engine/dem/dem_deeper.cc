@@ -1,0 +1,77 @@
+// Levels that edits add below those of the sources.
+#include <algorithm>
+#include <cstdint>
+#include <utility>
+
+#include "engine/dem/common/content_hash.h"
+#include "engine/dem/dem_impl.h"
+#include "engine/dem/edits/deeper_tiles.h"
+#include "engine/dem/mosaic/availability.h"
+#include "engine/geo/tile_cover.h"
+
+namespace terrace::dem {
+namespace {
+
+// The parts of ranges of a level that lie below a tile.
+std::vector<geo::TileRange> Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
+  std::vector<geo::TileRange> parts;
+  for (const geo::TileRange& range : ranges) {
+    const geo::TileRange common = geo::Common(range, geo::TilesBelow(key, level));
+    if (!geo::IsEmpty(common)) parts.push_back(common);
+  }
+  return geo::Disjoint(std::move(parts));
+}
+
+}  // namespace
+
+// Lattices of deeper levels have as many cells as the deepest level of the sources, so that each is twice as fine as
+// the one above it.
+void DemSource::Impl::AddDeeperLevels(double error_fraction) {
+  const int deepest = std::min(info.finest_level + kMaxDeeperLevels, geo::kMaxLevel);
+  std::vector<FinerTiles> finer;
+  for (const Edit& edit : edits->edits()) {
+    const int level = LevelFor(edit, error_fraction, deepest);
+    if (level > 0) finer.push_back({level, TilesTouching(edit, level)});
+  }
+  if (finer.empty()) return;
+  std::vector<std::vector<geo::TileRange>> all = available;
+  AddTiles(all, finer);
+  if (all == available) return;
+  available_unedited = std::exchange(available, std::move(all));
+  info.max_level = static_cast<int>(available.size()) - 1;
+  for (int level = info.finest_level + 1; level <= info.max_level; ++level) {
+    lattices[static_cast<std::size_t>(level)].cells = lattices[static_cast<std::size_t>(info.finest_level)].cells;
+  }
+}
+
+std::uint64_t DemSource::DeeperTilesOf(const geo::TileKey& key) const {
+  if (impl_->available_unedited.empty() || !geo::IsValid(key)) return 0;
+  ContentHasher hasher;
+  bool is_touched = false;
+  for (int level = key.level + 1; level <= max_level(); ++level) {
+    const auto at = static_cast<std::size_t>(level);
+    const std::vector<geo::TileRange> tiles = Below(impl_->available[at], key, level);
+    if (tiles.empty()) break;  // and none on deeper levels
+    hasher.Add(std::uint64_t{tiles.size()});
+    for (const geo::TileRange& range : tiles) {
+      for (const std::int64_t number : {range.start_x, range.start_y, range.end_x, range.end_y}) hasher.Add(number);
+    }
+    is_touched |= at >= impl_->available_unedited.size() || tiles != Below(impl_->available_unedited[at], key, level);
+  }
+  return is_touched ? hasher.Hash().low | 1 : 0;
+}
+
+std::span<const std::vector<geo::TileRange>> DemSource::AvailabilityBelow(const geo::TileKey& key) const {
+  const std::span<const std::vector<geo::TileRange>> all = impl_->available;
+  std::size_t levels = all.size();
+  const auto least = static_cast<std::size_t>(finest_level()) + 1;
+  const auto has_none = [&](std::size_t level) {
+    return static_cast<int>(level) > key.level && std::ranges::none_of(all[level], [&](const geo::TileRange& range) {
+             return !geo::IsEmpty(geo::Common(range, geo::TilesBelow(key, static_cast<int>(level))));
+           });
+  };
+  while (levels > least && has_none(levels - 1)) --levels;
+  return all.first(levels);
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,62 @@
+// Edits whose heights count from the geoid of the sources.
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "engine/dem/crs/geoid.h"
+#include "engine/dem/dem_impl.h"
+
+namespace terrace::dem {
+namespace {
+
+// The geoid of the first raster grid at the middle of an edit that refers to one; EGM96 if none does. Null: a datum is
+// not known.
+Result<std::shared_ptr<const Geoid>> GeoidAt(const std::vector<RasterGrid>& grids,
+                                             const std::vector<std::size_t>& there) {
+  for (const std::size_t i : there) {
+    const VerticalDatum& vertical = grids[i].vertical();
+    if (!vertical.is_known()) return std::shared_ptr<const Geoid>();
+    if (vertical.geoid != nullptr) return vertical.geoid;
+  }
+  return Geoid::OfCrs("EPSG:5773", {0, 0});
+}
+
+}  // namespace
+
+Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
+  const EditPlane& plane = edit.plane;
+  const auto geoid = GeoidAt(grids, GridsAt({plane.longitude, plane.latitude, plane.longitude, plane.latitude}));
+  if (!geoid) return tl::unexpected(geoid.error());
+  if (*geoid == nullptr) {
+    return std::string(
+        "its heights are orthometric, but the vertical datum of the source there is not known; set "
+        "`vertical` of the source, such as \"egm96\", or \"vertical\": \"ellipsoid\" of the feature");
+  }
+  // Of the finest models, nodes are two kilometres apart.
+  constexpr double kStep_m = 500, kMostSteps = 64;
+  const Box& reach = edit.reach;
+  const double width = (reach.east - reach.west) * plane.east_m, height = (reach.north - reach.south) * plane.north_m;
+  const auto steps = [&](double metres) { return std::clamp(std::ceil(metres / kStep_m), 1.0, kMostSteps); };
+  auto patch = std::make_shared<EditUndulations>();
+  patch->south_west = {(reach.west - plane.longitude) * plane.east_m, (reach.south - plane.latitude) * plane.north_m};
+  patch->columns = static_cast<std::size_t>(steps(width)) + 1;
+  patch->rows = static_cast<std::size_t>(steps(height)) + 1;
+  patch->step_x = width / steps(width);
+  patch->step_y = height / steps(height);
+  const Geoid::Reader reader(**geoid);
+  for (std::size_t j = 0; j < patch->rows; ++j) {
+    const double latitude = reach.south + static_cast<double>(j) * patch->step_y / plane.north_m;
+    for (std::size_t i = 0; i < patch->columns; ++i) {
+      const double longitude = reach.west + static_cast<double>(i) * patch->step_x / plane.east_m;
+      const double metres = reader.At({longitude, latitude});
+      if (!std::isfinite(metres))
+        return fmt::format("its heights are orthometric, and {} has none there", (*geoid)->name());
+      patch->values.push_back(std::round(metres * 4096) / 4096);  // equal on all processors
+    }
+  }
+  edit.undulations = std::move(patch);
+  Complete(edit);
+  return std::string();
+}
+
+}  // namespace terrace::dem

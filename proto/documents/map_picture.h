@@ -1,0 +1,28 @@
+// Pictures of map tiles as WebP and JPEG. Deterministic, thread-safe. png.h has PNG.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "engine/core/result.h"
+#include "proto/documents/png.h"
+
+namespace terrace::proto {
+
+enum class PictureFormat : std::uint8_t { kPng, kWebp, kJpeg };
+
+// "image/png", "image/webp", "image/jpeg".
+const char* MediaTypeOf(PictureFormat format);
+// As in URLs: "png", "webp", "jpg".
+const char* ToString(PictureFormat format);
+
+// The samples unchanged, as PNG or as lossless WebP. WebP has red, green and blue of grey, any colour in transparent
+// pixels, and no alpha if there are none. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
+Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
+
+// A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has the
+// colours at `quality`, and `background` instead of transparent pixels. Errors and preconditions as above; kRgba.
+Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, int quality,
+                                const std::array<std::uint8_t, 3>& background);
+
+}  // namespace terrace::proto

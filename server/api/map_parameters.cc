@@ -1,0 +1,218 @@
+#include "server/api/map_parameters.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "server/http/text.h"
+#include "tiler/map/contour_tile.h"
+#include "tiler/tile_bounds.h"
+
+namespace terrace::server {
+namespace {
+
+bool IsImagery(tiler::TileFormat format) {
+  return format == tiler::TileFormat::kImagery || format == tiler::TileFormat::kGeodeticImagery;
+}
+
+// A reader of one parameter's value. kInvalidArgument: the message begins with what the value must be.
+using SetParameter = Result<void> (*)(std::string_view text, MapTileParameters& parameters);
+
+Result<void> SetSize(std::string_view text, MapTileParameters& parameters) {
+  for (const int size : tiler::kHeightSizes) {
+    if (text != fmt::format("{}", size)) continue;
+    parameters.size = size;
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+}
+
+Result<void> SetAzimuth(std::string_view text, MapTileParameters& parameters) {
+  const auto degrees = PlainDecimal(text, /*max_digits=*/3);
+  if (!degrees || *degrees > 360) {
+    return MakeError(ErrorCode::kInvalidArgument, "azimuth must be a whole number of degrees from 0 to 360");
+  }
+  parameters.map.azimuth_deg = static_cast<std::uint16_t>(*degrees % 360);
+  return {};
+}
+
+Result<void> SetAltitude(std::string_view text, MapTileParameters& parameters) {
+  const auto degrees = PlainDecimal(text, /*max_digits=*/2);
+  if (!degrees || *degrees > 90) {
+    return MakeError(ErrorCode::kInvalidArgument, "altitude must be a whole number of degrees from 0 to 90");
+  }
+  parameters.map.altitude_deg = static_cast<std::uint8_t>(*degrees);
+  return {};
+}
+
+// A number with at most two decimals that count, as hundredths; nothing outside `min` .. `max` hundredths.
+std::optional<std::uint32_t> Hundredths(std::string_view text, double min, double max) {
+  const std::optional<double> number = PositiveNumber(text);
+  if (!number || !(*number <= max)) return std::nullopt;
+  const double hundredths = std::floor(*number * 100 + 0.5);
+  if (hundredths < min || hundredths > max) return std::nullopt;
+  return static_cast<std::uint32_t>(hundredths);
+}
+
+Result<void> SetZFactor(std::string_view text, MapTileParameters& parameters) {
+  const auto hundredths = Hundredths(text, 1, 10'000);
+  if (!hundredths) return MakeError(ErrorCode::kInvalidArgument, "zfactor must be a number from 0.01 to 100");
+  parameters.map.z_factor_hundredths = static_cast<std::uint16_t>(*hundredths);
+  return {};
+}
+
+Result<void> SetStyle(std::string_view text, MapTileParameters& parameters) {
+  if (text != "colors" && text != "degrees") {
+    return MakeError(ErrorCode::kInvalidArgument, "style must be colors or degrees");
+  }
+  parameters.map.slope_style = text == "degrees" ? tiler::SlopeStyle::kDegrees : tiler::SlopeStyle::kColors;
+  return {};
+}
+
+Result<void> SetInterval(std::string_view text, MapTileParameters& parameters) {
+  const auto cm = Hundredths(text, 10, tiler::kMaxIntervalCm);
+  if (!cm) return MakeError(ErrorCode::kInvalidArgument, "interval must be a number of metres from 0.1 to 10000");
+  parameters.map.interval_cm = *cm;
+  return {};
+}
+
+Result<void> SetPicture(std::string_view text, MapTileParameters& parameters) {
+  for (const auto format : {proto::PictureFormat::kPng, proto::PictureFormat::kWebp, proto::PictureFormat::kJpeg}) {
+    if (text != proto::ToString(format)) continue;
+    parameters.picture = format;
+    return {};
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "format must be png, webp or jpg");
+}
+
+struct MapParameterRow {
+  std::string_view name;
+  bool (*is_of)(tiler::TileFormat format);
+  SetParameter set;
+  bool in_tile_json_only = false;
+};
+
+constexpr MapParameterRow kRows[] = {
+    {"size", [](tiler::TileFormat format) { return format != tiler::TileFormat::kContours; }, SetSize},
+    {"azimuth", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetAzimuth},
+    {"altitude", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetAltitude},
+    {"zfactor", [](tiler::TileFormat format) { return format == tiler::TileFormat::kHillshade; }, SetZFactor},
+    {"style", [](tiler::TileFormat format) { return format == tiler::TileFormat::kSlope; }, SetStyle},
+    {"interval", [](tiler::TileFormat format) { return format == tiler::TileFormat::kContours; }, SetInterval},
+    {"format", [](tiler::TileFormat format) { return format != tiler::TileFormat::kContours; }, SetPicture,
+     /*in_tile_json_only=*/true},
+};
+
+Error UnknownParameter(tiler::TileFormat format, bool in_tile_json) {
+  std::string known;
+  for (const MapParameterRow& row : kRows) {
+    if (!row.is_of(format) || (row.in_tile_json_only && !in_tile_json)) continue;
+    known += known.empty() ? "" : ", ";
+    known += row.name;
+  }
+  return {ErrorCode::kInvalidArgument, "unknown parameter; known are " + known};
+}
+
+// Whether two boxes meet; west > east: across the antimeridian. `tile` does not cross it.
+bool Meets(const dem::GeoBounds& box, const dem::GeoBounds& tile) {
+  if (tile.north < box.south || tile.south > box.north) return false;
+  if (box.west > box.east) return tile.west <= box.east || tile.east >= box.west;
+  return tile.west <= box.east && tile.east >= box.west;
+}
+
+}  // namespace
+
+Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format, bool in_tile_json) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  MapTileParameters parameters;
+  unsigned seen = 0;
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    const auto* const row = std::ranges::find(kRows, std::string_view(name), &MapParameterRow::name);
+    if (row == std::end(kRows) || !row->is_of(format) || (row->in_tile_json_only && !in_tile_json)) {
+      return tl::unexpected(UnknownParameter(format, in_tile_json));
+    }
+    const unsigned bit = 1u << (row - std::begin(kRows));
+    if ((seen & bit) != 0) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", row->name);
+    seen |= bit;
+    if (Result<void> set = row->set(value, parameters); !set) return tl::unexpected(std::move(set.error()));
+  }
+  return parameters;
+}
+
+std::string MapTileQuery(const MapTileParameters& parameters) {
+  const MapTileParameters defaults;
+  const tiler::MapParameters& map = parameters.map;
+  std::string query;
+  const auto add = [to = std::back_inserter(query)](std::string_view name, const auto& value) {
+    fmt::format_to(to, "&{}={}", name, value);
+  };
+  if (map.azimuth_deg != defaults.map.azimuth_deg) add("azimuth", map.azimuth_deg);
+  if (map.altitude_deg != defaults.map.altitude_deg) add("altitude", map.altitude_deg);
+  if (map.z_factor_hundredths != defaults.map.z_factor_hundredths) add("zfactor", map.z_factor_hundredths / 100.0);
+  if (map.slope_style != defaults.map.slope_style) add("style", "degrees");
+  if (map.interval_cm != 0) add("interval", map.interval_cm / 100.0);
+  if (parameters.size != defaults.size) add("size", parameters.size);
+  return query;
+}
+
+int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size) {
+  const int above = size == 512 ? 1 : 0;
+  switch (format) {
+    case tiler::TileFormat::kImagery:
+      return std::max(dataset.imagery->max_mercator_depth - above, 0);
+    case tiler::TileFormat::kGeodeticImagery:
+      return std::max(dataset.imagery->max_geodetic_level - above, 0);
+    default:
+      return MaxHeightLevel(dataset, size);
+  }
+}
+
+dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
+  if (IsImagery(format)) return dataset.imagery->bounds;
+  return {dataset.west, dataset.south, dataset.east, dataset.north};
+}
+
+Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format) {
+  if (!IsImagery(format) || dataset.imagery) return {};
+  return MakeError(ErrorCode::kNotFound, "the dataset has no imagery; its option \"imagery\" names an image");
+}
+
+Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile) {
+  if (Result<void> has = CheckHasImagery(dataset, tile.format); !has) return has;
+  const Result<MapTileParameters> parameters = ParseMapParameters(query, tile.format);
+  if (!parameters) return tl::unexpected(parameters.error());
+  const bool is_there =
+      tile.key.level <= MaxMapLevel(dataset, tile.format, parameters->size) &&
+      Meets(MapBounds(dataset, tile.format), tiler::TileBounds(tile.key, tiler::IsMercator(tile.format)));
+  if (!is_there) {
+    return MakeError(ErrorCode::kNotFound,
+                     "the dataset has no such tile; the tiles.json of this layer tells the bounds and levels of what "
+                     "it has");
+  }
+  const proto::PictureFormat picture = tile.map.picture;
+  tile.map = parameters->map;
+  tile.map.picture = picture;
+  if (tile.format != tiler::TileFormat::kContours) {
+    tile.height_size = parameters->size;
+    return {};
+  }
+  const std::uint32_t least = tiler::MinIntervalCm(tile.key.level);
+  if (tile.map.interval_cm == 0) tile.map.interval_cm = tiler::DefaultIntervalCm(tile.key.level);
+  if (tile.map.interval_cm < least) {
+    return MakeError(ErrorCode::kInvalidArgument, "interval must be at least {} m at level {}", least / 100.0,
+                     tile.key.level);
+  }
+  return {};
+}
+
+std::string_view MapTileType(const tiler::TileRequest& tile) {
+  return tile.format == tiler::TileFormat::kContours ? "application/vnd.mapbox-vector-tile"
+                                                     : proto::MediaTypeOf(tile.map.picture);
+}
+
+}  // namespace terrace::server

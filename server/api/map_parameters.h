@@ -1,0 +1,44 @@
+// Parameters of tiles for maps and of their TileJSON: hillshades, slopes, contours, imagery.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "engine/core/result.h"
+#include "proto/documents/map_picture.h"
+#include "server/tiles/catalog.h"
+#include "tiler/tile_request.h"
+
+namespace terrace::server {
+
+struct MapTileParameters {
+  int size = tiler::kHeightSizes[0];
+  tiler::MapParameters map;                     // interval_cm is 0 if none is requested
+  std::optional<proto::PictureFormat> picture;  // TileJSON's `format`
+};
+
+// Parses the parameters of a format: `azimuth`, `altitude`, `zfactor` and `size` of hillshades; `style` and `size` of
+// slopes; `interval` of contours; `size` of imagery. `in_tile_json`: also `format` of pictures. `v` may be repeated.
+// kInvalidArgument, with a message for the client: an unknown or repeated parameter, or a value out of range.
+Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format,
+                                             bool in_tile_json = false);
+
+// The query of a tile template: parameters that differ from the defaults, each with '&' before it.
+std::string MapTileQuery(const MapTileParameters& parameters);
+
+// The level of the finest tiles of a format, 0 if the size would put it above. Precondition for imagery: the dataset
+// has an image.
+int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size);
+// Where tiles of a format are. Precondition: as above.
+dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
+
+// kNotFound: the dataset has no imagery, and the format needs it.
+Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format);
+
+// TileFormat::read, vary and media_type of formats for maps.
+Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile);
+std::string_view MapTileType(const tiler::TileRequest& tile);
+
+}  // namespace terrace::server

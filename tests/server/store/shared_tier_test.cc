@@ -1,0 +1,146 @@
+// The store behind the shared cache, with a Redis that this file plays. What is counted: look-ups that waited, and
+// commands that reached the server.
+#include "server/store/shared_tier.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include "tests/server/store/fake_redis.h"
+#include "tiler/store/tile_record.h"
+
+namespace terrace::server {
+namespace {
+
+using std::chrono::hours;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+SharedTierOptions OptionsOf(const FakeRedis& redis, std::size_t readers) {
+  SharedTierOptions options;
+  options.address = redis.address();
+  options.timeout = seconds(5);
+  options.max_value_bytes = 1000;
+  options.readers = readers;
+  options.retry_after = hours(1);  // nothing is tried again while a test counts
+  options.test_after = hours(1);
+  return options;
+}
+
+void Await(const std::function<bool()>& condition) {
+  const auto end = std::chrono::steady_clock::now() + seconds(60);
+  while (!condition()) {
+    ASSERT_LT(std::chrono::steady_clock::now(), end);
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+}
+
+TEST(SharedTier, FindsWhatRedisHas) {
+  FakeRedis redis;
+  redis.SetValue(tiler::AddChecksum("key", "value"));
+  SharedTier tier(OptionsOf(redis, 1));
+  Await([&] { return redis.pings() >= 2; });  // one of the greeting, one that switches the store on
+  Await([&] { return tier.stats().on; });
+  EXPECT_EQ(tier.Find("key"), "value");
+  EXPECT_EQ(tier.Find("other"), std::nullopt);  // the checksum is of another key
+  EXPECT_EQ(tier.stats().hits, 1U);
+  EXPECT_EQ(tier.stats().damaged, 1U);
+}
+
+TEST(SharedTier, SilenceCostsOneTimeOutAndNoFurtherCommand) {
+  FakeRedis redis;
+  SharedTierOptions options = OptionsOf(redis, 1);
+  options.timeout = milliseconds(50);
+  SharedTier tier(options);
+  Await([&] { return tier.stats().on; });
+  redis.FallSilent();
+  constexpr std::uint64_t kLookUps = 1000;
+  for (std::uint64_t i = 0; i < kLookUps; ++i) EXPECT_EQ(tier.Find("key"), std::nullopt);
+  const tiler::StoreStats stats = tier.stats();
+  EXPECT_EQ(stats.timeouts, 1U);
+  EXPECT_EQ(stats.skipped, kLookUps - 1);
+  EXPECT_EQ(stats.switched_off, 1U);
+  EXPECT_FALSE(stats.on);
+  EXPECT_EQ(redis.look_ups(), 1U) << "while it is switched off, no look-up sends a byte";
+}
+
+TEST(SharedTier, AnErrorSwitchesOffAsSilenceDoes) {
+  FakeRedis redis;
+  redis.SetReply("-LOADING Redis is loading\r\n");
+  SharedTier tier(OptionsOf(redis, 1));
+  Await([&] { return tier.stats().on; });
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(tier.Find("key"), std::nullopt);
+  EXPECT_EQ(tier.stats().timeouts, 0U);
+  EXPECT_EQ(tier.stats().skipped, 99U);
+  EXPECT_EQ(redis.look_ups(), 1U);
+}
+
+TEST(SharedTier, TheFirstTimeOutEndsAllLookUps) {
+  FakeRedis redis;
+  SharedTierOptions options = OptionsOf(redis, 8);
+  options.timeout = seconds(2);
+  SharedTier tier(options);
+  Await([&] { return redis.pings() >= 16; });
+  Await([&] { return tier.stats().on; });
+  redis.FallSilent();
+  std::vector<std::jthread> callers;
+  callers.emplace_back([&] { tier.Find("key"); });
+  Await([&] { return redis.look_ups() == 1; });
+  std::this_thread::sleep_for(options.timeout / 2);  // the others have that much left when the first has none
+  for (int i = 0; i < 7; ++i) callers.emplace_back([&] { tier.Find("key"); });
+  Await([&] { return redis.look_ups() == 8; });
+  callers.clear();
+  EXPECT_EQ(tier.stats().timeouts, 1U) << "connections that are all gone cost one time-out, not one each";
+  EXPECT_EQ(tier.stats().switched_off, 1U);
+}
+
+TEST(SharedTier, ConnectionsThatAreSilentlyGoneAreFoundWithoutALookUp) {
+  FakeRedis redis;
+  SharedTierOptions options = OptionsOf(redis, 4);
+  options.timeout = milliseconds(50);
+  options.test_after = milliseconds(100);
+  SharedTier tier(options);
+  Await([&] { return redis.pings() >= 12; });  // all four have been tested
+  EXPECT_TRUE(tier.stats().on);
+  redis.FallSilent();
+  Await([&] { return !tier.stats().on; });
+  EXPECT_EQ(tier.stats().timeouts, 1U) << "of the store's own thread";
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(tier.Find("key"), std::nullopt);
+  EXPECT_EQ(tier.stats().timeouts, 1U);
+  EXPECT_EQ(redis.look_ups(), 0U);
+}
+
+TEST(SharedTier, ConnectionsThatRedisHasClosedAreReplacedWithoutAFailure) {
+  FakeRedis redis;
+  redis.SetValue(tiler::AddChecksum("key", "value"));
+  SharedTierOptions options = OptionsOf(redis, 2);
+  SharedTier tier(options);
+  Await([&] { return redis.pings() >= 4; });
+  Await([&] { return tier.stats().on; });
+  redis.CloseAll();
+  EXPECT_EQ(tier.Find("key"), std::nullopt);  // both are found to be closed, and opened again by the store's thread
+  Await([&] { return tier.Find("key").has_value(); });
+  EXPECT_EQ(tier.stats().switched_off, 0U);
+  EXPECT_EQ(tier.stats().errors, 0U);
+}
+
+TEST(SharedTier, ComesBackWhenRedisAnswers) {
+  FakeRedis redis;
+  redis.SetValue(tiler::AddChecksum("key", "value"));
+  SharedTierOptions options = OptionsOf(redis, 1);
+  options.timeout = milliseconds(200);
+  options.retry_after = milliseconds(20);
+  SharedTier tier(options);
+  Await([&] { return tier.stats().on; });
+  redis.FallSilent();
+  EXPECT_EQ(tier.Find("key"), std::nullopt);
+  redis.Speak();
+  Await([&] { return tier.Find("key").has_value(); });
+  EXPECT_EQ(tier.stats().switched_off, 1U);
+}
+
+}  // namespace
+}  // namespace terrace::server

@@ -1,0 +1,27 @@
+#include <chrono>
+
+#include "proto/documents/vector_tile.h"
+#include "tiler/encoders.h"
+#include "tiler/map/contour_tile.h"
+#include "tiler/map/map_heights.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::tiler {
+
+// Heights are in the sources' datum, because a map's lines tell heights above the sea.
+Result<void> EncodeContours(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  encoded.refinement = RefinementUse::kNone;
+  auto start = std::chrono::steady_clock::now();
+  const MapWindow window(input.request.key, kHeightSizes[0], kContourMargin);
+  const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kSource, stop);
+  if (!heights) return tl::unexpected(heights.error());
+  encoded.times.read = MicrosecondsSince(start);
+  start = std::chrono::steady_clock::now();
+  const auto features = ContoursOf(*heights, input.request.map.interval_cm, stop);
+  if (!features) return tl::unexpected(features.error());
+  encoded.bytes = proto::EncodeContourTile(*features);
+  encoded.times.encode = MicrosecondsSince(start);
+  return {};
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,45 @@
+#include <chrono>
+#include <utility>
+
+#include "proto/documents/map_picture.h"
+#include "tiler/encoders.h"
+#include "tiler/tile_pipeline.h"
+
+namespace terrace::tiler {
+namespace {
+
+Result<void> EncodeMapPicture(Result<dem::MapPicture> read, std::chrono::steady_clock::time_point start,
+                              const EncoderInput& input, EncodedTile& encoded) {
+  if (!read) return tl::unexpected(std::move(read.error()));
+  encoded.refinement = RefinementUse::kNone;
+  encoded.times.read = MicrosecondsSince(start);
+  start = std::chrono::steady_clock::now();
+  auto bytes = proto::EncodePhoto({read->side, read->side, proto::PixelKind::kRgba, read->rgba},
+                                  input.request.map.picture, input.dataset.imagery.quality, dem::Imagery::kNoPicture);
+  if (!bytes) return tl::unexpected(std::move(bytes.error()));
+  encoded.bytes = *std::move(bytes);
+  encoded.times.encode = MicrosecondsSince(start);
+  return {};
+}
+
+tl::unexpected<Error> NoImagery() { return MakeError(ErrorCode::kNotFound, "the dataset has no imagery"); }
+
+}  // namespace
+
+Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  if (!input.dataset.imagery.image) return NoImagery();
+  const auto start = std::chrono::steady_clock::now();
+  const geo::TileKey& key = input.request.key;
+  const int size = input.request.height_size, depth = key.level + (size == 512 ? 1 : 0);
+  return EncodeMapPicture(input.dataset.imagery.image->ReadMercator(depth, key.x * size, key.y * size, size, stop),
+                          start, input, encoded);
+}
+
+Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+  if (!input.dataset.imagery.image) return NoImagery();
+  const auto start = std::chrono::steady_clock::now();
+  return EncodeMapPicture(input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.height_size, stop),
+                          start, input, encoded);
+}
+
+}  // namespace terrace::tiler

@@ -1,0 +1,24 @@
+// Parameters of tiles for maps that change their bytes, in whole numbers, so that equal requests have one form.
+#pragma once
+
+#include <cstdint>
+
+#include "proto/documents/map_picture.h"
+
+namespace terrace::tiler {
+
+enum class SlopeStyle : std::uint8_t { kColors, kDegrees };
+
+// Members that a format does not use have their defaults.
+struct MapParameters {
+  proto::PictureFormat picture = proto::PictureFormat::kPng;
+  std::uint16_t azimuth_deg = 315;          // where the light comes from, clockwise from north, 0 .. 359
+  std::uint8_t altitude_deg = 45;           // of the light above the horizon, 0 .. 90
+  std::uint16_t z_factor_hundredths = 100;  // heights are multiplied by it, 1 .. 10000
+  SlopeStyle slope_style = SlopeStyle::kColors;
+  std::uint32_t interval_cm = 0;  // of contours; not 0 in their requests
+
+  friend bool operator==(const MapParameters&, const MapParameters&) = default;
+};
+
+}  // namespace terrace::tiler
