@@ -6,11 +6,14 @@ LISTEN ?=
 # Options of `make bench` and `make bench-serve`, for instance BENCH="--peer 'COMMAND' --filter 'T1 '": see docs/performance.md.
 BENCH ?=
 
+# Where `make install` puts the server and the library, below DESTDIR.
+PREFIX ?= /usr/local
+
 SOURCES = git ls-files '*.h' '*.cc'
 TERRACE = build/release/server/cli/terrace
 
 .DEFAULT_GOAL := help
-.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper deb docs site format lint tidy clean
+.PHONY: help deps test-deps build run test sanitize coverage reliability reliability-long bench bench-serve paper deb install release docs site format lint tidy clean
 
 help:  ## list these targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -59,6 +62,13 @@ paper: test-deps  ## repeat the experiments of the paper (docs/engine.md) into b
 
 deb: build test-deps  ## build the Debian package into build/deb
 	@packaging/build_deb.sh
+
+release: test-deps  ## build source, Debian package, image recipe, bill of materials and sums into build/release-files
+	@JOBS=$(JOBS) tools/release.sh
+
+install: build  ## install the server and the tiler library (PREFIX=/usr/local, DESTDIR=)
+	DESTDIR=$(DESTDIR) cmake --install build/release --prefix $(PREFIX) --strip > /dev/null
+	DESTDIR=$(DESTDIR) cmake --install build/release --prefix $(PREFIX) --component development > /dev/null
 
 docs: deps  ## write config.schema.json and the tables of docs/configuration.md from the options
 	cmake --preset release --log-level=WARNING

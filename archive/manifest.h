@@ -52,7 +52,7 @@ struct BakedDataset {
 };
 
 struct Manifest {
-  std::string product;  // "terrace 0.1.0"
+  std::string product;  // "terrace 1.0.0"
   std::string encoder;  // tiler::EncoderText()
   BakedDataset dataset;
   // The request of every tile: format, coding, extensions, compression, texture, encoding. Its dataset, key and

@@ -18,14 +18,16 @@ set_property(CACHE TERRACE_SANITIZER PROPERTY STRINGS "" address thread)
 
 add_library(terrace_options INTERFACE)
 target_compile_options(terrace_options INTERFACE
-  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror=return-type
-  # Otherwise GCC fuses a*b+c into one rounding on processors that can, and bytes differ between machines.
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion;-Werror=return-type>"
+  # Otherwise GCC fuses a*b+c into one rounding on processors that can, and bytes differ between machines. Also for
+  # programs that use the library: inline functions of its headers are linked once.
   -ffp-contract=off
   # In a unity build, file-local names of one source are visible in the next. Builds of single sources report shadowed
   # names.
   $<$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>:-Wno-shadow>
   $<$<AND:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>)
-target_include_directories(terrace_options INTERFACE "${PROJECT_SOURCE_DIR}")
+target_compile_features(terrace_options INTERFACE cxx_std_20)
+target_include_directories(terrace_options INTERFACE "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>" "$<INSTALL_INTERFACE:include/terrace>")
 
 if(TERRACE_SANITIZER STREQUAL "address")
   # clang-14 reports Asio's coroutine frames under -fsanitize=function.

@@ -3,6 +3,8 @@
 function(terrace_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
   add_library(terrace_${name} STATIC ${ARG_SOURCES})
+  # Header-only libraries in sources: programs that link an installed library do not need them.
+  list(TRANSFORM ARG_PRIVATE_DEPS REPLACE "^(Boost::headers|nlohmann_json::nlohmann_json)$" "$<BUILD_INTERFACE:\\1>")
   add_library(terrace::${name} ALIAS terrace_${name})
   target_link_libraries(terrace_${name} PUBLIC terrace_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
 endfunction()

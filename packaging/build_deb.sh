@@ -14,8 +14,8 @@ export BUILD SOURCE
 terrace=$BUILD/server/cli/terrace
 [[ -x $terrace ]] || { echo "build_deb: $terrace is missing; run make build" >&2; exit 1; }
 version=$("$terrace" --version | grep -oE '[0-9]+\.[0-9]+\.[0-9]+')
-stamp=$(git -C "$root" log -1 --format=%ct)
-export SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$stamp}
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git -C "$root" log -1 --format=%ct)}
+export SOURCE_DATE_EPOCH
 
 maintainer="${DEBFULLNAME:-The terrace authors} <${DEBEMAIL:-terrace@lists.example.org}>"
 

@@ -6,9 +6,13 @@
 #include <utility>
 
 #include "proto/documents/implicit_tree.h"
+#include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
+#include "server/http/http_error.h"
 #include "server/http/text.h"
+#include "server/openapi/openapi_document.h"
+#include "server/openapi/operations.h"
 #include "tiler/tile_bounds.h"
 
 namespace terrace::server {
@@ -151,21 +155,40 @@ Answer Write(const Handlers& from, const RequestContext& context) {
   return from.documents.Make(describe(from, context), context);
 }
 
+DocumentAnswer DescribeUrls(const Handlers& from, const RequestContext& context);
+
 // Most frequent routes first.
 constexpr RouteRow kRows[] = {
     {.label = "tile", .pattern = "/{dataset}/{z}/{x}/{y}.{suffix}", .handle = AnswerTile, .read = ReadTile},
     {.label = "tile",
      .pattern = "/{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb",
      .handle = AnswerTile,
+     .operation = &kImplicitTileOperation,
      .read = ReadImplicitTile},
     {.label = "subtree",
      .pattern = "/{dataset}/3dtiles/{root}/{level}/{x}/{y}.{levels}.subtree",
      .handle = Write<DescribeSubtree>,
+     .operation = &kSubtreeOperation,
      .read = ReadSubtree},
-    {.label = "layer", .pattern = "/{dataset}/layer.json", .handle = Write<DescribeLayer>, .has_templates = true},
-    {.label = "tileset", .pattern = "/{dataset}/tileset.json", .handle = Write<DescribeTileset>, .has_templates = true},
-    {.label = "tilejson", .pattern = "/{dataset}/tiles.json", .handle = AnswerTileJson, .has_templates = true},
-    {.label = "edits", .pattern = "/{dataset}/edits.geojson", .handle = Write<DescribeEdits>},
+    {.label = "layer",
+     .pattern = "/{dataset}/layer.json",
+     .handle = Write<DescribeLayer>,
+     .operation = &kLayerOperation,
+     .has_templates = true},
+    {.label = "tileset",
+     .pattern = "/{dataset}/tileset.json",
+     .handle = Write<DescribeTileset>,
+     .operation = &kTilesetOperation,
+     .has_templates = true},
+    {.label = "tilejson",
+     .pattern = "/{dataset}/tiles.json",
+     .handle = AnswerTileJson,
+     .operation = &kTileJsonOperation,
+     .has_templates = true},
+    {.label = "edits",
+     .pattern = "/{dataset}/edits.geojson",
+     .handle = Write<DescribeEdits>,
+     .operation = &kEditsOperation},
     {.label = "hillshade",
      .pattern = "/{dataset}/hillshade/{z}/{x}/{y}.{suffix}",
      .handle = AnswerTile,
@@ -189,68 +212,135 @@ constexpr RouteRow kRows[] = {
     {.label = "hillshade",
      .pattern = "/{dataset}/hillshade/tiles.json",
      .handle = AnswerMapTileJson,
+     .operation = &kHillshadeTileJsonOperation,
      .read = ReadMapLayer,
      .has_templates = true},
     {.label = "slope",
      .pattern = "/{dataset}/slope/tiles.json",
      .handle = AnswerMapTileJson,
+     .operation = &kSlopeTileJsonOperation,
      .read = ReadMapLayer,
      .has_templates = true},
     {.label = "contours",
      .pattern = "/{dataset}/contours/tiles.json",
      .handle = AnswerMapTileJson,
+     .operation = &kContoursTileJsonOperation,
      .read = ReadMapLayer,
      .has_templates = true},
     {.label = "imagery",
      .pattern = "/{dataset}/imagery/tiles.json",
      .handle = AnswerMapTileJson,
+     .operation = &kImageryTileJsonOperation,
      .read = ReadMapLayer,
      .has_templates = true},
-    {.label = "heights", .pattern = "/{dataset}/heights", .handle = AnswerHeights, .max_body_bytes = MaxLocationsBytes},
-    {.label = "grid", .pattern = "/{dataset}/grid", .handle = AnswerGrid},
-    {.label = "sight", .pattern = "/{dataset}/sight", .handle = AnswerSight, .max_body_bytes = MaxRaysBytes},
-    {.label = "mesh", .pattern = "/{dataset}/mesh", .handle = AnswerArea},
+    {.label = "heights",
+     .pattern = "/{dataset}/heights",
+     .handle = AnswerHeights,
+     .operation = &kHeightsOperation,
+     .max_body_bytes = MaxLocationsBytes},
+    {.label = "grid", .pattern = "/{dataset}/grid", .handle = AnswerGrid, .operation = &kGridOperation},
+    {.label = "sight",
+     .pattern = "/{dataset}/sight",
+     .handle = AnswerSight,
+     .operation = &kSightOperation,
+     .max_body_bytes = MaxRaysBytes},
+    {.label = "mesh", .pattern = "/{dataset}/mesh", .handle = AnswerArea, .operation = &kAreaOperation},
     {.label = "datasets",
      .pattern = "/datasets",
      .handle = Write<DescribeDatasets>,
+     .operation = &kDatasetsOperation,
      .scope = DatasetScope::kVisibleDatasets},
+    {.label = "openapi",
+     .pattern = "/openapi.json",
+     .handle = Write<DescribeUrls>,
+     .operation = &kOpenApiOperation,
+     .scope = DatasetScope::kNothing,
+     .needs_no_catalog = true},
     {.label = "viewer",
      .pattern = "/",
      .handle = Write<DescribeViewerFile>,
+     .operation = &kViewerOperation,
      .read = ReadViewerFile,
      .scope = DatasetScope::kNothing,
      .takes_any_query = true},
     {.label = "viewer",
      .pattern = "/viewer/{file}...",
      .handle = Write<DescribeViewerFile>,
+     .operation = &kViewerFileOperation,
      .read = ReadViewerFile,
      .scope = DatasetScope::kNothing,
      .takes_any_query = true},
     {.label = "livez",
      .pattern = "/livez",
      .handle = AnswerLive,
+     .operation = &kLiveOperation,
      .scope = DatasetScope::kNothing,
      .is_probe = true,
      .needs_no_catalog = true},
     {.label = "readyz",
      .pattern = "/readyz",
      .handle = AnswerReady,
+     .operation = &kReadyOperation,
      .scope = DatasetScope::kNothing,
      .is_probe = true,
      .needs_no_catalog = true},
     {.label = "metrics",
      .pattern = "/metrics",
      .handle = AnswerMetrics,
+     .operation = &kMetricsOperation,
      .scope = DatasetScope::kAllDatasets,
      .needs_no_catalog = true},
     {.label = "version",
      .pattern = "/version",
      .handle = AnswerVersion,
+     .operation = &kVersionOperation,
      .scope = DatasetScope::kAllDatasets,
      .needs_no_catalog = true},
 };
 
+DocumentAnswer DescribeUrls(const Handlers&, const RequestContext& context) {
+  if (const Result<void> none = RefuseParameters(context.route.query); !none) {
+    return ClientErrorResponse(none.error(), context.request->id);
+  }
+  DocumentPlan plan;
+  plan.key = "openapi";
+  plan.content_type = "application/json";
+  plan.cache_control = kRevalidate;
+  plan.write = [](const std::stop_token&) { return WriteOpenApi(DocumentedUrls()); };
+  return plan;
+}
+
 }  // namespace
+
+std::vector<DocumentedUrl> DocumentedUrls() {
+  constexpr std::string_view kSuffix = ".{suffix}", kMore = "...";
+  std::vector<DocumentedUrl> urls;
+  for (const RouteRow& row : kRows) {
+    DocumentedUrl url{.pattern = std::string(row.pattern),
+                      .operation = row.operation,
+                      .takes_post = row.takes_post(),
+                      .takes_any_query = row.takes_any_query,
+                      .is_probe = row.is_probe,
+                      .needs_grant = row.scope != DatasetScope::kNothing};
+    if (row.pattern.ends_with(kMore)) url.pattern.resize(url.pattern.size() - kMore.size());
+    if (!row.pattern.ends_with(kSuffix)) {
+      urls.push_back(std::move(url));
+      continue;
+    }
+    url.pattern.resize(url.pattern.size() - kSuffix.size());
+    // "/{dataset}/hillshade/{z}/{x}/{y}": the folder of the formats is between the dataset and the level.
+    const std::size_t begin = std::string_view("/{dataset}/").size(), end = url.pattern.find("{z}");
+    const std::string folder = url.pattern.substr(begin, end > begin ? end - 1 - begin : 0);
+    for (const TileFormat& format : TileFormats()) {
+      if (format.folder != folder) continue;
+      DocumentedUrl of_format = url;
+      of_format.pattern.append(format.suffix);
+      of_format.operation = format.operation;
+      urls.push_back(std::move(of_format));
+    }
+  }
+  return urls;
+}
 
 const RouteTable& Routes() {
   static const RouteTable table(kRows);

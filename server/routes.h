@@ -12,6 +12,7 @@
 
 #include "engine/core/result.h"
 #include "server/api/request_context.h"
+#include "server/openapi/openapi_document.h"
 
 namespace terrace::server {
 
@@ -57,5 +58,8 @@ class RouteTable {
 };
 
 const RouteTable& Routes();
+
+// Every row, one URL for each tile format, for /openapi.json.
+std::vector<DocumentedUrl> DocumentedUrls();
 
 }  // namespace terrace::server

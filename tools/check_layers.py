@@ -44,7 +44,7 @@ VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_t
 FLY = ["fly/scene", "fly/select", "fly/content", "fly/tree", "fly/http", "fly/flight", "fly/report"]
 HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
-API = TILES + HTTP + ["server/api"]
+API = TILES + HTTP + ["server/openapi", "server/api"]
 SERVER = API + ["server/store", "server/telemetry", "server/query", "server/frontend", "server/documents", "server/handlers"]
 MODULES = {
     "engine/core": [],
@@ -80,7 +80,8 @@ MODULES = {
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
-    "server/api": TILES + HTTP,
+    "server/openapi": [],
+    "server/api": TILES + HTTP + ["server/openapi"],
     "server/frontend": API + ["server/telemetry"],
     "server/documents": API,
     "server/handlers": API + ["server/query", "server/documents"],

@@ -118,5 +118,6 @@ install_node_modules server/viewer
 if $with_tests; then
   install_node_modules tests/e2e
   install_node_modules tests/examples
+  install_node_modules tests/openapi
   install_node_modules tests/scale
 fi

@@ -6,9 +6,10 @@
 
 With --built the stage that compiles is skipped, and its installed files come from PREFIX (cmake --install build/release --prefix).
 
-Supports the instructions of the Dockerfile: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK; others are an error. Leaves the
-last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER, waits until HEALTHCHECK passes, fetches a tile, and sends
-SIGTERM, which must give exit code 0. Port 8080 must be free. Needs root, and uses the machine's network.
+Supports the instructions of the Dockerfile: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK (ENV has no effect); others are an error. Leaves the
+last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER on a read-only root, where only /tmp and /var/cache/terrace can be written,
+waits until HEALTHCHECK passes, fetches a tile, and sends SIGTERM, which must give exit code 0. Prints the size of the root and of its tar with gzip,
+as registries send it; fails if the latter is over 150 MB. Port 8080 must be free. Needs root, and uses the machine's network.
 """
 import argparse
 import fnmatch
@@ -49,16 +50,23 @@ def context():
     return folder
 
 
-def inside(root, command, user=None, workdir="/"):
+LIMIT_MB = 150  # of the compressed image
+
+
+def inside(root, command, user=None, workdir="/", read_only=False):
     """The command line of a process in `root` with its own mounts and process namespace, which end with it."""
-    mounts = "mount --make-rprivate / && mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && "
+    mounts = "mount --make-rprivate / && "
+    if read_only:
+        mounts += ("mount --bind {0} {0} && mount -o remount,ro,bind {0} && mount -t tmpfs -o mode=1777 tmp {0}/tmp && "
+                   "mount -t tmpfs -o uid=10001 cache {0}/var/cache/terrace && ")
+    mounts += "mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && "
     drop = f"--userspec={user} " if user else ""
     enter = "exec env -i PATH={1} HOME=/tmp chroot {2}{0} /bin/sh -c 'cd \"$0\" && exec \"$@\"' {3} \"$@\""
     script = (mounts + enter).format(root, PATH, drop, workdir)
     return ["unshare", "--mount", "--pid", "--fork", "--kill-child", "bash", "-c", script, "bash", *command]
 
 
-def copy(source_root, root, workdir, rest):
+def copy(source_root, root, workdir, rest, owner):
     *sources, target = rest.split()
     base = pathlib.Path(workdir) / target  # an absolute target replaces workdir
     destination = pathlib.Path(str(root) + str(base))
@@ -67,6 +75,10 @@ def copy(source_root, root, workdir, rest):
         path = source_root / source.lstrip("/")
         if path.is_dir():
             shutil.copytree(path, destination, symlinks=True, dirs_exist_ok=True)
+            if owner is not None:
+                for folder, _, names in os.walk(destination):
+                    for name in [".", *names]:
+                        os.lchown(os.path.join(folder, name), owner, 0)
         else:
             where = destination / path.name if into_folder else destination
             where.parent.mkdir(parents=True, exist_ok=True)
@@ -90,23 +102,28 @@ def play(base, folder, built):
             root, workdir, image = folder / name, "/", {}
             shutil.rmtree(root, ignore_errors=True)
             root.mkdir(parents=True)
-            subprocess.run(["tar", "-C", root, "-xf", base], check=True)
+            if rest.split()[0] != "scratch":
+                subprocess.run(["tar", "-C", root, "-xf", base], check=True)
             stages[name] = root
         elif word == "WORKDIR":
             workdir = rest
             pathlib.Path(str(root) + rest).mkdir(parents=True, exist_ok=True)
         elif word == "COPY":
-            source = files
+            source, owner = files, None
             if rest.startswith("--from="):
                 stage, _, rest = rest[len("--from="):].partition(" ")
                 source = stages[stage]
                 if built:  # contains what the stage would install below /opt/terrace
                     rest = rest.replace("/opt/terrace", "/", 1)
-            copy(source, root, workdir, rest)
+            if rest.startswith("--chown="):
+                flag, _, rest = rest.partition(" ")
+                owner = int(re.match(r"--chown=(\d+)", flag)[1])
+            copy(source, root, workdir, rest, owner)
         elif word == "RUN":
-            subprocess.run(inside(root, ["/bin/sh", "-c", rest], workdir=workdir), check=True, stdin=subprocess.DEVNULL)
+            command = json.loads(rest) if rest.startswith("[") else ["/bin/sh", "-c", rest]
+            subprocess.run(inside(root, command, workdir=workdir), check=True, stdin=subprocess.DEVNULL)
             print(f"  {time.monotonic() - begun:.0f} s", flush=True)
-        elif word in ("USER", "ENTRYPOINT", "CMD", "HEALTHCHECK", "EXPOSE", "STOPSIGNAL"):
+        elif word in ("ENV", "USER", "ENTRYPOINT", "CMD", "HEALTHCHECK", "EXPOSE", "STOPSIGNAL"):
             image[word] = rest
         else:
             sys.exit(f"play_dockerfile: {word} is not known")
@@ -117,7 +134,7 @@ def play(base, folder, built):
 def smoke(root, image):
     command = json.loads(image["ENTRYPOINT"]) + json.loads(image["CMD"])
     health = json.loads(re.search(r"CMD (\[.*\])", image["HEALTHCHECK"])[1])
-    server = subprocess.Popen(inside(root, command, image["USER"]), stdin=subprocess.DEVNULL)
+    server = subprocess.Popen(inside(root, command, image["USER"], read_only=True), stdin=subprocess.DEVNULL)
     try:
         for _ in range(60):
             if subprocess.run(inside(root, health, image["USER"])).returncode == 0:
@@ -141,8 +158,13 @@ def smoke(root, image):
     finally:
         if server.poll() is None:
             server.kill()
-    size = subprocess.run(["du", "-sxm", root], stdout=subprocess.PIPE, text=True, check=True).stdout.split()[0]
-    print(f"runs as {image['USER']}, healthy, ends with 0; {size} MB in all")
+    print(f"runs as {image['USER']} on a read-only root, healthy, ends with 0")
+    def size(command):
+        return int(subprocess.run(f"tar -C '{root}' --one-file-system -cf - . | {command}", shell=True, stdout=subprocess.PIPE, check=True).stdout)
+    plain, packed = size("wc -c"), size("gzip -6 | wc -c")
+    print(f"{plain / 1e6:.1f} MB, {packed / 1e6:.1f} MB with gzip")
+    if packed > LIMIT_MB * 1e6:
+        sys.exit(f"play_dockerfile: the image has more than {LIMIT_MB} MB with gzip")
 
 
 def main():

@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::size_t kMaxNameLength = 64;
 
-constexpr std::array<std::string_view, 6> kReservedNames = {"datasets", "viewer",  "livez",
-                                                            "readyz",   "metrics", "version"};
+constexpr std::array<std::string_view, 7> kReservedNames = {"datasets", "viewer",  "livez",       "readyz",
+                                                            "metrics",  "version", "openapi.json"};
 
 bool IsNameCharacter(char c) {
   return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';

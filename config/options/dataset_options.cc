@@ -18,9 +18,9 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {.key = "name",
        .value = "NAME",
        .help = "Name of the dataset in URLs; by default the name of the file without its extension",
-       .details =
-           "1 to 64 letters, digits, `.`, `_` or `-`; not `.`, `..`, `datasets`, `viewer`, `livez`, `readyz`, "
-           "`metrics` or `version`. A DEM on the command line is named after its file; other characters become `-`",
+       .details = "1 to 64 letters, digits, `.`, `_` or `-`; not `.`, `..`, `datasets`, `viewer`, `livez`, `readyz`, "
+                  "`metrics`, `version` or `openapi.json`. A DEM on the command line is named after its file; other "
+                  "characters become `-`",
        .codec = Text(&DatasetConfig::name, CheckDatasetName, NameSchema()),
        .other_words = "id title",
        .missing = "; every dataset needs one"},

@@ -20,6 +20,7 @@ struct Handlers;  // server/handlers/handlers.h
 class Segments;   // server/routes.h
 struct RouteRow;
 struct TileFormat;  // server/api/tile_formats.h
+struct Operation;   // server/openapi/operation.h
 
 struct Route {
   const RouteRow* row = nullptr;       // null: not a URL of the server
@@ -45,6 +46,8 @@ struct RouteRow {
   std::string_view label;    // in logs and metrics
   std::string_view pattern;  // "/{dataset}/layer.json": '{' in a segment matches any; "..." at the end: one or more
   Answer (*handle)(const Handlers& handlers, const RequestContext& context);
+  // What /openapi.json says about the URL; of tiles see TileFormat::operation. Null: a test fails.
+  const Operation* operation = nullptr;
   // Reads what the URL names besides its dataset. Returns false if the URL names nothing. Null: nothing to read.
   bool (*read)(const Segments& segments, Route& route) = nullptr;
   DatasetScope scope = DatasetScope::kOneDataset;

@@ -16,6 +16,7 @@
 #include "proto/mesh/tile_metadata.h"
 #include "server/api/map_parameters.h"
 #include "server/http/text.h"
+#include "server/openapi/operations.h"
 
 namespace terrace::server {
 namespace {
@@ -106,18 +107,22 @@ constexpr proto::PictureFormat kPng = proto::PictureFormat::kPng, kWebp = proto:
                                kJpeg = proto::PictureFormat::kJpeg;
 
 constexpr TileFormat kFormats[] = {
-    {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh},
-    {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb},
-    {tiler::TileFormat::kHeightPng, "", ".png", PngType, PngVary, ReadHeightPng},
-    {kHillshade, "hillshade", ".png", MapTileType, PngVary, ReadPicture, kPng},
-    {kHillshade, "hillshade", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
-    {kSlope, "slope", ".png", MapTileType, PngVary, ReadPicture, kPng},
-    {kSlope, "slope", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
-    {kContours, "contours", ".mvt", MapTileType, ContoursVary, ReadContours},
-    {kImagery, "imagery", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
-    {kImagery, "imagery", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg},
-    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, PngVary, ReadPicture, kWebp},
-    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg},
+    {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh,
+     proto::PictureFormat::kPng, &kTerrainTileOperation},
+    {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb, proto::PictureFormat::kPng, &kGlbTileOperation},
+    {tiler::TileFormat::kHeightPng, "", ".png", PngType, PngVary, ReadHeightPng, proto::PictureFormat::kPng,
+     &kHeightTileOperation},
+    {kHillshade, "hillshade", ".png", MapTileType, PngVary, ReadPicture, kPng, &kHillshadePngOperation},
+    {kHillshade, "hillshade", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kHillshadeWebpOperation},
+    {kSlope, "slope", ".png", MapTileType, PngVary, ReadPicture, kPng, &kSlopePngOperation},
+    {kSlope, "slope", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kSlopeWebpOperation},
+    {kContours, "contours", ".mvt", MapTileType, ContoursVary, ReadContours, kPng, &kContoursOperation},
+    {kImagery, "imagery", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kImageryWebpOperation},
+    {kImagery, "imagery", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg, &kImageryJpegOperation},
+    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, PngVary, ReadPicture, kWebp,
+     &kGeodeticImageryWebpOperation},
+    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg,
+     &kGeodeticImageryJpegOperation},
 };
 
 // If `repeatable`, a parameter may be repeated with the same value.
@@ -307,6 +312,8 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
   }
   return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
+
+std::span<const TileFormat> TileFormats() { return kFormats; }
 
 const TileFormat* CutSuffix(std::string_view& name, std::string_view folder) {
   for (const TileFormat& row : kFormats) {

@@ -58,9 +58,13 @@ struct TileFormat {
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                        tiler::TileRequest& tile);
   proto::PictureFormat picture = proto::PictureFormat::kPng;  // of pictures for maps
+  const Operation* operation = nullptr;                       // what /openapi.json says about its URLs
 
   bool is_mercator() const { return tiler::IsMercator(format); }
 };
+
+// All formats.
+std::span<const TileFormat> TileFormats();
 
 // Removes the suffix of a tile's URL from its last segment, and returns the row of the format in a folder; null if no
 // suffix matches.

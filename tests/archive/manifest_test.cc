@@ -10,7 +10,7 @@ namespace {
 
 Manifest FullManifest() {
   Manifest manifest;
-  manifest.product = "terrace 0.1.0";
+  manifest.product = "terrace 1.0.0";
   manifest.encoder = "1 GDAL 3.6.2";
   manifest.dataset.name = "alps";
   manifest.dataset.attribution = "© swisstopo \"x\"";

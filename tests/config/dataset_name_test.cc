@@ -23,7 +23,7 @@ TEST(CheckDatasetName, RefusesOtherCharactersAndLengths) {
 }
 
 TEST(CheckDatasetName, RefusesUrlsOfTheServer) {
-  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics", "version"}) {
+  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics", "version", "openapi.json"}) {
     EXPECT_NE(CheckDatasetName(name).find("is a URL of the server itself"), std::string::npos) << name;
   }
 }

@@ -69,6 +69,27 @@ class Package(unittest.TestCase):
         self.assertIn("User=terrace", unit)
         self.assertIn("u terrace", (self.root / "usr/lib/sysusers.d/terrace.conf").read_text())
 
+    def test_the_bill_of_materials_has_what_the_package_needs_and_contains(self):
+        texts = []
+        for name in ("a.json", "b.json"):
+            run(ROOT / "tools/write_sbom.py", self.deb, self.root / name)
+            texts.append((self.root / name).read_text())
+        self.assertEqual(texts[0], texts[1])
+        document = json.loads(texts[0])
+        versions = {component["name"]: component["version"] for component in document["components"]}
+        for clause in run("dpkg-deb", "-f", self.deb, "Depends").split(","):
+            name = clause.split()[0]
+            if name in versions:  # else an alternative of it is
+                self.assertEqual(versions[name], run("dpkg-query", "-W", "-f", "${Version}", name))
+        viewer = json.loads((ROOT / "server/viewer/package-lock.json").read_text())["packages"]
+        self.assertEqual(versions["cesium"], viewer["node_modules/cesium"]["version"])
+        for name in ("libgdal32", "libdraco7", "libproj25", "libc6", "boost", "nlohmann-json3-dev"):
+            self.assertIn(name, versions)
+        refs = [component["bom-ref"] for component in document["components"]] + [document["metadata"]["component"]["bom-ref"]]
+        self.assertEqual(len(refs), len(set(refs)))
+        named = {ref for entry in document["dependencies"] for ref in [entry["ref"], *entry["dependsOn"]]}
+        self.assertEqual(named - set(refs), set())
+
     def test_the_viewer_is_found_beside_the_program(self):
         printed = json.loads(run(self.terrace, "serve", self.root / "usr/share/terrace/samples/jacksboro.tif", "--print-config"))
         self.assertIs(printed["viewer"], True)

@@ -237,11 +237,15 @@ bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, c
 // The configuration of the server: with the installed viewer, if the configuration asks for it.
 config::Config WithViewer(config::Config config) {
   if (!config.viewer.enabled || !config.viewer.directory.empty()) return config;
-  // Beside the binary if installed, else in the build tree.
+  // Beside the binary if installed (PREFIX/bin), else in the build tree (BUILD/server/cli). The program contains no
+  // path of the build: two builds in different folders are equal.
   std::error_code ignored;
   const std::filesystem::path binary = std::filesystem::read_symlink("/proc/self/exe", ignored);
-  config.viewer.directory = binary.parent_path().parent_path() / "share/terrace/viewer";
-  if (!std::filesystem::exists(config.viewer.directory, ignored)) config.viewer.directory = TERRACE_VIEWER_DIR;
+  const std::filesystem::path above = binary.parent_path().parent_path();
+  constexpr const char* kPlace = "share/terrace/viewer";
+  config.viewer.directory = above / kPlace;
+  if (!std::filesystem::exists(config.viewer.directory, ignored))
+    config.viewer.directory = above.parent_path() / kPlace;
   return config;
 }
 

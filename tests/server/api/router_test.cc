@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <set>
 #include <string>
+#include <string_view>
 
 #include "server/api/tile_formats.h"
 #include "server/routes.h"
+#include "server/telemetry/redact.h"
 
 namespace terrace::server {
 namespace {
@@ -191,8 +194,31 @@ TEST(Router, RefusesMalformedTargets) {
 }
 
 TEST(Router, ReservesTheNamesOfItsOwnUrls) {
-  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics"}) EXPECT_TRUE(Routes().IsReserved(name));
+  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics", "openapi.json"}) {
+    EXPECT_TRUE(Routes().IsReserved(name)) << name;
+  }
   for (const char* name : {"maui", "", "layer.json", "{dataset}"}) EXPECT_FALSE(Routes().IsReserved(name)) << name;
+}
+
+TEST(Router, DescribesEachUrl) {
+  std::set<std::string_view> ids;
+  for (const DocumentedUrl& url : DocumentedUrls()) {
+    ASSERT_NE(url.operation, nullptr) << url.pattern << ": name its Operation in server/routes.cc or tile_formats.cc";
+    EXPECT_TRUE(ids.insert(url.operation->id).second) << url.operation->id;
+    for (const ExampleRequest& example : url.operation->examples) {
+      const Result<Route> route = Routes().Match(example.target);
+      ASSERT_TRUE(route) << example.target;
+      EXPECT_EQ(route->row->takes_post() || example.body_type.empty(), true) << example.target;
+      for (const std::string_view name : PlaceholdersOf(url.pattern)) {
+        EXPECT_TRUE(ValueIn(example.target, url.pattern, name)) << example.target << " " << name;
+      }
+    }
+    // The log may show it.
+    for (const ParameterNote& note : url.operation->parameters) {
+      EXPECT_TRUE(IsPlainTarget("/maui/x?" + std::string(note.name) + "=1")) << note.name;
+    }
+  }
+  EXPECT_GE(ids.size(), 20U);
 }
 
 TEST(Router, TellsWhichUrlsTakeABodyAndHowLarge) {

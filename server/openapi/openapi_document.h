@@ -1,0 +1,33 @@
+// Writes the OpenAPI 3.1 document of a table of URLs. Pure.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "server/openapi/operation.h"
+
+namespace terrace::server {
+
+// A URL to describe.
+struct DocumentedUrl {
+  std::string pattern;                   // "/{dataset}/{z}/{x}/{y}.terrain"
+  const Operation* operation = nullptr;  // null: only its pattern is known
+  bool takes_post = false;
+  bool takes_any_query = false;
+  bool is_probe = false;     // exempt from rate limits
+  bool needs_grant = false;  // the reply depends on a token, where the server has tokens
+};
+
+// The document as JSON; equal for equal URLs.
+std::string WriteOpenApi(const std::vector<DocumentedUrl>& urls);
+
+// The placeholders of a pattern in their order: "dataset", "z", "x", "y".
+std::vector<std::string_view> PlaceholdersOf(std::string_view pattern);
+
+// The value that a target has for a placeholder of the pattern; nothing if they do not match. The query does not count.
+std::optional<std::string> ValueIn(std::string_view target, std::string_view pattern, std::string_view placeholder);
+
+}  // namespace terrace::server

@@ -1,0 +1,53 @@
+#include "server/openapi/operations.h"
+
+namespace terrace::server {
+namespace {
+
+constexpr std::string_view kStateHeaders[] = {"Cache-Control"};
+constexpr MediaNote kPlainText[] = {{"text/plain; charset=utf-8"}};
+constexpr MediaNote kPrometheusText[] = {{"text/plain; version=0.0.4; charset=utf-8"}};
+constexpr MediaNote kVersionReplies[] = {{"application/json", "Version"}};
+constexpr ExampleRequest kLiveExamples[] = {{"/livez"}};
+constexpr ExampleRequest kReadyExamples[] = {{"/readyz"}};
+constexpr ExampleRequest kMetricsExamples[] = {{"/metrics"}};
+constexpr ExampleRequest kVersionExamples[] = {{"/version"}};
+
+}  // namespace
+
+const Operation kLiveOperation{.id = "getLive",
+                               .tag = "monitoring",
+                               .summary = "Liveness",
+                               .description = "`ok` as long as the process answers.",
+                               .replies = kPlainText,
+                               .headers = kStateHeaders,
+                               .examples = kLiveExamples};
+
+const Operation kReadyOperation{
+    .id = "getReady",
+    .tag = "monitoring",
+    .summary = "Readiness",
+    .description =
+        "`ready`, or `degraded` if a changed source or configuration cannot be loaded. 503: `opening` while "
+        "the server starts, `draining` while it stops.",
+    .replies = kPlainText,
+    .unavailable = kPlainText,
+    .headers = kStateHeaders,
+    .examples = kReadyExamples};
+
+const Operation kMetricsOperation{.id = "getMetrics",
+                                  .tag = "monitoring",
+                                  .summary = "Metrics in Prometheus text format",
+                                  .description = "With tokens only for those that see all datasets.",
+                                  .replies = kPrometheusText,
+                                  .headers = kStateHeaders,
+                                  .examples = kMetricsExamples};
+
+const Operation kVersionOperation{.id = "getVersion",
+                                  .tag = "monitoring",
+                                  .summary = "Versions of the program, of its libraries and of the datasets",
+                                  .description = "With tokens only for those that see all datasets.",
+                                  .replies = kVersionReplies,
+                                  .headers = kStateHeaders,
+                                  .examples = kVersionExamples};
+
+}  // namespace terrace::server
