@@ -297,7 +297,9 @@ class DeeperLevels(unittest.TestCase):
                                              way=["--circle", "-84.25,36.30,700,250", "--speed", "100"])
                     self.assertEqual(status, 0, summary)
                     self.assertGreater(summary["holes"]["examined_frames"], 3)
-                    asked = [int(level) for level in re.findall(r"^/jacksboro/(\d+)/\d+/\d+\.", urls.read_text(), re.M)]
+                    # /jacksboro/LEVEL/X/Y.terrain, /jacksboro/3dtiles/LEVEL-X-Y/LEVEL_BELOW/X/Y.glb
+                    found = re.findall(r"^/jacksboro/(?:3dtiles/(\d+)-\d+-\d+/)?(\d+)/\d+/\d+\.(?:terrain|glb)", urls.read_text(), re.M)
+                    asked = [int(root or 0) + int(level) for root, level in found]
                     self.assertGreaterEqual(max(asked), levels("plain") + 1, tiles)
 
 
