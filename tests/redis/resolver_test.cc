@@ -82,7 +82,9 @@ TEST(RedisResolver, AFailureKeepsTheLastAddressesButNotIfThereIsNoSuchHost) {
     EXPECT_EQ(NumberOf(resolver.Resolve("redis.example", 6379, In(seconds(30)))), 7U);
     const auto again = resolver.Resolve("redis.example", 6379, In(seconds(30)));
     EXPECT_EQ(NumberOf(again), code == ErrorCode::kNotFound ? 0U : 7U);
-    if (!again) EXPECT_NE(again.error().message.find("the answer"), std::string::npos);
+    if (!again) {
+      EXPECT_NE(again.error().message.find("the answer"), std::string::npos);
+    }
   }
 }
 

@@ -35,7 +35,9 @@ Edit Star(int vertices, double blend_m) {
 TEST(EditRow, HasThePlacesOfAllEdges) {
   for (const double blend_m : {0.0, 300.0, 30'000.0}) {
     const Edit edit = Star(2'000, blend_m);
-    if (blend_m < 1'000) EXPECT_GT(edit.band_begins.size(), 10u);
+    if (blend_m < 1'000) {
+      EXPECT_GT(edit.band_begins.size(), 10u);
+    }
     EXPECT_LE(edit.band_edges.size(), 8'000u);
     Edit whole = edit;
     whole.bands_per_m = 0;
