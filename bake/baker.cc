@@ -11,8 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "bake/bake_request.h"
 #include "bake/copy_unit.h"
-#include "bake/order.h"
 #include "bake/queue/local_queue.h"
 #include "bake/unit_key.h"
 
@@ -135,25 +135,25 @@ class Run {
   // Finds which files of the unit are there; creates the others. Null: nothing is left to do, or it failed.
   UnitPtr Open(const UnitQueue::Taken& taken) {
     const std::size_t index = taken.unit;
-    const UnitPlan::Of& of = plan_.units[index];
+    const UnitPlan::Entry& entry = plan_.units[index];
     if (taken.attempt == 0) Forget(index);
     WaitBefore(taken.attempt);
     auto unit = std::make_shared<OpenUnit>();
     unit->index = index;
-    for (const std::size_t target : of.targets) {
+    for (const std::size_t target : entry.targets) {
       if (options_.stop.stop_requested()) {
         queue_.Return(index);
         return nullptr;
       }
       if (HasReport(index, target)) continue;
       const Target& to = targets_[target];
-      const std::uint64_t key = UnitKey(dataset_, to.manifest, of.unit);
+      const std::uint64_t key = UnitKey(dataset_, to.manifest, entry.unit);
       if (!to.create && TakeFinished(index, target, key)) continue;
       if (options_.only_verify) {
-        Report(index, {target, {of.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
+        Report(index, {target, {entry.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
         continue;
       }
-      auto writer = to.create ? to.create() : archive::CreateUnit(to.place, of.unit.name, {to.manifest.kind, key});
+      auto writer = to.create ? to.create() : archive::CreateUnit(to.place, entry.unit.name, {to.manifest.kind, key});
       if (!writer) {
         unit->outputs.push_back({target, key});
         unit->error = writer.error();
@@ -169,7 +169,7 @@ class Run {
       queue_.Done(index);
       return nullptr;
     }
-    for (const Part& part : PartsOf(of.unit)) unit->parts.push_back(part);
+    for (const Part& part : PartsOf(entry.unit)) unit->parts.push_back(part);
     return unit;
   }
 

@@ -80,11 +80,11 @@ struct BakeOptions {
 // The units to bake. Formats with the same scheme and tiles share their units and are baked together, so that each tile
 // is read and refined once.
 struct UnitPlan {
-  struct Of {
+  struct Entry {
     Unit unit;
     std::vector<std::size_t> targets;
   };
-  std::vector<Of> units;
+  std::vector<Entry> units;
   std::uint64_t tiles = 0, files = 0;  // of all archives
 
   static UnitPlan Make(const std::vector<Target>& targets, const Shard& shard);

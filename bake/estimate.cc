@@ -5,7 +5,7 @@
 #include <optional>
 #include <set>
 
-#include "bake/order.h"
+#include "bake/bake_request.h"
 #include "engine/geo/tile_cover.h"
 
 namespace terrace::bake {
@@ -72,10 +72,11 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
     const archive::Manifest& manifest = targets[target].manifest;
     for (int level = 0; level <= manifest.max_level; ++level) {
       Pyramid of_shard(1);
-      for (const UnitPlan::Of& of : plan.units) {
-        if (std::ranges::find(of.targets, target) == of.targets.end()) continue;
-        if (level >= static_cast<int>(of.unit.tiles.size())) continue;
-        for (const geo::TileRange& range : of.unit.tiles[static_cast<std::size_t>(level)]) of_shard[0].push_back(range);
+      for (const UnitPlan::Entry& entry : plan.units) {
+        if (std::ranges::find(entry.targets, target) == entry.targets.end()) continue;
+        if (level >= static_cast<int>(entry.unit.tiles.size())) continue;
+        for (const geo::TileRange& range : entry.unit.tiles[static_cast<std::size_t>(level)])
+          of_shard[0].push_back(range);
       }
       const std::uint64_t count = CountTiles(of_shard);
       if (count == 0) continue;
@@ -96,7 +97,8 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
   }
   Estimate estimate = Sum(std::move(levels));
   estimate.files = plan.files;
-  for (const UnitPlan::Of& of : plan.units) estimate.subtrees += ReachesDown(of.unit) ? of.targets.size() : 0;
+  for (const UnitPlan::Entry& entry : plan.units)
+    estimate.subtrees += ReachesDown(entry.unit) ? entry.targets.size() : 0;
   estimate.sampled = sampled;
   return estimate;
 }

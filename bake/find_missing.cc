@@ -26,9 +26,9 @@ std::vector<std::size_t> FindMissing(const tiler::Dataset& dataset, const std::v
                                      const UnitPlan& plan) {
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < plan.units.size(); ++i) {
-    const UnitPlan::Of& of = plan.units[i];
-    const bool is_there =
-        std::ranges::all_of(of.targets, [&](std::size_t target) { return IsThere(dataset, targets[target], of.unit); });
+    const UnitPlan::Entry& entry = plan.units[i];
+    const bool is_there = std::ranges::all_of(
+        entry.targets, [&](std::size_t target) { return IsThere(dataset, targets[target], entry.unit); });
     if (!is_there) missing.push_back(i);
   }
   return missing;

@@ -362,7 +362,7 @@ Result<std::string> PlaceId(const std::string& place) {
                    error != 0 && error != EEXIST ? "written" : "read", WhyOf(error == EEXIST ? EIO : error));
 }
 
-bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
+bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::error_code ignored;
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
@@ -375,7 +375,7 @@ bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest
   return true;
 }
 
-void LeaveEmpty(const std::string& place, const std::string& own_lock) {
+void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock) {
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(place, error)) {
     const std::string name = entry.path().filename().string();

@@ -58,10 +58,10 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 Result<std::string> PlaceId(const std::string& place);
 // Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted, and what killed
 // processes have left, as TidyPlace does.
-bool LeaveFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
+bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
 // Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
 // refused.
-void LeaveEmpty(const std::string& place, const std::string& own_lock);
+void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock);
 // The name of a worker's lock for PlaceLock::Take. Locks of one job exclude other bakes, but not one another.
 std::string LockOfWorker(const std::string& worker, const std::string& job);
 // Removes the locks of the job's other workers. The job is done: they were killed, or what they still do is not needed.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "bake/order.h"
+#include "bake/bake_request.h"
 #include "engine/dem/common/content_hash.h"
 #include "engine/dem/planned_tiles.h"
 #include "engine/geo/mercator_grid.h"

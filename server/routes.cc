@@ -331,7 +331,7 @@ std::vector<DocumentedUrl> DocumentedUrls() {
     // "/{dataset}/hillshade/{z}/{x}/{y}": the folder of the formats is between the dataset and the level.
     const std::size_t begin = std::string_view("/{dataset}/").size(), end = url.pattern.find("{z}");
     const std::string folder = url.pattern.substr(begin, end > begin ? end - 1 - begin : 0);
-    for (const TileFormat& format : TileFormats()) {
+    for (const TileFormatRow& format : TileFormatRows()) {
       if (format.folder != folder) continue;
       DocumentedUrl of_format = url;
       of_format.pattern.append(format.suffix);

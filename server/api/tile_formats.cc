@@ -106,7 +106,7 @@ using tiler::TileFormat::kContours, tiler::TileFormat::kGeodeticImagery, tiler::
 constexpr proto::PictureFormat kPng = proto::PictureFormat::kPng, kWebp = proto::PictureFormat::kWebp,
                                kJpeg = proto::PictureFormat::kJpeg;
 
-constexpr TileFormat kFormats[] = {
+constexpr TileFormatRow kFormats[] = {
     {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh,
      proto::PictureFormat::kPng, &kTerrainTileOperation},
     {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb, proto::PictureFormat::kPng, &kGlbTileOperation},
@@ -300,7 +300,7 @@ Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format
   if (!dataset.baked_alone) return {};
   const std::vector<tiler::TileFormat>& formats = dataset.baked_alone->extent().formats;
   if (std::ranges::find(formats, format) != formats.end()) return {};
-  const auto* const row = std::ranges::find(kFormats, format, &TileFormat::format);
+  const auto* const row = std::ranges::find(kFormats, format, &TileFormatRow::format);
   TERRACE_CHECK(row != std::end(kFormats));
   return MakeError(ErrorCode::kNotFound, "the dataset is an archive of finished tiles alone, which has no {} tiles",
                    row->folder.empty() ? row->suffix : row->folder);
@@ -313,10 +313,10 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
   return MakeError(ErrorCode::kNotFound, "no such dataset; /datasets lists them");
 }
 
-std::span<const TileFormat> TileFormats() { return kFormats; }
+std::span<const TileFormatRow> TileFormatRows() { return kFormats; }
 
-const TileFormat* CutSuffix(std::string_view& name, std::string_view folder) {
-  for (const TileFormat& row : kFormats) {
+const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder) {
+  for (const TileFormatRow& row : kFormats) {
     if (row.folder != folder || !name.ends_with(row.suffix)) continue;
     name.remove_suffix(row.suffix.size());
     return &row;
@@ -324,14 +324,14 @@ const TileFormat* CutSuffix(std::string_view& name, std::string_view folder) {
   return nullptr;
 }
 
-const TileFormat* FirstFormatIn(std::string_view folder) {
-  const auto* const row = std::ranges::find(kFormats, folder, &TileFormat::folder);
+const TileFormatRow* FirstFormatIn(std::string_view folder) {
+  const auto* const row = std::ranges::find(kFormats, folder, &TileFormatRow::folder);
   return row == std::end(kFormats) ? nullptr : row;
 }
 
-const TileFormat* FormatWith(tiler::TileFormat format, proto::PictureFormat picture) {
+const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat picture) {
   const auto* const row = std::ranges::find_if(
-      kFormats, [&](const TileFormat& of) { return of.format == format && of.picture == picture; });
+      kFormats, [&](const TileFormatRow& of) { return of.format == format && of.picture == picture; });
   return row == std::end(kFormats) ? nullptr : row;
 }
 
@@ -354,7 +354,7 @@ Result<TileRequest> NegotiateTile(const RequestContext& context, std::span<const
 }
 
 tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::EncodedTile& tile) {
-  const auto* const row = std::ranges::find(kFormats, request.format, &TileFormat::format);
+  const auto* const row = std::ranges::find(kFormats, request.format, &TileFormatRow::format);
   TERRACE_CHECK(row != std::end(kFormats));
   tiler::HeaderLines head;
   const auto put = [to = std::back_inserter(head.text)](std::string_view name, const auto& value) {

@@ -47,7 +47,7 @@ struct HeightTileParameters {
 // Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
-struct TileFormat {
+struct TileFormatRow {
   tiler::TileFormat format;
   std::string_view folder;  // of the URL, between the dataset and the level: "hillshade"; empty: none
   std::string_view suffix;  // of the URL: ".terrain"
@@ -64,19 +64,19 @@ struct TileFormat {
 };
 
 // All formats.
-std::span<const TileFormat> TileFormats();
+std::span<const TileFormatRow> TileFormatRows();
 
 // Removes the suffix of a tile's URL from its last segment, and returns the row of the format in a folder; null if no
 // suffix matches.
-const TileFormat* CutSuffix(std::string_view& name, std::string_view folder = {});
+const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder = {});
 
 // The first row of a format in a folder, whose suffix is that of TileJSON documents; null if there is none.
-const TileFormat* FirstFormatIn(std::string_view folder);
+const TileFormatRow* FirstFormatIn(std::string_view folder);
 // The row of a format with these pictures; null if there is none.
-const TileFormat* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
+const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
 
 // Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies
-// outside what the dataset has. Errors of TileFormat::read. Precondition: the route has a format.
+// outside what the dataset has. Errors of TileFormatRow::read. Precondition: the route has a format.
 Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
 // kNotFound, for a dataset without sources: its archive has no tiles of this format.

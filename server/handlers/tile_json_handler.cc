@@ -74,7 +74,7 @@ Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
   const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
   if (!index) return refuse(index.error());
   const DatasetView& dataset = from.catalog->datasets[*index];
-  const TileFormat* row = context.route.format;
+  const TileFormatRow* row = context.route.format;
   if (const auto has = CheckHasFormat(dataset, row->format); !has) return refuse(has.error());
   if (const auto has = CheckHasImagery(dataset, row->format); !has) return refuse(has.error());
   const auto parameters = ParseMapParameters(context.route.query, row->format, /*in_tile_json=*/true);

@@ -114,7 +114,7 @@ double CellErrorBound::DistanceBound(const TileCell& cell, double lowest, double
 double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) const {
   // If members are misplaced, samples of the cell may count as neighbouring ones. The last average of an axis may be up
   // to twice as near.
-  const Position& off = tables_.misplacement();
+  const Position& off = statistics_.misplacement();
   const double off_x = 2 * off.x / trace_.factor, off_y = 2 * off.y / trace_.factor;
   const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
   const auto above = [](double weight) {
@@ -160,8 +160,8 @@ double CellErrorBound::BoundByBox(const TileCell& cell, const SampleBox& average
     }
   }
   const float averaging =
-      tables_.AveragingError(static_cast<double>(averages.west), static_cast<double>(averages.north),
-                             static_cast<double>(averages.east), static_cast<double>(averages.south));
+      statistics_.AveragingError(static_cast<double>(averages.west), static_cast<double>(averages.north),
+                                 static_cast<double>(averages.east), static_cast<double>(averages.south));
   if (lowest > highest) return averaging > 0 ? kUnknownError : 0;
   return DistanceBound(cell, lowest, highest) + averaging;
 }
@@ -236,15 +236,15 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
       at.Add(corner.x, corner.y);
     }
   }
-  const Position& off = tables_.misplacement();
+  const Position& off = statistics_.misplacement();
   at.Grow((at.east - at.west) * kBulge + off.x, (at.south - at.north) * kBulge + off.y);
   if (grid_.wraps() || IsOnBothEnds(at)) return false;
   const SampleBox in = CentresIn(at, 0);
   if (in.empty()) return true;
-  const BlockRange range = tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north),
-                                          static_cast<double>(in.east), static_cast<double>(in.south));
+  const BlockRange range = statistics_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north),
+                                              static_cast<double>(in.east), static_cast<double>(in.south));
   if (range.min > range.max) return true;
-  // The tables' blocks are large: samples that were read tell more.
+  // The blocks of the statistics are large: samples that were read tell more.
   const GridWindow& window = trace_.window;
   const SampleBox near = Clipped(in);
   if (near.empty()) return true;
@@ -268,7 +268,7 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   for (const Position& corner : *corners) box.Add(corner.x, corner.y);
   // Samples are at the pixels' centres.
   const double halo = may_blend ? 1 : 0;
-  const Position& off = tables_.misplacement();
+  const Position& off = statistics_.misplacement();
   box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
   if (fills) {
     const double reach = grid_.options().max_void_gap + trace_.factor;
@@ -284,8 +284,8 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
     if (turn != 0 && !grid_.wraps()) continue;
     const SampleBox in = CentresIn(box, turn * static_cast<double>(grid_.columns()));
     if (in.empty()) return 0;  // like those of other turns
-    range.Add(tables_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north), static_cast<double>(in.east),
-                             static_cast<double>(in.south)));
+    range.Add(statistics_.Ranges(static_cast<double>(in.west), static_cast<double>(in.north),
+                                 static_cast<double>(in.east), static_cast<double>(in.south)));
   }
   if (range.min > range.max) return 0;
   double error = DistanceBound(cell, range.min, range.max);
@@ -311,7 +311,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& p
   }
   // The range of heights served in a cell, in the raster grid's vertical datum.
   constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
-  const Position& off = tables_.misplacement();
+  const Position& off = statistics_.misplacement();
   const double slack = kPosition * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
   CellSurface surface(place.corners, is_separable, {off.x + slack, off.y + slack});

@@ -36,12 +36,12 @@ struct SampleBox {
 class CellErrorBound {
  public:
   // The arguments must outlive this object.
-  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridStatistics& tables,
-                 const GeoidErrorBound& geoid)
+  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+                 const GridStatistics& statistics, const GeoidErrorBound& geoid)
       : tile_(tile),
         grid_(grid),
         trace_(trace),
-        tables_(tables),
+        statistics_(statistics),
         geoid_(geoid),
         columns_(GridAxis(grid.columns(), trace.factor, grid.wraps()).count()),
         rows_(GridAxis(grid.rows(), trace.factor, false).count()) {}
@@ -58,9 +58,9 @@ class CellErrorBound {
     bool between = false;  // heights between samples count as well
   };
 
-  // Returns a bound for any cell from the tables, averages and samples that were read. `may_blend`: the raster grid is
-  // blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets `place`
-  // if BoundBySamples can give a tighter bound from samples that have not been read.
+  // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
+  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
+  // `place` if BoundBySamples can give a tighter bound from samples that have not been read.
   double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, std::optional<CellSamples>& place) const;
 
   // Whether BoundBySurroundings returns 0 for every cell of a box, because there is no sample around any of them: on
@@ -83,7 +83,7 @@ class CellErrorBound {
   const TileNodes tile_;
   const RasterGrid& grid_;
   const GridTrace& trace_;
-  const GridStatistics& tables_;
+  const GridStatistics& statistics_;
   const GeoidErrorBound& geoid_;
   const std::int64_t columns_, rows_;  // of averages of the trace's factor
 };

@@ -19,7 +19,7 @@ GridStatistics::GridStatistics(const RasterGrid& grid, const GridTrace& trace)
     misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
   }
   if (near_.size() > kFewMembers) return;
-  for (const std::size_t i : near_) tables_.push_back(grid.members()[i].raster->tables());
+  for (const std::size_t i : near_) statistics_.push_back(grid.members()[i].raster->statistics());
 }
 
 // Columns of grids around the Earth jump by one turn somewhere. They are followed from node to node, which are less
@@ -71,9 +71,9 @@ bool GridStatistics::IsAround(const Box& pixels) const {
 template <typename Visit>
 void GridStatistics::ForMembersAt(const Box& pixels, const Visit& visit) const {
   const std::vector<GridMember>& members = grid_.members();
-  if (!tables_.empty() && (members.size() == 1 || IsAround(pixels))) {
+  if (!statistics_.empty() && (members.size() == 1 || IsAround(pixels))) {
     members_visited_ += near_.size();
-    for (std::size_t k = 0; k < near_.size(); ++k) visit(members[near_[k]], tables_[k].get());
+    for (std::size_t k = 0; k < near_.size(); ++k) visit(members[near_[k]], statistics_[k].get());
     return;
   }
   for (const std::size_t i : grid_.MembersAt(pixels)) {
@@ -84,10 +84,10 @@ void GridStatistics::ForMembersAt(const Box& pixels, const Visit& visit) const {
 
 BlockRange GridStatistics::Ranges(double west, double north, double east, double south) const {
   BlockRange range;
-  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* tables) {
+  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
-    range.Add(tables != nullptr ? tables->table.Query(west - x, north - y, east - x, south - y)
-                                : member.raster->RangeIn(west - x, north - y, east - x, south - y));
+    range.Add(statistics != nullptr ? statistics->table.Query(west - x, north - y, east - x, south - y)
+                                    : member.raster->RangeIn(west - x, north - y, east - x, south - y));
   });
   return range;
 }
@@ -95,17 +95,18 @@ BlockRange GridStatistics::Ranges(double west, double north, double east, double
 float GridStatistics::ErrorOfAverages(double west, double north, double east, double south) const {
   const int factor = trace_.factor;
   if (factor == 1) return 0;  // averages of one sample
-  const auto error_of = [&](const GridMember& member, const RasterStatistics* tables) {
+  const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
-    const StatisticsPages::Tables read = tables == nullptr ? member.raster->tables() : nullptr;
-    return (tables != nullptr ? *tables : *read).errors.Largest(factor, west - x, north - y, east - x, south - y);
+    const StatisticsPages::Statistics read = statistics == nullptr ? member.raster->statistics() : nullptr;
+    return (statistics != nullptr ? *statistics : *read)
+        .errors.Largest(factor, west - x, north - y, east - x, south - y);
   };
-  if (grid_.members().size() == 1) return error_of(grid_.members().front(), tables_.front().get());
+  if (grid_.members().size() == 1) return error_of(grid_.members().front(), statistics_.front().get());
   constexpr float kNotTold = std::numeric_limits<float>::infinity();
   if (grid_.alignment() < factor) return kNotTold;
   int met = 0;
   float error = 0;
-  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* tables) {
+  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
     const geo::TileRange pixels = member.pixels();
     if (east < static_cast<double>(pixels.start_x) || west > static_cast<double>(pixels.end_x + 1) ||
         south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
@@ -116,7 +117,7 @@ float GridStatistics::ErrorOfAverages(double west, double north, double east, do
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
     const bool is_inside =
         west >= x && north >= y && east <= x + whole(layout.columns) && south <= y + whole(layout.height);
-    error = ++met == 1 && is_inside ? error_of(member, tables) : kNotTold;
+    error = ++met == 1 && is_inside ? error_of(member, statistics) : kNotTold;
   });
   return error;
 }

@@ -30,7 +30,8 @@ class GridStatistics {
   Box BoxAround() const;
   std::vector<std::size_t> MembersAround() const;
   bool IsAround(const Box& pixels) const;
-  // Calls visit(member, tables) for all members that meet a box, and perhaps others. Null tables: not in memory.
+  // Calls visit(member, statistics) for all members that meet a box, and perhaps others. Null statistics: not in
+  // memory.
   template <typename Visit>
   void ForMembersAt(const Box& pixels, const Visit& visit) const;
   float ErrorOfAverages(double west, double north, double east, double south) const;  // of pixels
@@ -41,7 +42,7 @@ class GridStatistics {
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;
-  std::vector<StatisticsPages::Tables> tables_;  // of near_, if they are few; else empty
+  std::vector<StatisticsPages::Statistics> statistics_;  // of near_, if they are few; else empty
   Position misplacement_{0, 0};
 };
 

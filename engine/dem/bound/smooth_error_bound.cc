@@ -66,13 +66,13 @@ class Lanes {
 }  // namespace
 
 SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
-                                   const GridStatistics& tables, const GeoidErrorBound& geoid, bool blends)
+                                   const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends)
     : tile_(tile),
       trace_(trace),
-      tables_(tables),
+      statistics_(statistics),
       geoid_(geoid),
       blends_(blends),
-      misplacement_{tables.misplacement().x / trace.factor, tables.misplacement().y / trace.factor} {
+      misplacement_{statistics.misplacement().x / trace.factor, statistics.misplacement().y / trace.factor} {
   PlaceNodes(grid);
 }
 
@@ -230,8 +230,8 @@ double SmoothErrorBound::BoundOver(const CellBox& box) const {
   const SampleRange range = RangeOf(at);
   if (!Measure(range, bends)) return kUnknown;
   return Largest(bends, steps) + geoid_.BoundOver(box) + LargestBlend(box) +
-         tables_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
-                                static_cast<double>(range.right), static_cast<double>(range.bottom));
+         statistics_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
+                                    static_cast<double>(range.right), static_cast<double>(range.bottom));
 }
 
 SmoothErrorBound::SampleRange SmoothErrorBound::RangeOf(const PixelBounds& at) const {

@@ -18,8 +18,8 @@ namespace terrace::dem {
 class SmoothErrorBound {
  public:
   // `blends`: raster grids are blended where one gives way to the next. The other arguments must outlive this object.
-  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace, const GridStatistics& tables,
-                   const GeoidErrorBound& geoid, bool blends);
+  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+                   const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends);
 
   // Makes BoundOver faster for boxes of cell rows `south` to `north`. Results do not depend on it.
   void PrepareRows(int south, int north);
@@ -56,7 +56,7 @@ class SmoothErrorBound {
 
   const TileNodes tile_;
   const GridTrace& trace_;
-  const GridStatistics& tables_;
+  const GridStatistics& statistics_;
   const GeoidErrorBound& geoid_;
   const bool blends_;
   const Position misplacement_;  // of samples, in averages

@@ -92,10 +92,10 @@ class GridErrorBound {
         nodes_{tile.lattice_, tile.window_, tile.heights_},
         grid_(grid),
         trace_(trace),
-        tables_(grid, trace),
+        statistics_(grid, trace),
         geoid_(nodes_, grid.undulations(), trace.undulations),
-        smooth_(nodes_, grid, trace, tables_, geoid_, tile.blends_),
-        single_(nodes_, grid, trace, tables_, geoid_),
+        smooth_(nodes_, grid, trace, statistics_, geoid_, tile.blends_),
+        single_(nodes_, grid, trace, statistics_, geoid_),
         loose_(grid, single_) {}
 
   Result<void> Add(const std::stop_token& stop) {
@@ -263,7 +263,7 @@ class GridErrorBound {
   const TileNodes nodes_;
   const RasterGrid& grid_;
   const GridTrace& trace_;
-  const GridStatistics tables_;
+  const GridStatistics statistics_;
   const GeoidErrorBound geoid_;
   SmoothErrorBound smooth_;
   const CellErrorBound single_;

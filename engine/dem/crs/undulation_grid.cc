@@ -30,14 +30,14 @@ int BandOfUndulations(GDALDataset& dataset) {
 }
 
 // The first and the last node around places.
-std::pair<int, int> HullOf(std::span<const NodePlace> places) {
-  std::pair<int, int> hull{std::numeric_limits<int>::max(), -1};
+std::pair<int, int> FirstAndLast(std::span<const NodePlace> places) {
+  std::pair<int, int> ends{std::numeric_limits<int>::max(), -1};
   for (const NodePlace& place : places) {
     if (!place.is_inside()) continue;
-    hull.first = std::min({hull.first, place.node, place.next});
-    hull.second = std::max({hull.second, place.node, place.next});
+    ends.first = std::min({ends.first, place.node, place.next});
+    ends.second = std::max({ends.second, place.node, place.next});
   }
-  return hull;
+  return ends;
 }
 
 }  // namespace
@@ -123,15 +123,15 @@ Result<std::vector<float>> UndulationGrid::Read(int column, int row, int columns
 }
 
 std::int64_t UndulationPatch::CountNodes(std::span<const NodePlace> columns, std::span<const NodePlace> rows) {
-  const auto [west, east] = HullOf(columns);
-  const auto [north, south] = HullOf(rows);
+  const auto [west, east] = FirstAndLast(columns);
+  const auto [north, south] = FirstAndLast(rows);
   return east < 0 || south < 0 ? 0 : std::int64_t{east - west + 1} * (south - north + 1);
 }
 
 Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::span<const NodePlace> columns,
                                               std::span<const NodePlace> rows) {
-  const auto [west, east] = HullOf(columns);
-  const auto [north, south] = HullOf(rows);
+  const auto [west, east] = FirstAndLast(columns);
+  const auto [north, south] = FirstAndLast(rows);
   UndulationPatch patch;
   if (east < 0 || south < 0) return patch;
   auto heights = grid.Read(west, north, east - west + 1, south - north + 1);

@@ -54,11 +54,12 @@ std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) cons
 // A box contains one rectangle of nodes, or two if the columns jump by one turn.
 std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions) const {
   std::vector<std::uint8_t> inside(positions.columns() * positions.rows());
-  Box hull = kNowhereBox;
-  for (const double x : positions.x()) hull.west = std::min(hull.west, x), hull.east = std::max(hull.east, x);
-  for (const double y : positions.y()) hull.south = std::min(hull.south, y), hull.north = std::max(hull.north, y);
+  Box extent = kNowhereBox;
+  for (const double x : positions.x()) extent.west = std::min(extent.west, x), extent.east = std::max(extent.east, x);
+  for (const double y : positions.y())
+    extent.south = std::min(extent.south, y), extent.north = std::max(extent.north, y);
   std::vector<std::uint8_t> columns(positions.columns());
-  for (const std::size_t i : index_.Find(Grown(hull, 2 * kEdgeTolerance))) {
+  for (const std::size_t i : index_.Find(Grown(extent, 2 * kEdgeTolerance))) {
     const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
     std::size_t first = columns.size(), end = 0;
     for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -79,13 +80,13 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
   // Up to this number, boxes are checked one by one; for more, the index is used.
   constexpr std::size_t kFewBoxes = 8;
   std::vector<std::uint8_t> inside(positions.size());
-  const PositionHull known = HullOf(positions);
-  const Box hull{known.least.x, known.least.y, known.most.x, known.most.y};
-  if (hull.west > hull.east) return inside;
-  const std::vector<std::size_t> near = index_.Find(Grown(hull, 2 * kEdgeTolerance));
+  const PositionExtent known = ExtentOf(positions);
+  const Box extent{known.min.x, known.min.y, known.max.x, known.max.y};
+  if (extent.west > extent.east) return inside;
+  const std::vector<std::size_t> near = index_.Find(Grown(extent, 2 * kEdgeTolerance));
   if (near.size() == 1) {
     const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);
-    if (known.are_all_known && Holds(box, known.least) && Holds(box, known.most)) {
+    if (known.are_all_known && Holds(box, known.min) && Holds(box, known.max)) {
       std::ranges::fill(inside, std::uint8_t{1});
       return inside;
     }

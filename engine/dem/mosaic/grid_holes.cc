@@ -92,7 +92,7 @@ Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const 
     }
   }
   if (samples.empty()) return {};
-  const GridWindow coarse = HullOf(cells, Axes(2 * factor));
+  const GridWindow coarse = WindowOf(cells, Axes(2 * factor));
   const auto guess = ReadSmooth(2 * factor, coarse, true, stop);
   if (!guess) return tl::unexpected(guess.error());
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -26,7 +26,7 @@ std::int64_t NearestTurn(std::int64_t column, std::int64_t around, const GridAxi
 }
 
 // The columns and rows of cells.
-class CellHull {
+class CellWindow {
  public:
   void AddColumn(std::int64_t column) { west_ = std::min(west_, column), east_ = std::max(east_, column + 1); }
   void AddRow(std::int64_t row) { north_ = std::min(north_, row), south_ = std::max(south_, row + 1); }
@@ -77,40 +77,40 @@ void NodeCells::MoveNear(std::int64_t column) {
 }
 
 // Indices grow with positions, so without wrapping the outermost positions have the outermost cells.
-GridWindow NodeCells::HullOfNodes(std::span<const std::uint8_t> wanted) const {
-  CellHull hull;
+GridWindow NodeCells::WindowOfNodes(std::span<const std::uint8_t> wanted) const {
+  CellWindow window;
   const std::span<const Position> nodes = positions_.nodes();
   if (!axes_.columns.wraps()) {
-    PositionHull all;
-    const auto add = [&](const Position& least, const Position& most) {
-      all.least = {std::min(all.least.x, least.x), std::min(all.least.y, least.y)};
-      all.most = {std::max(all.most.x, most.x), std::max(all.most.y, most.y)};
+    PositionExtent all;
+    const auto add = [&](const Position& min, const Position& max) {
+      all.min = {std::min(all.min.x, min.x), std::min(all.min.y, min.y)};
+      all.max = {std::max(all.max.x, max.x), std::max(all.max.y, max.y)};
     };
     for (std::size_t first = 0; first < nodes.size(); first += positions_.columns()) {
       const std::span<const std::uint8_t> row = wanted.subspan(first, positions_.columns());
       if (std::ranges::find(row, std::uint8_t{0}) == row.end()) {
-        const PositionHull of_row = HullOf(nodes.subspan(first, row.size()));
-        add(of_row.least, of_row.most);
+        const PositionExtent of_row = ExtentOf(nodes.subspan(first, row.size()));
+        add(of_row.min, of_row.max);
         continue;
       }
       for (std::size_t i = 0; i < row.size(); ++i) {
         if (row[i] != 0) add(nodes[first + i], nodes[first + i]);
       }
     }
-    for (const Position& position : {all.least, all.most}) {
+    for (const Position& position : {all.min, all.max}) {
       const GridCell cell = axes_.CellAt(position);
-      hull.AddColumn(cell.column);
-      hull.AddRow(cell.row);
+      window.AddColumn(cell.column);
+      window.AddRow(cell.row);
     }
-    return hull.Window(axes_);
+    return window.Window(axes_);
   }
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     if (wanted[n] == 0) continue;
     const GridCell cell = At(n % positions_.columns(), n / positions_.columns());
-    hull.AddColumn(cell.column);
-    hull.AddRow(cell.row);
+    window.AddColumn(cell.column);
+    window.AddRow(cell.row);
   }
-  return hull.Window(axes_);
+  return window.Window(axes_);
 }
 
 GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
@@ -124,8 +124,8 @@ GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
     }
     MoveNear(is_separable() ? columns_[stride / 2].index : At(nearest % stride, nearest / stride).column);
   }
-  if (!is_separable()) return HullOfNodes(wanted);
-  CellHull hull;
+  if (!is_separable()) return WindowOfNodes(wanted);
+  CellWindow window;
   std::vector<std::uint8_t> of_column(stride);
   for (std::size_t j = 0; j < rows_.size(); ++j) {
     std::uint8_t of_row = 0;
@@ -133,27 +133,27 @@ GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
       of_row |= wanted[j * stride + i];
       of_column[i] |= wanted[j * stride + i];
     }
-    if (of_row != 0) hull.AddRow(rows_[j].index);
+    if (of_row != 0) window.AddRow(rows_[j].index);
   }
   for (std::size_t i = 0; i < stride; ++i) {
-    if (of_column[i] != 0) hull.AddColumn(columns_[i].index);
+    if (of_column[i] != 0) window.AddColumn(columns_[i].index);
   }
-  return hull.Window(axes_);
+  return window.Window(axes_);
 }
 
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes) {
   const std::int64_t around = cells[cells.size() / 2].column;
   for (GridCell& cell : cells) cell.column = NearestTurn(cell.column, around, axes.columns);
-  return HullOf(cells, axes);
+  return WindowOf(cells, axes);
 }
 
-GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes) {
-  CellHull hull;
+GridWindow WindowOf(std::span<const GridCell> cells, const GridAxes& axes) {
+  CellWindow window;
   for (const GridCell& cell : cells) {
-    hull.AddColumn(cell.column);
-    hull.AddRow(cell.row);
+    window.AddColumn(cell.column);
+    window.AddRow(cell.row);
   }
-  return hull.Window(axes);
+  return window.Window(axes);
 }
 
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell) {

@@ -71,7 +71,7 @@ class NodeCells {
   void MoveNear(std::int64_t column);
 
  private:
-  GridWindow HullOfNodes(std::span<const std::uint8_t> wanted) const;
+  GridWindow WindowOfNodes(std::span<const std::uint8_t> wanted) const;
 
   NodePositions positions_;
   GridAxes axes_;
@@ -83,7 +83,7 @@ class NodeCells {
 // Precondition: not empty.
 GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
 // The same without moving the cells.
-GridWindow HullOf(std::span<const GridCell> cells, const GridAxes& axes);
+GridWindow WindowOf(std::span<const GridCell> cells, const GridAxes& axes);
 
 // Interpolates bilinearly, with weights renormalized over valid samples; nothing if there is none.
 std::optional<double> Interpolate(const std::vector<float>& heights, const GridWindow& window, const GridCell& cell);

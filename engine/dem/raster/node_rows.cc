@@ -194,7 +194,7 @@ bool MarkVoids(const std::uint8_t* inside, const float* heights, std::size_t cou
 }
 
 // Coordinates in turn, x and y, in the lanes of one vector.
-PositionHull Hull(const Position* positions, std::size_t count) {
+PositionExtent Extent(const Position* positions, std::size_t count) {
   const hn::CappedTag<double, 8> d;
   const std::size_t lanes = hn::Lanes(d), numbers = 2 * count;
   const double* const number = &positions->x;
@@ -208,13 +208,13 @@ PositionHull Hull(const Position* positions, std::size_t count) {
     most = hn::Max(most, hn::IfThenElse(is_known, here, most));
     sum = hn::Add(sum, here);  // NaN if one is
   }
-  PositionHull hull;
-  hull.are_all_known = hn::AllTrue(d, hn::Eq(sum, sum));
+  PositionExtent extent;
+  extent.are_all_known = hn::AllTrue(d, hn::Eq(sum, sum));
   const auto add = [&](const double* low, const double* high) {
-    if (low[0] < hull.least.x) hull.least.x = low[0];
-    if (low[1] < hull.least.y) hull.least.y = low[1];
-    if (high[0] > hull.most.x) hull.most.x = high[0];
-    if (high[1] > hull.most.y) hull.most.y = high[1];
+    if (low[0] < extent.min.x) extent.min.x = low[0];
+    if (low[1] < extent.min.y) extent.min.y = low[1];
+    if (high[0] > extent.max.x) extent.max.x = high[0];
+    if (high[1] > extent.max.y) extent.max.y = high[1];
   };
   double low[8], high[8];
   hn::StoreU(least, d, low);
@@ -222,9 +222,9 @@ PositionHull Hull(const Position* positions, std::size_t count) {
   for (std::size_t lane = 0; lane + 1 < lanes; lane += 2) add(low + lane, high + lane);
   for (; i < numbers; i += 2) {
     add(number + i, number + i);
-    hull.are_all_known &= number[i] == number[i] && number[i + 1] == number[i + 1];
+    extent.are_all_known &= number[i] == number[i] && number[i + 1] == number[i + 1];
   }
-  return hull;
+  return extent;
 }
 
 }  // namespace
@@ -244,7 +244,7 @@ HWY_EXPORT(Places);
 HWY_EXPORT(AreAllKnown);
 HWY_EXPORT(VoidsAmong);
 HWY_EXPORT(MarkVoids);
-HWY_EXPORT(Hull);
+HWY_EXPORT(Extent);
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
@@ -320,8 +320,8 @@ bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heig
   return HWY_DYNAMIC_DISPATCH(MarkVoids)(inside.data(), heights.data(), heights.size(), wanted.data());
 }
 
-PositionHull HullOf(std::span<const Position> positions) {
-  return positions.empty() ? PositionHull{} : HWY_DYNAMIC_DISPATCH(Hull)(positions.data(), positions.size());
+PositionExtent ExtentOf(std::span<const Position> positions) {
+  return positions.empty() ? PositionExtent{} : HWY_DYNAMIC_DISPATCH(Extent)(positions.data(), positions.size());
 }
 
 }  // namespace terrace::dem

@@ -62,12 +62,12 @@ bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heig
 bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
                        Position limit, std::span<double> x, std::span<double> y);
 
-// The outermost coordinates of positions that are known; infinite, with `least` above `most`, if there is none.
-struct PositionHull {
-  Position least{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-  Position most{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+// The outermost coordinates of positions that are known; infinite, with `min` above `max`, if there is none.
+struct PositionExtent {
+  Position min{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  Position max{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   bool are_all_known = true;
 };
-PositionHull HullOf(std::span<const Position> positions);
+PositionExtent ExtentOf(std::span<const Position> positions);
 
 }  // namespace terrace::dem

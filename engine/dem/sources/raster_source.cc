@@ -272,7 +272,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
         "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
   }
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  source->KeepTables(*std::move(prepared), prepare, std::move(pages));
+  source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
   return source;
 }
 
@@ -283,19 +283,19 @@ bool StatisticsPages::Admit(std::size_t bytes) {
   return true;
 }
 
-StatisticsPages::Tables StatisticsPages::Find(const void* raster) {
+StatisticsPages::Statistics StatisticsPages::Find(const void* raster) {
   const std::lock_guard lock(mutex_);
   const auto found = by_raster_.find(raster);
   if (found == by_raster_.end()) return nullptr;
   pages_.splice(pages_.begin(), pages_, found->second);
-  return found->second->tables;
+  return found->second->statistics;
 }
 
-void StatisticsPages::Add(const void* raster, Tables tables) {
-  const std::size_t bytes = tables->bytes();
+void StatisticsPages::Add(const void* raster, Statistics statistics) {
+  const std::size_t bytes = statistics->bytes();
   const std::lock_guard lock(mutex_);
   if (by_raster_.contains(raster)) return;  // by another thread meanwhile
-  pages_.push_front({raster, std::move(tables), bytes});
+  pages_.push_front({raster, std::move(statistics), bytes});
   by_raster_.emplace(raster, pages_.begin());
   paged_ += bytes;
   while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
@@ -321,9 +321,9 @@ RasterSource::~RasterSource() {
   if (paging_) paging_->pages->Forget(this);
 }
 
-// In a dataset of thousands of rasters, these tables take most of the memory.
-void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& prepare,
-                              std::shared_ptr<StatisticsPages> pages) {
+// In a dataset of thousands of rasters, the statistics take most of the memory.
+void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare,
+                                  std::shared_ptr<StatisticsPages> pages) {
   constexpr std::size_t kMaxCoarse = 64;  // blocks of a level
   RasterStatistics& statistics = prepared.statistics;
   content_ = statistics.content;
@@ -341,17 +341,17 @@ void RasterSource::KeepTables(PreparedRaster prepared, const PrepareOptions& pre
                                                   {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
 }
 
-StatisticsPages::Tables RasterSource::tables() const {
+StatisticsPages::Statistics RasterSource::statistics() const {
   if (kept_) return kept_;
   if (auto known = paging_->pages->Find(this)) return known;
-  auto statistics = ReadTables();
+  auto statistics = ReadStatistics();
   if (!statistics) throw std::runtime_error(statistics.error().message);
-  auto tables = std::make_shared<const RasterStatistics>(*std::move(statistics));
-  paging_->pages->Add(this, tables);
-  return tables;
+  auto shared = std::make_shared<const RasterStatistics>(*std::move(statistics));
+  paging_->pages->Add(this, shared);
+  return shared;
 }
 
-Result<RasterStatistics> RasterSource::ReadTables() const {
+Result<RasterStatistics> RasterSource::ReadStatistics() const {
   if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
   LogSource(SourceLog::Level::kWarn, info_.path, "{} is gone or damaged; the source is prepared anew",
             paging_->cache_file);
@@ -368,7 +368,7 @@ Result<RasterStatistics> RasterSource::ReadTables() const {
 BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
   if (kept_) return kept_->table.Query(west, north, east, south);
   if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
-  return tables()->table.Query(west, north, east, south);
+  return statistics()->table.Query(west, north, east, south);
 }
 
 // Until the raster is reopened, it is read at full resolution.
@@ -387,7 +387,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   // Uses memory and the cache file only if the files have not changed since they were prepared.
   if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-    if (const StatisticsPages::Tables known = tables(); known->coarse.Has(factor))
+    if (const StatisticsPages::Statistics known = statistics(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);
   }
   if (memory_averages_ && memory_averages_->Has(factor)) {

@@ -31,20 +31,20 @@ namespace terrace::dem {
 // Memory budget for the statistics of a dataset's rasters. Statistics beyond it are read from the statistics cache on
 // demand.
 //
-// Two budgets of bytes: for tables that stay in memory with their raster, and for tables that are paged, evicted least
-// recently used first. Thread-safe.
+// Two budgets of bytes: for statistics that stay in memory with their raster, and for statistics that are paged,
+// evicted least recently used first. Thread-safe.
 class StatisticsPages {
  public:
-  using Tables = std::shared_ptr<const RasterStatistics>;
+  using Statistics = std::shared_ptr<const RasterStatistics>;
 
   StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), most_paged_(paged_bytes) {}
 
-  // Whether tables of this size fit the first budget. If so, they are charged to it.
+  // Whether statistics of this size fit the first budget. If so, they are charged to it.
   bool Admit(std::size_t bytes);
 
   // Null: not in memory.
-  Tables Find(const void* raster);
-  void Add(const void* raster, Tables tables);
+  Statistics Find(const void* raster);
+  void Add(const void* raster, Statistics statistics);
   void Forget(const void* raster);
 
   std::size_t paged_bytes() const;
@@ -52,7 +52,7 @@ class StatisticsPages {
  private:
   struct Page {
     const void* raster;
-    Tables tables;
+    Statistics statistics;
     std::size_t bytes;
   };
   void Remove(std::list<Page>::iterator page);
@@ -92,7 +92,7 @@ class RasterSource {
 
   // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
   // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
-  StatisticsPages::Tables tables() const;
+  StatisticsPages::Statistics statistics() const;
   // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
   BlockRange RangeIn(double west, double north, double east, double south) const;
   const StampedFiles& files() const { return handles_.files(); }
@@ -115,8 +115,8 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
-  void KeepTables(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
-  Result<RasterStatistics> ReadTables() const;
+  void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
+  Result<RasterStatistics> ReadStatistics() const;
   void LoseCache(const Error& error) const;
 
   RasterSource(std::string path, StampedFiles files, Georeference where)
@@ -131,7 +131,7 @@ class RasterSource {
   ContentHash content_;
   std::array<std::optional<double>, 2> edge_row_means_;
   RimVoids rim_voids_;
-  StatisticsPages::Tables kept_;  // null: the statistics are paged
+  StatisticsPages::Statistics kept_;  // null: the statistics are paged
   // Set if the statistics are paged.
   struct Paging {
     std::shared_ptr<StatisticsPages> pages;

@@ -110,23 +110,23 @@ Result<config::DatasetConfig> ConfiguredDataset(const BakeArguments& arguments, 
 
 }  // namespace
 
-Result<bake::Order> OrderOf(const BakeArguments& arguments) {
-  bake::Order order;
+Result<bake::BakeRequest> BakeRequestOf(const BakeArguments& arguments) {
+  bake::BakeRequest request;
   auto formats = FormatsOf(arguments.format);
   if (!formats) return tl::unexpected(formats.error());
-  order.formats = *std::move(formats);
+  request.formats = *std::move(formats);
   const auto has = [&](tiler::TileFormat format) {
-    return std::ranges::find(order.formats, format) != order.formats.end();
+    return std::ranges::find(request.formats, format) != request.formats.end();
   };
   if (!arguments.levels.empty()) {
     const auto levels = LevelsOf(arguments.levels);
     if (!levels) return tl::unexpected(levels.error());
-    order.levels = *levels;
+    request.levels = *levels;
   }
   if (!arguments.bbox.empty()) {
     const auto bbox = BoundsOf(arguments.bbox);
     if (!bbox) return tl::unexpected(bbox.error());
-    order.bbox = *bbox;
+    request.bbox = *bbox;
   }
   if (!arguments.extensions.empty()) {
     if (!has(tiler::TileFormat::kQuantizedMesh)) {
@@ -134,7 +134,7 @@ Result<bake::Order> OrderOf(const BakeArguments& arguments) {
     }
     const auto extensions = ExtensionsOf(arguments.extensions);
     if (!extensions) return tl::unexpected(extensions.error());
-    order.extensions = *extensions;
+    request.extensions = *extensions;
   }
   if (arguments.error > 0 && arguments.fraction > 0) {
     return MakeError(ErrorCode::kInvalidArgument, "--error and --fraction exclude each other; give one");
@@ -142,17 +142,17 @@ Result<bake::Order> OrderOf(const BakeArguments& arguments) {
   if ((arguments.error > 0 || arguments.fraction > 0) && arguments.format == "png") {
     return MakeError(ErrorCode::kInvalidArgument, "--error and --fraction are for meshes; png tiles have no error");
   }
-  if (arguments.error > 0) order.requested = {arguments.error, std::nullopt, /*at_least=*/true};
-  if (arguments.fraction > 0) order.requested = {std::nullopt, arguments.fraction, false};
-  order.compress = !arguments.no_gzip;
-  if (arguments.form != kChunks && order.formats.size() > 1) {
+  if (arguments.error > 0) request.requested = {arguments.error, std::nullopt, /*at_least=*/true};
+  if (arguments.fraction > 0) request.requested = {std::nullopt, arguments.fraction, false};
+  request.compress = !arguments.no_gzip;
+  if (arguments.form != kChunks && request.formats.size() > 1) {
     return MakeError(ErrorCode::kInvalidArgument, "--form {} has one format, and --format names {}; bake each alone",
-                     arguments.form, order.formats.size());
+                     arguments.form, request.formats.size());
   }
   if (arguments.form == k3tz && !has(tiler::TileFormat::kGlb)) {
     return MakeError(ErrorCode::kInvalidArgument, "--form 3tz holds 3D Tiles: give --format glb");
   }
-  return order;
+  return request;
 }
 
 Result<std::vector<tiler::Coding>> CodingsOf(const std::string& text) {

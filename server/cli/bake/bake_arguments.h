@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "bake/bake_request.h"
 #include "bake/baker.h"
-#include "bake/order.h"
 #include "config/config.h"
 #include "engine/core/result.h"
 #include "tiler/coding.h"
@@ -36,7 +36,7 @@ struct BakeArguments {
 };
 
 // Check everything that needs no source. kInvalidArgument: the message names the flag and valid values.
-Result<bake::Order> OrderOf(const BakeArguments& arguments);
+Result<bake::BakeRequest> BakeRequestOf(const BakeArguments& arguments);
 Result<bake::Shard> ShardOf(const std::string& text);
 Result<std::vector<tiler::Coding>> CodingsOf(const std::string& text);
 

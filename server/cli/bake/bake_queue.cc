@@ -44,12 +44,12 @@ Result<std::string> PasswordOf(const BakeArguments& arguments) {
 }
 
 // "terrain+glb/7-12-34": units of other formats have the same names.
-std::string NameInQueue(const bake::UnitPlan::Of& of, const std::vector<bake::Target>& targets) {
+std::string NameInQueue(const bake::UnitPlan::Entry& entry, const std::vector<bake::Target>& targets) {
   std::string name;
-  for (const std::size_t target : of.targets) {
+  for (const std::size_t target : entry.targets) {
     name += (name.empty() ? "" : "+") + archive::FolderOf(targets[target].manifest.kind.format);
   }
-  return name + "/" + of.unit.name;
+  return name + "/" + entry.unit.name;
 }
 
 void PrintMessage(const std::string& message) { std::fprintf(stderr, "terrace: %s\n", message.c_str()); }
@@ -69,7 +69,7 @@ Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
   options.identity.emplace_back("sources (version)", tiler::VersionText(dataset.generation));
   options.identity.emplace_back("place (bake-place.id)", *place_id);
   options.worker = bake.worker;
-  for (const bake::UnitPlan::Of& of : bake.plan.units) options.units.push_back(NameInQueue(of, bake.targets));
+  for (const bake::UnitPlan::Entry& entry : bake.plan.units) options.units.push_back(NameInQueue(entry, bake.targets));
   options.find_missing = [&bake, &dataset] { return bake::FindMissing(dataset, bake.targets, bake.plan); };
   options.lease = std::chrono::milliseconds(static_cast<std::int64_t>(bake.arguments.lease * 1000));
   options.on_message = PrintMessage;
@@ -86,10 +86,10 @@ std::optional<int> FinishJob(const QueuedBake& bake, bake::RedisQueue& queue) {
   if (bake.options.stop.stop_requested()) return kExitFailure;
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < bake.plan.units.size(); ++i) {
-    const bake::UnitPlan::Of& of = bake.plan.units[i];
-    const bool is_there = std::ranges::all_of(of.targets, [&](std::size_t target) {
+    const bake::UnitPlan::Entry& entry = bake.plan.units[i];
+    const bool is_there = std::ranges::all_of(entry.targets, [&](std::size_t target) {
       return std::ranges::any_of(all, [&](const bake::UnitReport& report) {
-        return report.target == target && report.entry.name == of.unit.name &&
+        return report.target == target && report.entry.name == entry.unit.name &&
                report.outcome == bake::UnitOutcome::kKept;
       });
     });
@@ -149,7 +149,7 @@ std::string WorkerName() {
 bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets) {
   std::vector<archive::Manifest> manifests;
   std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
-  if (!bake::LeaveFinished(place, manifests)) return false;
+  if (!bake::RemoveNotesIfFinished(place, manifests)) return false;
   PrintMessage(fmt::format("{}: is complete already; --finish instead of --queue checks every file", place));
   return true;
 }
@@ -158,7 +158,7 @@ int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<
   const auto queue = Join(bake);
   if (!queue) {
     if (IsFinished(bake.place, bake.targets)) return kExitOk;
-    bake::LeaveEmpty(bake.place, bake::LockOfWorker(bake.worker, bake.arguments.job));
+    bake::RemoveNotesIfEmpty(bake.place, bake::LockOfWorker(bake.worker, bake.arguments.job));
     return Fail(queue.error());
   }
   while (true) {

@@ -42,7 +42,7 @@ using Clock = std::chrono::steady_clock;
 int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
 
 // Only ranges of tiles are made: no raster is opened.
-int PlanFromCatalogue(const BakeArguments& arguments, const bake::Order& order) {
+int PlanFromCatalogue(const BakeArguments& arguments, const bake::BakeRequest& request) {
   constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
   const Result<std::string> cells = archive::ReadFile(arguments.catalogue, kMaxBytes);
   if (!cells) {
@@ -52,12 +52,12 @@ int PlanFromCatalogue(const BakeArguments& arguments, const bake::Order& order) 
   auto tiles = bake::PlanCatalogue(*cells, arguments.arc_seconds, kErrorFraction);
   if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
   const int deepest = static_cast<int>(tiles->size()) - 1;
-  if (order.levels && (order.levels->first > 0 || order.levels->second > deepest)) {
+  if (request.levels && (request.levels->first > 0 || request.levels->second > deepest)) {
     return cli::Fail(fmt::format("--levels {}: the catalogue has levels 0 to {}", arguments.levels, deepest),
                      kExitUsage);
   }
-  if (order.bbox) *tiles = bake::TilesWithin(*tiles, *order.bbox);
-  if (order.levels) tiles->resize(static_cast<std::size_t>(order.levels->second) + 1);
+  if (request.bbox) *tiles = bake::TilesWithin(*tiles, *request.bbox);
+  if (request.levels) tiles->resize(static_cast<std::size_t>(request.levels->second) + 1);
   const bake::Estimate estimate = bake::EstimateWith(*tiles, arguments.bytes_per_tile, arguments.milliseconds_per_tile);
   fmt::print("{}", arguments.json ? EstimateJson(estimate) + "\n" : EstimateText(estimate));
   return kExitOk;
@@ -363,13 +363,13 @@ int Bake(const BakeArguments& arguments) {
   if (const std::string wrong = WrongTogether(arguments); !wrong.empty()) {
     return cli::Fail(wrong + "\nRun 'terrace bake --help' for what is accepted.", kExitUsage);
   }
-  const auto order = OrderOf(arguments);
-  if (!order) return Fail(order.error());
+  const auto request = BakeRequestOf(arguments);
+  if (!request) return Fail(request.error());
   const auto codings = CodingsOf(arguments.codings);
   if (!codings) return Fail(codings.error());
   const auto shard = ShardOf(arguments.shard);
   if (!shard) return Fail(shard.error());
-  if (!arguments.catalogue.empty()) return PlanFromCatalogue(arguments, *order);
+  if (!arguments.catalogue.empty()) return PlanFromCatalogue(arguments, *request);
 
   std::vector<config::ConfigError> errors;
   const auto input = InputOf(arguments, errors);
@@ -378,7 +378,7 @@ int Bake(const BakeArguments& arguments) {
   auto dataset = OpenDataset(*input, signals);
   if (signals.signal() != 0) return StopCode(signals);
   if (!dataset) return cli::Fail(dataset.error().message, kExitFailure);
-  const auto manifests = bake::PlanArchives(*dataset, *order, "terrace " TERRACE_VERSION);
+  const auto manifests = bake::PlanArchives(*dataset, *request, "terrace " TERRACE_VERSION);
   if (!manifests) return Fail(manifests.error());
   std::vector<bake::Target> targets;
   std::uint64_t tiles = 0;

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "archive/tile_writer.h"
-#include "bake/order.h"
+#include "bake/bake_request.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/progress.h"

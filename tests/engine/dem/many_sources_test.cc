@@ -63,7 +63,7 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
   BlockRange range;
   for (const GridMember& member : grid.members()) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
-    range.Add(member.raster->tables()->table.Query(west - x, north - y, east - x, south - y));
+    range.Add(member.raster->statistics()->table.Query(west - x, north - y, east - x, south - y));
   }
   return range;
 }
@@ -71,20 +71,20 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
 // Queries a box around every position of a trace. Returns how many members were examined: the maximum of a box, and in
 // all.
 std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
-  const GridStatistics tables(grid, trace);
+  const GridStatistics statistics(grid, trace);
   std::size_t most = 0;
   for (std::size_t n = 0; n < trace.cells.positions().columns() * trace.cells.positions().rows(); ++n) {
     const Position p =
         trace.cells.positions().At(n % trace.cells.positions().columns(), n / trace.cells.positions().columns());
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
-    const std::size_t before = tables.members_visited();
-    const BlockRange found = tables.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
-    most = std::max(most, tables.members_visited() - before);
+    const std::size_t before = statistics.members_visited();
+    const BlockRange found = statistics.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
+    most = std::max(most, statistics.members_visited() - before);
     const BlockRange expected = OfAllMembers(grid, p.x - 1, p.y - 1, p.x + 1, p.y + 1);
     EXPECT_EQ(found.min, expected.min) << p.x << ' ' << p.y;
     EXPECT_EQ(found.max, expected.max) << p.x << ' ' << p.y;
   }
-  return {most, tables.members_visited()};
+  return {most, statistics.members_visited()};
 }
 
 // Columns of a raster grid around the Earth start at one meridian, so a tile there has pixels at both ends.
@@ -266,8 +266,8 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
     ASSERT_EQ(a.max, b.max);
     ASSERT_EQ(a.has_voids, b.has_voids);
     for (const int factor : {2, 8, 64}) {
-      ASSERT_EQ(kept->tables()->errors.Largest(factor, west, north, west + size, north + size),
-                paged.tables()->errors.Largest(factor, west, north, west + size, north + size));
+      ASSERT_EQ(kept->statistics()->errors.Largest(factor, west, north, west + size, north + size),
+                paged.statistics()->errors.Largest(factor, west, north, west + size, north + size));
     }
   }
   EXPECT_GT(pages->paged_bytes(), 0U);

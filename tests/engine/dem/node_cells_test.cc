@@ -262,14 +262,14 @@ TEST(NodeRows, PlacesAreThoseOfCells) {
   });
 }
 
-TEST(NodeRows, HullLeavesUnknownPositionsOut) {
+TEST(NodeRows, ExtentLeavesUnknownPositionsOut) {
   tin::ForEachInstructionSet([] {
     std::mt19937 random(9);
     std::uniform_real_distribution<double> place(-50, 2000);
     for (std::size_t count = 1; count < 40; ++count) {
       for (const unsigned share : {0U, 4U, 1U}) {  // one in so many is unknown; 0: none
         std::vector<Position> positions(count);
-        PositionHull expected;
+        PositionExtent expected;
         for (Position& p : positions) {
           p = {place(random), place(random)};
           if (share != 0 && random() % share == 0) {
@@ -277,13 +277,12 @@ TEST(NodeRows, HullLeavesUnknownPositionsOut) {
             expected.are_all_known = false;
             continue;
           }
-          expected.least = {std::min(expected.least.x, p.x), std::min(expected.least.y, p.y)};
-          expected.most = {std::max(expected.most.x, p.x), std::max(expected.most.y, p.y)};
+          expected.min = {std::min(expected.min.x, p.x), std::min(expected.min.y, p.y)};
+          expected.max = {std::max(expected.max.x, p.x), std::max(expected.max.y, p.y)};
         }
-        const PositionHull hull = HullOf(positions);
-        ASSERT_EQ(
-            std::tuple(hull.least.x, hull.least.y, hull.most.x, hull.most.y, hull.are_all_known),
-            std::tuple(expected.least.x, expected.least.y, expected.most.x, expected.most.y, expected.are_all_known));
+        const PositionExtent extent = ExtentOf(positions);
+        ASSERT_EQ(std::tuple(extent.min.x, extent.min.y, extent.max.x, extent.max.y, extent.are_all_known),
+                  std::tuple(expected.min.x, expected.min.y, expected.max.x, expected.max.y, expected.are_all_known));
       }
     }
   });

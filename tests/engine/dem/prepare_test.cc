@@ -150,7 +150,7 @@ void ExpectErrorsHold(const std::string& path) {
     }
     double most = 0;
     for (std::size_t i = 0; i < truth.level(factor).errors.size(); ++i) {
-      const float bound = source->tables()->errors.level(factor).errors[i], real = truth.level(factor).errors[i];
+      const float bound = source->statistics()->errors.level(factor).errors[i], real = truth.level(factor).errors[i];
       ASSERT_GE(bound * 1.00001 + 1e-3, real) << path << " factor " << factor << " block " << i;
       most = std::max(most, double{bound} - real);
       if (factor <= kLargestDirect) {

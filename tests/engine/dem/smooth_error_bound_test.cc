@@ -46,10 +46,10 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
       GridTrace trace;
       ASSERT_TRUE(grid->Fill(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
       const TileNodes nodes{lattice, window, heights};
-      const GridStatistics tables(*grid, trace);
+      const GridStatistics statistics(*grid, trace);
       const GeoidErrorBound geoid(nodes, nullptr, {});
-      const SmoothErrorBound plain(nodes, *grid, trace, tables, geoid, false);
-      SmoothErrorBound prepared(nodes, *grid, trace, tables, geoid, false);
+      const SmoothErrorBound plain(nodes, *grid, trace, statistics, geoid, false);
+      SmoothErrorBound prepared(nodes, *grid, trace, statistics, geoid, false);
       for (int south = 0; south < lattice.cells; south += 16) {
         prepared.PrepareRows(south, south + 16);
         for (int west = 0; west < lattice.cells; west += 8) {

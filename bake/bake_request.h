@@ -16,7 +16,7 @@
 
 namespace terrace::bake {
 
-struct Order {
+struct BakeRequest {
   std::vector<tiler::TileFormat> formats = {tiler::TileFormat::kQuantizedMesh};
   std::optional<std::pair<int, int>> levels = {};  // first and last; nothing: all
   std::optional<dem::GeoBounds> bbox = {};         // tiles that overlap it, and their siblings; nothing: all
@@ -28,7 +28,7 @@ struct Order {
 
 // The manifests of the archives, one for each format, without units. `product`: name and version of the program.
 // kInvalidArgument: the dataset does not have the levels, the area or the extensions; the message names valid ones.
-Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const Order& order,
+Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const BakeRequest& request,
                                                     const std::string& product);
 
 // Restricts the tiles of a dataset to those that overlap `bbox` and their siblings. Both roots stay.

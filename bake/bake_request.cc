@@ -1,4 +1,4 @@
-#include "bake/order.h"
+#include "bake/bake_request.h"
 
 #include <fmt/format.h>
 
@@ -63,13 +63,13 @@ Ranges HeightTiles(const dem::GeoBounds& bounds, int level) {
 
 std::string LevelsTo(int deepest) { return deepest == 0 ? "level 0 only" : fmt::format("levels 0 to {}", deepest); }
 
-Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& order, tiler::TileFormat format) {
+Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const BakeRequest& request, tiler::TileFormat format) {
   tiler::TileRequest kind;
   kind.format = format;
   switch (format) {
     case tiler::TileFormat::kQuantizedMesh: {
       const proto::TileExtensions wanted =
-          order.extensions.value_or(proto::TileExtensions{true, dataset.water.any(), false});
+          request.extensions.value_or(proto::TileExtensions{true, dataset.water.any(), false});
       if (wanted.watermask && !dataset.water.any()) {
         return MakeError(
             ErrorCode::kInvalidArgument,
@@ -82,7 +82,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& or
                          "extension metadata: dataset {} has none; set metadata_availability in its configuration",
                          dataset.name);
       }
-      if (wanted.metadata && (order.bbox || order.levels)) {
+      if (wanted.metadata && (request.bbox || request.levels)) {
         return MakeError(
             ErrorCode::kInvalidArgument,
             "extension metadata lists the tiles of the whole dataset: leave it out, or bake without --bbox "
@@ -91,14 +91,14 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const Order& or
       kind.normals = wanted.octvertexnormals;
       kind.water_mask = wanted.watermask;
       kind.metadata = wanted.metadata;
-      if (order.compress) kind.coding = tiler::Coding::kGzip;
+      if (request.compress) kind.coding = tiler::Coding::kGzip;
       break;
     }
     case tiler::TileFormat::kGlb:
       kind.compression = dataset.glb.compression;
       if (dataset.imagery.image) kind.texture = dataset.imagery.texture;
       // Draco output is entropy-coded already.
-      if (order.compress && kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
+      if (request.compress && kind.compression != proto::GlbCompression::kDraco) kind.coding = tiler::Coding::kGzip;
       break;
     case tiler::TileFormat::kHeightPng:
     default:  // archives have no others
@@ -148,19 +148,19 @@ std::vector<Ranges> TilesWithin(const std::vector<Ranges>& available, const dem:
   return levels;
 }
 
-Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const Order& order,
+Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const BakeRequest& request,
                                                     const std::string& product) {
   const dem::DemSource& source = *dataset.source;
   const dem::GeoBounds& data = source.info().bounds;
-  if (order.bbox && dem::CommonBounds(data, *order.bbox).empty()) {
+  if (request.bbox && dem::CommonBounds(data, *request.bbox).empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--bbox lies outside dataset {}, which covers {},{},{},{} (west, south, east, north)",
                      dataset.name, PlainNumber(data.west, 4), PlainNumber(data.south, 4), PlainNumber(data.east, 4),
                      PlainNumber(data.north, 4));
   }
   std::vector<archive::Manifest> manifests;
-  for (const tiler::TileFormat format : order.formats) {
-    const Result<tiler::TileRequest> kind = KindOf(dataset, order, format);
+  for (const tiler::TileFormat format : request.formats) {
+    const Result<tiler::TileRequest> kind = KindOf(dataset, request, format);
     if (!kind) return tl::unexpected(kind.error());
     archive::Manifest& manifest = manifests.emplace_back();
     manifest.product = product;
@@ -169,7 +169,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.kind = *kind;
     const bool is_mercator = format == tiler::TileFormat::kHeightPng;
     const int deepest = is_mercator ? source.info().max_mercator_depth : source.max_level();
-    const auto [first, last] = order.levels.value_or(std::pair(0, deepest));
+    const auto [first, last] = request.levels.value_or(std::pair(0, deepest));
     if (last > deepest) {
       return MakeError(ErrorCode::kInvalidArgument, "--levels {}-{}: dataset {} has {} of {} tiles", first, last,
                        dataset.name, LevelsTo(deepest), archive::FolderOf(format));
@@ -182,7 +182,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.min_level = first;
     manifest.max_level = last;
     if (is_mercator) {
-      const auto areas = order.bbox ? dem::CommonBounds(data, *order.bbox) : std::vector<dem::GeoBounds>{data};
+      const auto areas = request.bbox ? dem::CommonBounds(data, *request.bbox) : std::vector<dem::GeoBounds>{data};
       for (int level = 0; level <= last; ++level) {
         Ranges tiles;
         for (const dem::GeoBounds& area : areas) {
@@ -192,11 +192,11 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
       }
       continue;
     }
-    manifest.available = order.bbox ? TilesWithin(source.Availability(), *order.bbox) : source.Availability();
+    manifest.available = request.bbox ? TilesWithin(source.Availability(), *request.bbox) : source.Availability();
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
       manifest.error_steps.push_back(
-          tiler::ErrorStep(order.requested, level, level >= source.finest_level(), dataset.error_fraction));
+          tiler::ErrorStep(request.requested, level, level >= source.finest_level(), dataset.error_fraction));
     }
   }
   return manifests;
