@@ -26,6 +26,8 @@ FENCE = re.compile(r"^( *)```(\w*)[^\n]*\n(.*?)^ *```", re.MULTILINE | re.DOTALL
 INDENTED = re.compile(r"(?<=\n\n)(?:(?: {4,})\S.*\n(?:\n(?= {4}))?)+")
 MARK = re.compile(r"<!-- not run: ([^\n]+) -->\n+$")
 PAGE_MARK = re.compile(r"^<!-- no command of this page is run: (.+) -->$", re.MULTILINE)
+# What would change the machine or asks another host. Such a block is never run, so it needs a comment.
+FORBIDDEN = re.compile(r"\b(?:apt|apt-get|sudo|systemctl|service|docker|podman|kubectl)\s|/etc/|/var/|/usr/|https://")
 # In the scratch folder: a server is stopped as soon as it is ready.
 PREAMBLE = """
 set -eo pipefail
@@ -131,9 +133,13 @@ class DocCommands(unittest.TestCase):
                 place = re.search(r"http://([^/\s]+)", server.stdout.readline())[1]
                 environment = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}"}
                 for block in run:
+                    if FORBIDDEN.search(block.script):
+                        wrong.append(f"{block.page}:{block.line}: would change the machine or ask another host: "
+                                     f"put <!-- not run: REASON --> before it\n{block.script}")
+                        continue
                     script = re.sub(r"(127\.0\.0\.1|localhost):8080", place, block.script)
                     script = re.sub(r"build/release/server/cli/terrace\b", "terrace", script)
-                    done = subprocess.run(["bash", "-c", PREAMBLE + script], cwd=folder, env=environment, text=True, timeout=60,
+                    done = subprocess.run(["timeout", "60", "bash", "-c", PREAMBLE + script], cwd=folder, env=environment, text=True,
                                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
                     # 141: `head` had enough.
                     if done.returncode not in (0, 141):
