@@ -38,9 +38,9 @@ struct Encoder {
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 
-// encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: the source, the water raster or the image cannot be
-// read now. kCancelled: stopped. kNotFound (height tiles and those for maps): deeper than
-// max_mercator_depth; imagery: the dataset has none.
+// encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: the source, the
+// water raster or the image cannot be read now. kCancelled: stopped. kNotFound (height tiles and those for maps):
+// deeper than max_mercator_depth; imagery: the dataset has none.
 Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);

@@ -21,7 +21,7 @@ std::string EncodeTileJson(const TileJsonDescription& tiles) {
   json["name"] = tiles.name;
   json["scheme"] = "xyz";
   json["tiles"] = Json::array({tiles.tile_template});
-  json["minzoom"] = 0;
+  json["minzoom"] = tiles.min_zoom;
   json["maxzoom"] = tiles.max_zoom;
   json["bounds"] = Json::array({crosses_antimeridian ? -180 : tiles.west, clipped(tiles.south),
                                 crosses_antimeridian ? 180 : tiles.east, clipped(tiles.north)});
@@ -34,7 +34,7 @@ std::string EncodeTileJson(const TileJsonDescription& tiles) {
   if (tiles.kind == TileJsonKind::kContours) {
     json["vector_layers"] = Json::array({{{"id", kContourLayer},
                                           {"description", "lines of equal height"},
-                                          {"minzoom", 0},
+                                          {"minzoom", tiles.min_zoom},
                                           {"maxzoom", tiles.max_zoom},
                                           {"fields", {{"ele", "Number"}, {"index", "Boolean"}}}}});
   } else {

@@ -17,7 +17,7 @@ struct TileJsonDescription {
   std::string name;
   std::string attribution;
   std::string tile_template;  // an absolute URL with {z}, {x} and {y}: clients do not resolve it against the TileJSON's
-  int max_zoom = 0;
+  int min_zoom = 0, max_zoom = 0;
   int tile_size = 256;
   HeightEncoding encoding = HeightEncoding::kMapbox;
   // Degrees. west > east is a box across the antimeridian: TileJSON forbids that, and has all longitudes then.

@@ -10,6 +10,7 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
+#include "tiler/map/contour_tile.h"
 
 namespace terrace::server {
 namespace {
@@ -94,6 +95,16 @@ Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
   tiles.tile_template = fmt::format("{}/{}/{}/{{z}}/{{x}}/{{y}}{}?{}", OriginOf(*context.request),
                                     PercentEncode(dataset.name), row->folder, row->suffix, WithToken(query, context));
   tiles.max_zoom = MaxMapLevel(dataset, row->format, parameters->size);
+  if (is_lines && parameters->map.interval_cm != 0) {
+    while (tiles.min_zoom < tiles.max_zoom && tiler::MinIntervalCm(tiles.min_zoom) > parameters->map.interval_cm) {
+      ++tiles.min_zoom;
+    }
+    if (const std::uint32_t min = tiler::MinIntervalCm(tiles.min_zoom); min > parameters->map.interval_cm) {
+      return refuse(
+          Error{ErrorCode::kInvalidArgument,
+                fmt::format("interval must be at least {} m at the finest level, {}", min / 100.0, tiles.max_zoom)});
+    }
+  }
   tiles.tile_size = parameters->size;
   SetBounds(MapBounds(dataset, row->format), tiles);
   return ServeTileJson(from, context, tiles);

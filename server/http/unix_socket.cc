@@ -54,9 +54,9 @@ Result<bool> IsStale(const std::string& path) {
     return CannotListen(path, "something else lies there", "remove it, or choose another path");
   const Descriptor caller;
   const sockaddr_un address = AddressOf(path);
-  if (::connect(caller.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 &&
-      errno == ECONNREFUSED) {
-    return true;
+  if (::connect(caller.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
+    if (errno == ECONNREFUSED) return true;
+    return CannotListen(path, WhyOf(errno), "choose another path");
   }
   return CannotListen(path, "another process listens there", "stop it, or choose another path");
 }

@@ -273,7 +273,7 @@ std::string WriteOpenApi(const std::vector<DocumentedUrl>& urls) {
   document["openapi"] = "3.1.0";
   document["info"] = {
       {"title", "terrace"},
-      {"version", TERRACE_VERSION},
+      {"version", "1"},  // of the interface; /version reveals the program's to those who may know it
       {"summary", "Level-of-detail terrain tiles over HTTP"},
       {"description",
        "Elevation rasters as quantized-mesh, 3D Tiles, height images, heights and meshes. Each URL also "

@@ -7,8 +7,8 @@ namespace terrace::server {
 
 extern const Operation kTerrainTileOperation, kGlbTileOperation, kHeightTileOperation, kImplicitTileOperation,
     kSubtreeOperation;
-extern const Operation kDatasetsOperation, kLayerOperation, kTilesetOperation, kTileJsonOperation, kEditsOperation, kOpenApiOperation,
-    kViewerOperation, kViewerFileOperation;
+extern const Operation kDatasetsOperation, kLayerOperation, kTilesetOperation, kTileJsonOperation, kEditsOperation,
+    kOpenApiOperation, kViewerOperation, kViewerFileOperation;
 extern const Operation kHeightsOperation, kGridOperation, kSightOperation, kAreaOperation;
 extern const Operation kHillshadePngOperation, kHillshadeWebpOperation, kHillshadeTileJsonOperation, kSlopePngOperation,
     kSlopeWebpOperation, kSlopeTileJsonOperation, kContoursOperation, kContoursTileJsonOperation, kImageryWebpOperation,

@@ -28,8 +28,9 @@ std::string Prefix() {
 // Tiles of one level and format take about the same time to build.
 std::size_t ClassOf(const tiler::TileRequest& request) {
   constexpr std::size_t kLevels = 32;
+  static_assert(static_cast<std::size_t>(tiler::TileFormat::kGeodeticImagery) < LookUpGate::kClasses / kLevels);
   const auto level = static_cast<std::size_t>(std::clamp(request.key.level, 0, static_cast<int>(kLevels) - 1));
-  return (level + kLevels * static_cast<std::size_t>(request.format)) % LookUpGate::kClasses;
+  return level + kLevels * static_cast<std::size_t>(request.format);
 }
 
 class SharedCache final : public tiler::TileStore {

@@ -55,7 +55,10 @@ export function placesInside(corners, count) {
     });
     if (isInside) places.push({ longitude, latitude });
   }
-  return places;
+  if (places.length > 0) return places;
+  // Thinner than the grid.
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
+  return [...corners, { longitude: mean(longitudes), latitude: mean(latitudes) }];
 }
 
 // What flattening to `height` would do to ground of these heights on `area` square metres. Volumes in cubic metres, of

@@ -91,7 +91,9 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         os.mkdir(f"{folder}/cells")
         place(str(dem), f"{folder}/cells", arguments.rasters)
-        start(arguments.binary, dem, folder, arguments.cache_mb)[0].kill()  # statistics are kept; the peak of reading them is another matter
+        first = start(arguments.binary, dem, folder, arguments.cache_mb)[0]
+        first.kill()  # statistics are kept; the peak of reading them is another matter
+        first.wait()
         server, port = start(arguments.binary, dem, folder, arguments.cache_mb)
         try:
             before = peak_mb(server)

@@ -99,7 +99,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   auto handle = handles.Borrow();
   if (!handle) return tl::unexpected(handle.error());
   if (cells.empty()) return pixels;
-  const GridWindow window = WindowOf(cells, axes);
+  const GridWindow window = MoveTogether(cells, axes);
   const auto shares = ReadGrid(**handle, layout, factor, window, stop);
   if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!shares) {

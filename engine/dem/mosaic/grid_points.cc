@@ -131,7 +131,7 @@ Result<PointBlockPtr> RasterGrid::BlockOfCells(std::vector<GridCell>& cells, con
   const PointBlockKey key{id_, column, row};
   if (PointBlockPtr known = PointBlockCache::Shared().Find(key)) return known;
   if (PointBlockCache::Shared().Note(key) || cells.size() >= kManyPoints) return FindPointBlock(column, row, stop);
-  auto read = ReadPointBlock(WindowOf(cells, Axes(1)), stop);
+  auto read = ReadPointBlock(MoveTogether(cells, Axes(1)), stop);
   if (!read) return tl::unexpected(read.error());
   return std::make_shared<const PointBlock>(*std::move(read));
 }

@@ -141,7 +141,7 @@ GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
   return window.Window(axes_);
 }
 
-GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes) {
+GridWindow MoveTogether(std::span<GridCell> cells, const GridAxes& axes) {
   const std::int64_t around = cells[cells.size() / 2].column;
   for (GridCell& cell : cells) cell.column = NearestTurn(cell.column, around, axes.columns);
   return WindowOf(cells, axes);

@@ -79,10 +79,9 @@ class NodeCells {
   std::optional<std::int64_t> near_;                // column that cells were moved to, unless separable
 };
 
-// Returns the smallest window that contains all cells. If the axis wraps, moves the cells to columns near one of them.
-// Precondition: not empty.
-GridWindow WindowOf(std::span<GridCell> cells, const GridAxes& axes);
-// The same without moving the cells.
+// Moves cells to columns near one of them if the axis wraps, and returns WindowOf them. Precondition: not empty.
+GridWindow MoveTogether(std::span<GridCell> cells, const GridAxes& axes);
+// Returns the smallest window that contains all cells.
 GridWindow WindowOf(std::span<const GridCell> cells, const GridAxes& axes);
 
 // Interpolates bilinearly, with weights renormalized over valid samples; nothing if there is none.
