@@ -88,7 +88,7 @@ describe('/openapi.json', () => {
     // And with an edit.
     const ring = [[-84.25, 36.3], [-84.24, 36.3], [-84.24, 36.31], [-84.25, 36.3]];
     fs.writeFileSync(path.join(scratch, 'edits.geojson'), JSON.stringify({ type: 'FeatureCollection', features: [
-      { type: 'Feature', properties: { op: 'flatten', height: 500 }, geometry: { type: 'Polygon', coordinates: [ring] } }] }));
+      { type: 'Feature', properties: { terrain: { op: 'flatten', height: 500, blend_m: 100 } }, geometry: { type: 'Polygon', coordinates: [ring] } }] }));
     config.datasets.find((dataset) => dataset.name === 'jacksboro').edits = path.join(scratch, 'edits.geojson');
     fs.writeFileSync(path.join(scratch, 'samples.json'), JSON.stringify(config));
     server = await serve('--config', path.join(scratch, 'samples.json'));

@@ -43,6 +43,9 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"heights", base + "/heights"},
                                              {"grid", base + "/grid"},
                                              {"sight", base + "/sight"},
+                                             {"hillshade", base + "/hillshade/tiles.json"},
+                                             {"slope", base + "/slope/tiles.json"},
+                                             {"contours", base + "/contours/tiles.json"},
                                              {"mesh", base + "/mesh"}}));
 }
 
