@@ -11,6 +11,7 @@
 #include "engine/dem/crs/geoid.h"
 #include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -404,6 +405,33 @@ TEST_F(TerrainEdits, CountFromTheGeoidOfTheSources) {
     EXPECT_NEAR(static_cast<double>(above->front()), 500, 0.01);
   }
   EXPECT_GE(stated->info().heights.max, 500 + 40);
+}
+
+// Contours over an edit where the source has a void at its rim count from the same geoid as those beside it.
+TEST_F(TerrainEdits, CountFromTheGeoidOnMapsOverVoidsToo) {
+  RasterSpec spec{.width = 400, .height = 400, .geo_transform = {10, 0.001, 0, 50.4, 0, -0.001}, .nodata = -9999};
+  spec.value = [](int column, int) { return column < 200 ? -9999.0 : 100.0 + column; };
+  DemOptions options;
+  options.source.vertical = "egm96";
+  options.edits = {
+      WriteEdits(dir_, Rectangle(R"({"op":"flatten","height":500,"vertical":"orthometric"})", 10.1, 50.1, 10.3, 50.3))};
+  const auto source = OpenOrFail(WriteRaster(dir_, spec, "rim.tif"), options);
+  ASSERT_NE(source, nullptr);
+  const geo::MercatorGrid grid{10};
+  const NodeWindow window{static_cast<std::int64_t>((10.0 + 180) / 360 * static_cast<double>(grid.columns())), 88'400,
+                          300, 600};
+  const auto known = source->ReadKnownMercator(10, window, HeightDatum::kSource);
+  ASSERT_TRUE(known);
+  int west = 0, east = 0;
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    const auto column = static_cast<std::int64_t>(i % 300), row = static_cast<std::int64_t>(i / 300);
+    const double x = grid.Longitude(window.column + column), y = grid.Latitude(window.row + row);
+    if (x < 10.102 || x > 10.298 || y < 50.102 || y > 50.298) continue;
+    ++(x < 10.19 ? west : east);
+    ASSERT_NEAR((*known)[i], 500, 0.02) << x << " " << y;
+  }
+  EXPECT_GT(west, 1000);
+  EXPECT_GT(east, 1000);
 }
 
 TEST_F(TerrainEdits, RefuseDatumsThatTheyDoNotKnow) {
