@@ -259,6 +259,9 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
   if (const Result<void> has = CheckHasSurface(of, *surface); !has) return tl::unexpected(has.error());
   const Result<int> level = LevelOf(*surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
+  if (!of.source) {
+    if (const Result<void> bounded = CheckSamplesAlong(*level, rays); !bounded) return tl::unexpected(bounded.error());
+  }
   return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshesOf(dataset, *surface, stop), stop);
 }
 

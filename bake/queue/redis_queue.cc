@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <condition_variable>
-#include <iterator>
 #include <random>
 #include <utility>
 
@@ -179,19 +178,24 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
     if (Clock::now() < next_connect_) return MakeError(ErrorCode::kUnavailable, "Redis is away");
     if (auto connected = Connect(); !connected) return fail(connected.error());
   }
-  std::vector<redis::Command> commands;
+  std::deque<Outgoing> sent;
   {
     const std::lock_guard lock(mutex_);
-    commands.assign(std::make_move_iterator(outbox_.begin()), std::make_move_iterator(outbox_.end()));
-    outbox_.clear();
+    sent.swap(outbox_);
   }
+  std::vector<redis::Command> commands;
+  for (Outgoing& one : sent) commands.push_back(std::move(one.command));
   commands.push_back(command);
   auto replies = connection_->CallAll(commands);
   {
     // What Redis refuses now, because it is a replica, say, is sent again, before what was added meanwhile.
     const std::lock_guard lock(mutex_);
-    for (std::size_t i = commands.size() - 1; i-- > 0;) {
-      if (!replies || (*replies)[i].is_error()) outbox_.push_front(std::move(commands[i]));
+    for (std::size_t i = sent.size(); i-- > 0;) {
+      if (!replies || (*replies)[i].is_error()) {
+        outbox_.push_front({std::move(commands[i]), std::move(sent[i].done)});
+      } else {
+        done_.erase(sent[i].done);
+      }
     }
   }
   if (!replies) return fail(replies.error());
@@ -284,7 +288,7 @@ std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply
 
 void RedisQueue::Send(const Held& held, const char* script, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {held.incarnation, held.id});
-  outbox_.push_back(ScriptCommand(options_.place, script, std::move(arguments)));
+  outbox_.push_back({ScriptCommand(options_.place, script, std::move(arguments)), {}});
 }
 
 // The acknowledgement goes with the next command: the thread takes its next unit now.
@@ -294,6 +298,8 @@ void RedisQueue::Done(std::size_t unit) {
   if (held.empty()) return;
   const double seconds = std::chrono::duration<double>(Clock::now() - held.mapped().since).count();
   Send(held.mapped(), scripts::kDone, {options_.units[unit], options_.worker, fmt::format("{:.3f}", seconds)});
+  outbox_.back().done = held.mapped().id;
+  done_.insert(held.mapped().id);
 }
 
 void RedisQueue::Return(std::size_t unit) {
@@ -337,9 +343,10 @@ void RedisQueue::Beat() {
   std::vector<std::string> arguments;
   {
     const std::lock_guard lock(mutex_);
-    if (held_.empty() && !finish_) return;
+    if (held_.empty() && done_.empty() && !finish_) return;
     arguments = {incarnation_, options_.worker};
     for (const auto& [unit, held] : held_) arguments.push_back(held.id);
+    arguments.insert(arguments.end(), done_.begin(), done_.end());
     if (finish_) arguments.push_back(finish_->id);
   }
   // A call that takes longer is given up, so that the next one comes in time. Whether Redis is away is told by Take.

@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -117,7 +118,12 @@ class RedisQueue : public UnitQueue {
   std::chrono::milliseconds lease_;
   std::map<std::size_t, Held> held_;
   std::optional<Held> finish_;
-  std::deque<redis::Command> outbox_;  // to be sent before the next command
+  struct Outgoing {
+    redis::Command command;
+    std::string done;  // the id that it acknowledges; empty: none
+  };
+  std::deque<Outgoing> outbox_;  // to be sent before the next command
+  std::set<std::string> done_;   // ids whose acknowledgement waits or is on its way: they are beaten for until then
   End end_ = End::kNone;
   Error why_;
 

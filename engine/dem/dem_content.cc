@@ -1,12 +1,42 @@
 // The hash of all that the tiles of a subtree depend on.
 #include <algorithm>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "engine/core/check.h"
 #include "engine/dem/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
+namespace {
+
+// The tiles around a square of tiles that touch an available tile in it, corners included, as offsets from `first`, its
+// south-western tile. `side`: in tiles. Levels that edits add have few tiles; a square of them has a long rim.
+std::vector<std::pair<std::int64_t, std::int64_t>> RimOf(const std::vector<geo::TileRange>& available,
+                                                         const geo::TileKey& first, std::int64_t side) {
+  std::vector<std::pair<std::int64_t, std::int64_t>> rim;
+  for (const geo::TileRange& range : available) {
+    const geo::TileRange inside = geo::Common(range, {first.x, first.y, first.x + side - 1, first.y + side - 1});
+    if (geo::IsEmpty(inside)) continue;
+    const std::int64_t west = inside.start_x - first.x - 1, east = inside.end_x - first.x + 1;
+    const std::int64_t south = inside.start_y - first.y - 1, north = inside.end_y - first.y + 1;
+    for (std::int64_t x = west; x <= east; ++x) {
+      if (south == -1) rim.emplace_back(x, -1);
+      if (north == side) rim.emplace_back(x, side);
+    }
+    for (std::int64_t y = south; y <= north; ++y) {
+      if (west == -1) rim.emplace_back(-1, y);
+      if (east == side) rim.emplace_back(side, y);
+    }
+  }
+  std::ranges::sort(rim);
+  rim.erase(std::unique(rim.begin(), rim.end()), rim.end());
+  return rim;
+}
+
+}  // namespace
 
 ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const {
   TERRACE_CHECK(geo::IsValid(top) && top.level <= deepest && deepest <= geo::kMaxLevel);
@@ -50,6 +80,14 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
     const int down = level - top.level;
     const std::int64_t side = std::int64_t{1} << down;
     const geo::TileKey first{level, top.x << down, top.y << down};
+    if (level > finest_level()) {
+      for (const auto& [dx, dy] : RimOf(Available(level), first, side)) {
+        hasher.Add(dx);
+        hasher.Add(dy);
+        add_range(geo::Neighbour(first, static_cast<int>(dx), static_cast<int>(dy)));
+      }
+      continue;
+    }
     for (std::int64_t at = -1; at <= side; ++at) {
       for (const auto& [dx, dy] : {std::pair{at, std::int64_t{-1}}, {at, side}, {std::int64_t{-1}, at}, {side, at}}) {
         add_range(geo::Neighbour(first, static_cast<int>(dx), static_cast<int>(dy)));

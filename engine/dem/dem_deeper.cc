@@ -34,10 +34,18 @@ void DemSource::Impl::AddDeeperLevels(double error_fraction) {
     if (level > 0) finer.push_back({level, TilesTouching(edit, level)});
   }
   if (finer.empty()) return;
-  std::vector<std::vector<geo::TileRange>> all = available;
-  AddTiles(all, finer);
-  if (all == available) return;
-  available_unedited = std::exchange(available, std::move(all));
+  const std::vector<std::vector<geo::TileRange>> added = AddTiles(available, finer);
+  if (std::ranges::all_of(added, [](const auto& tiles) { return tiles.empty(); })) return;
+  above_added.resize(added.size());
+  for (std::size_t level = added.size() - 1; level > 0; --level) {
+    std::vector<geo::TileRange>& parents = above_added[level - 1];
+    std::vector<geo::TileRange> children = added[level];
+    children.insert(children.end(), above_added[level].begin(), above_added[level].end());
+    for (const geo::TileRange& range : children) {
+      parents.push_back({range.start_x >> 1, range.start_y >> 1, range.end_x >> 1, range.end_y >> 1});
+    }
+    parents = geo::Disjoint(std::move(parents));
+  }
   info.max_level = static_cast<int>(available.size()) - 1;
   for (int level = info.finest_level + 1; level <= info.max_level; ++level) {
     lattices[static_cast<std::size_t>(level)].cells = lattices[static_cast<std::size_t>(info.finest_level)].cells;
@@ -45,20 +53,23 @@ void DemSource::Impl::AddDeeperLevels(double error_fraction) {
 }
 
 std::uint64_t DemSource::DeeperTilesOf(const geo::TileKey& key) const {
-  if (impl_->available_unedited.empty() || !geo::IsValid(key)) return 0;
+  if (!geo::IsValid(key) || key.level >= static_cast<int>(impl_->above_added.size())) return 0;
+  const auto& touched = impl_->above_added[static_cast<std::size_t>(key.level)];
+  if (std::ranges::none_of(touched, [&](const geo::TileRange& range) { return range.Contains(key); })) return 0;
+  const Impl::HashKey memo_key = {key.level, key.x, key.y, -1, -1};
+  if (const auto known = impl_->KnownHash(memo_key)) return *known;
   ContentHasher hasher;
-  bool is_touched = false;
   for (int level = key.level + 1; level <= max_level(); ++level) {
-    const auto at = static_cast<std::size_t>(level);
-    const std::vector<geo::TileRange> tiles = Below(impl_->available[at], key, level);
+    const std::vector<geo::TileRange> tiles = Below(impl_->available[static_cast<std::size_t>(level)], key, level);
     if (tiles.empty()) break;  // and none on deeper levels
     hasher.Add(std::uint64_t{tiles.size()});
     for (const geo::TileRange& range : tiles) {
       for (const std::int64_t number : {range.start_x, range.start_y, range.end_x, range.end_y}) hasher.Add(number);
     }
-    is_touched |= at >= impl_->available_unedited.size() || tiles != Below(impl_->available_unedited[at], key, level);
   }
-  return is_touched ? hasher.Hash().low | 1 : 0;
+  const std::uint64_t hash = hasher.Hash().low | 1;
+  impl_->KeepHash(memo_key, hash);
+  return hash;
 }
 
 std::span<const std::vector<geo::TileRange>> DemSource::AvailabilityBelow(const geo::TileKey& key) const {

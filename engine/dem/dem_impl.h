@@ -76,8 +76,8 @@ class DemSource::Impl {
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)
   std::vector<geo::Lattice> lattices;
   std::vector<std::vector<geo::TileRange>> available;
-  std::vector<std::vector<geo::TileRange>> available_unedited;  // empty: the same
-  float floor = 0;                                              // above the ellipsoid
+  std::vector<std::vector<geo::TileRange>> above_added;  // the tiles above those that edits added; empty: none
+  float floor = 0;                                       // above the ellipsoid
   // For the whole Earth, of the last raster grid that refers to a geoid; or null.
   std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;
@@ -93,7 +93,8 @@ class DemSource::Impl {
   HeightRange unedited_heights;  // of `info`
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  using HashKey = std::array<std::int64_t, 5>;  // level, column, row; of Mercator windows also columns, rows; else 0
+  // Level, column, row; then columns and rows of Mercator windows, 0 of edits, -1 of deeper tiles.
+  using HashKey = std::array<std::int64_t, 5>;
   struct HashOfKey {
     std::size_t operator()(const HashKey& key) const {
       std::uint64_t hash = 0;

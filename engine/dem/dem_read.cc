@@ -329,10 +329,17 @@ Result<std::vector<float>> DemSource::ReadKnownMercator(int depth, const NodeWin
   if (const auto done = impl_->ApplyEdits(grid, window, which, edited, stop); !done) {
     return tl::unexpected(done.error());
   }
+  std::vector<double> undulations;  // empty: the datums are one
+  if (datum != HeightDatum::kEllipsoid && impl_->floor_undulations != nullptr && HasVoids(unedited)) {
+    auto read_undulations = impl_->floor_undulations->At(grid, window);
+    if (!read_undulations) return tl::unexpected(std::move(read_undulations).error());
+    undulations = *std::move(read_undulations);
+  }
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (IsVoid(unedited[i])) {
-      // No source tells how far apart the datums are there.
-      if (edited[i] != static_cast<float>(impl_->floor)) (*known)[i] = edited[i];
+      if (edited[i] == static_cast<float>(impl_->floor)) continue;
+      const bool converts = !undulations.empty() && !std::isnan(undulations[i]);
+      (*known)[i] = converts ? RoundHeight(static_cast<double>(edited[i]) - undulations[i]) : edited[i];
     } else if (edited[i] != unedited[i]) {
       (*known)[i] = datum == HeightDatum::kEllipsoid ? edited[i] : (*known)[i] + (edited[i] - unedited[i]);
     }

@@ -1,7 +1,6 @@
 // Lines of sight over a dataset: a ray is measured over the raster grids in order of precedence, over each where those
 // before it have no height.
 #include <algorithm>
-#include <map>
 #include <span>
 #include <utility>
 
@@ -40,10 +39,7 @@ bool IsEdited(const EditSet& edits, std::span<const TrackPiece> pieces) {
 
 Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                                       std::stop_token stop) const {
-  std::map<std::size_t, GridSight> sights;
-  const auto sight_of = [&](std::size_t grid) -> GridSight& {
-    return sights.try_emplace(grid, impl_->grids[grid]).first->second;
-  };
+  GridSights sights;
   std::vector<SightAnswer> answers;
   answers.reserve(rays.size());
   for (std::size_t i = 0; i < rays.size(); ++i) {
@@ -63,7 +59,7 @@ Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> 
     SightSearch search;
     std::vector<RayPart> open = {{0, 1}};
     const auto look = [&](std::size_t grid, SightSurface surface) -> Result<void> {
-      auto rest = sight_of(grid).Search(pieces, open, surface, search, stop);
+      auto rest = sights.Of(grid, impl_->grids[grid]).Search(pieces, open, surface, search, stop);
       if (!rest) return tl::unexpected(std::move(rest).error());
       open = *std::move(rest);
       return {};

@@ -350,7 +350,8 @@ void SharedTier::Write() {
   }
   const auto values =
       static_cast<std::uint64_t>(std::ranges::count_if(jobs, [](const Job& job) { return !!job.value; }));
-  if (!writer_ || writer_->HasEnded()) {
+  // A fire wall drops what is idle silently; a write there would wait for its time-out, and interrupt readers.
+  if (!writer_ || writer_->HasEnded() || Clock::now() - written_at_ >= options_.test_after) {
     Result<ConnectionPtr> opened = Open(kWriteTimeout, MaxReply());
     if (!opened) {
       dropped_ += values;
@@ -370,6 +371,7 @@ void SharedTier::Write() {
     }
   }
   const Result<std::vector<redis::Reply>> replies = writer_->CallAll(commands);
+  written_at_ = Clock::now();
   if (!replies) {
     dropped_ += values;
     return SwitchOff(replies.error(), epoch);

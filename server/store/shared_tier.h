@@ -130,7 +130,8 @@ class SharedTier {
   std::string reported_;                         // the last reason in the log
   Clock::time_point reported_at_, answered_at_;  // when the log said so
 
-  ConnectionPtr writer_;  // of the store's thread
+  ConnectionPtr writer_;          // of the store's thread
+  Clock::time_point written_at_;  // when the writer was used last
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0}, damaged_{0}, written_{0}, dropped_{0};
   std::atomic<std::uint64_t> timeouts_{0}, skipped_{0}, switched_off_{0};
   std::thread thread_;

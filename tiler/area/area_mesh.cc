@@ -213,9 +213,13 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
   AreaPlan plan;
   const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };
   while (plan.level < source.finest_level() && is_coarse()) ++plan.level;
-  // Deeper levels exist around edits alone.
-  while (plan.level < source.max_level() && is_coarse() && IsCovered(source, *clipped, plan.level + 1)) ++plan.level;
-  const NodeCounts nodes = NodesAt(source.LatticeOf(plan.level), *clipped);
+  const auto nodes_at = [&](int level) { return NodesAt(source.LatticeOf(level), *clipped); };
+  // Deeper levels exist around edits alone. An edit must not make an area too large.
+  while (plan.level < source.max_level() && is_coarse() &&
+         ExceededLimits(nodes_at(plan.level + 1), max_samples).empty() && IsCovered(source, *clipped, plan.level + 1)) {
+    ++plan.level;
+  }
+  const NodeCounts nodes = nodes_at(plan.level);
   if (!ExceededLimits(nodes, max_samples).empty()) {
     return TooLarge(source, error_fraction, *clipped, plan.level, max_samples);
   }

@@ -28,7 +28,8 @@ struct AreaRequest {
 
 // The samples that an area is meshed from: nodes of the lattice of the first level whose default error is at most the
 // requested error, or of the deepest level: of the deepest one without edits, unless all tiles that the area touches
-// exist on a deeper one. The area is clipped to the source's bounds, then extended to whole cells.
+// exist on a deeper one and its samples are not too many. The area is clipped to the source's bounds, then extended to
+// whole cells.
 struct AreaPlan {
   int level = 0;
   dem::NodeWindow window;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <utility>
 
 #include "engine/core/check.h"
 #include "engine/dem/contour/contour_lines.h"
@@ -79,7 +80,11 @@ void MarkKept(const std::vector<proto::TilePoint>& line, std::size_t first, std:
   }
 }
 
-// Without points that the line hardly needs.
+void Append(std::vector<proto::TilePoint>& line, const proto::TilePoint& point) {
+  if (line.empty() || line.back() != point) line.push_back(point);
+}
+
+// Without points that the line hardly needs. Of a small ring one point is left.
 std::vector<proto::TilePoint> Simplified(const std::vector<proto::TilePoint>& line) {
   std::vector<bool> keeps(line.size());
   std::size_t before = 0;  // the kept point before
@@ -91,20 +96,17 @@ std::vector<proto::TilePoint> Simplified(const std::vector<proto::TilePoint>& li
   }
   std::vector<proto::TilePoint> kept;
   for (std::size_t i = 0; i < line.size(); ++i) {
-    if (keeps[i]) kept.push_back(line[i]);
+    if (keeps[i]) Append(kept, line[i]);
   }
   return kept;
-}
-
-void Append(std::vector<proto::TilePoint>& line, const proto::TilePoint& point) {
-  if (line.empty() || line.back() != point) line.push_back(point);
 }
 
 // The parts of a line in the tile and its buffer.
 void AddParts(const dem::ContourLine& line, std::vector<std::vector<proto::TilePoint>>& lines) {
   std::vector<proto::TilePoint> part;
   const auto finish = [&] {
-    if (part.size() >= 2) lines.push_back(Simplified(part));
+    std::vector<proto::TilePoint> kept = Simplified(part);
+    if (kept.size() >= 2) lines.push_back(std::move(kept));  // vector tiles have no lines without length
     part.clear();
   };
   for (std::size_t i = 1; i < line.points.size(); ++i) {

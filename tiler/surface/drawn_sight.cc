@@ -191,19 +191,34 @@ class Walk {
   const DrawnMesh* last_ = nullptr;
 };
 
+double TotalLength(std::span<const dem::SightRay> rays) {
+  double length_m = 0;
+  for (const dem::SightRay& ray : rays) length_m += dem::LengthOf(ray);
+  return length_m;
+}
+
 }  // namespace
 
 Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem::SightRay> rays) {
   double spacing_m = std::numeric_limits<double>::infinity();
   for (const dem::RasterInfo& raster : source.info().sources) spacing_m = std::min(spacing_m, raster.spacing_m);
-  double samples = 0;
-  for (const dem::SightRay& ray : rays) samples += dem::LengthOf(ray) / spacing_m;
+  const double samples = TotalLength(rays) / spacing_m;
   if (samples <= kMaxSamplesAlong) return {};
   return MakeError(
       ErrorCode::kInvalidArgument,
       "the rays together cross about {:.0f} samples of the dataset's finest source, and {:.0f} are the most "
       "for one request; ask for fewer or shorter rays",
       samples, kMaxSamplesAlong);
+}
+
+Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays) {
+  const double side_m = geo::MetresPerDegreeNorth(0) * 180 / static_cast<double>(geo::TileRows(level));
+  const double samples = TotalLength(rays) / std::min(side_m / 256, kPartLength);
+  if (samples <= kMaxSamplesAlong) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "the rays together cross about {:.0f} samples of tiles of level {}, and {:.0f} are the most for one "
+                   "request; ask for fewer or shorter rays, or for a shallower level",
+                   samples, level, kMaxSamplesAlong);
 }
 
 Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,

@@ -11,11 +11,13 @@
 
 namespace terrace::tiler {
 
-// Samples of the finest source that the rays of one request may cross together.
+// Samples of the finest source, or of tiles, that the rays of one request may cross together.
 inline constexpr double kMaxSamplesAlong = 2e8;
 
 // kInvalidArgument, with a message for the client: the rays cross more.
 Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem::SightRay> rays);
+// The same where there are tiles alone: 256 samples along a tile's side count, and at least one every 500 m.
+Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays);
 
 // As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:
 // the rays cross more than kMaxDrawnTiles tiles. Other errors: those of `mesh_of`.

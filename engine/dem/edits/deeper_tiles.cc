@@ -13,7 +13,8 @@ int LevelFor(const Edit& edit, double error_fraction, int deepest) {
   if (edit.op != EditOp::kPrecision || !std::isfinite(edit.error_m)) return -1;
   int level = 0;
   while (level < deepest && geo::DefaultError(level, error_fraction) > edit.error_m) ++level;
-  return level;
+  // Without effect there: its tiles would be those of the sources.
+  return level < edit.min_level ? -1 : level;
 }
 
 std::vector<geo::TileRange> TilesTouching(const Edit& edit, int level) {

@@ -12,7 +12,7 @@ namespace terrace::dem {
 inline constexpr int kMaxDeeperLevels = 6;
 
 // The first level whose default error is at most the edit's `error_m`, at most `deepest`; -1: the edit is not
-// `precision`, or has no `error_m`.
+// `precision`, has no `error_m`, or begins on a deeper level (`min_level`).
 int LevelFor(const Edit& edit, double error_fraction, int deepest);
 
 // The tiles of a level that its polygon or the width of its line touches, without the blend. Large edits get a few

@@ -117,6 +117,7 @@ Result<void> GridSight::Probe(Scan& scan) {
         scan.search.IsSettled(scan.piece.height_m.At(s) - grid_.heights().max - SightBlocks::kMaxUndulation, 0))
       continue;
     const auto column = static_cast<std::int64_t>(x), row = static_cast<std::int64_t>(y);
+    blocks_.Trim();
     const Result<const SightBlock*> block = blocks_.At(column, row, scan.stop);
     if (!block) return tl::unexpected(block.error());
     const GridWindow& window = (*block)->window();
@@ -138,7 +139,9 @@ Result<void> GridSight::Probe(Scan& scan) {
   return {};
 }
 
+// No pointer to a block outlives a call that measures: halves are looked at after the block of the whole.
 Result<void> GridSight::Halve(Scan& scan, double first, double last) {
+  blocks_.Trim();
   const Quadratic::Range x = scan.on_grid.x.Over(first, last), y = scan.on_grid.y.Over(first, last);
   constexpr double kRim = 0.5 + GridCover::kEdgeTolerance;
   const bool is_beside = (!grid_.wraps() && (x.max < -kRim || x.min > grid_.columns() - 1 + kRim)) || y.max < -kRim ||
@@ -364,6 +367,17 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
     known = next;
     before = s;
   }
+}
+
+std::size_t GridSights::blocks() const {
+  std::size_t blocks = 0;
+  for (const auto& [number, sight] : sights_) blocks += sight.blocks();
+  return blocks;
+}
+
+GridSight& GridSights::Of(std::size_t number, const RasterGrid& grid) {
+  if (sights_.size() + blocks() > kMaxSightBlocks) sights_.clear();
+  return sights_.try_emplace(number, grid).first->second;
 }
 
 }  // namespace terrace::dem

@@ -6,6 +6,7 @@
 // degree between the lines of the grid, and its minimum is exact.
 #pragma once
 
+#include <map>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -59,6 +60,8 @@ class GridSight {
   Result<std::vector<RayPart>> Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
                                       SightSurface surface, SightSearch& search, const std::stop_token& stop);
 
+  std::size_t blocks() const { return blocks_.size(); }  // in memory
+
  private:
   struct Scan;
   struct CellRange {
@@ -78,6 +81,18 @@ class GridSight {
 
   const RasterGrid& grid_;
   SightBlocks blocks_;
+};
+
+// The raster grids below the rays of a request. Those of earlier rays together keep at most kMaxSightBlocks blocks, and
+// so does the one that is in use. For one thread.
+class GridSights {
+ public:
+  // `number`: of the grid. The reference is valid until the next call.
+  GridSight& Of(std::size_t number, const RasterGrid& grid);
+  std::size_t blocks() const;  // in memory
+
+ private:
+  std::map<std::size_t, GridSight> sights_;
 };
 
 }  // namespace terrace::dem

@@ -151,6 +151,13 @@ Result<std::vector<float>> SightBlocks::UndulationsOf(const GridWindow& window) 
   return undulations;
 }
 
+void SightBlocks::Trim() {
+  if (blocks_.size() <= kMaxSightBlocks) return;
+  blocks_.clear();
+  last_ = -1;
+  last_block_ = nullptr;
+}
+
 Result<const SightBlock*> SightBlocks::At(std::int64_t column, std::int64_t row, const std::stop_token& stop) {
   const std::int64_t block_column = (column + kPointBlockCells) / kPointBlockCells, block_row = row / kPointBlockCells;
   const std::int64_t number = block_row << 32 | block_column;

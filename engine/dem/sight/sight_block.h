@@ -50,13 +50,21 @@ class SightBlock {
   std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
 };
 
+// Blocks that are kept: of 1 MB each for 256 x 256 samples.
+inline constexpr std::size_t kMaxSightBlocks = 256;
+
 // The blocks of a raster grid that some rays cross. For one thread.
 class SightBlocks {
  public:
   explicit SightBlocks(const RasterGrid& grid);
 
-  // The block with a cell. The column of a cell is 0 .. columns() - 1. Errors: those of RasterGrid::FindPointBlock.
+  // The block with a cell, valid until Trim. The column of a cell is 0 .. columns() - 1. Errors: those of
+  // RasterGrid::FindPointBlock.
   Result<const SightBlock*> At(std::int64_t column, std::int64_t row, const std::stop_token& stop);
+  // Drops all blocks if there are more than kMaxSightBlocks. Parts of a ray are looked at in order, so few are read
+  // again.
+  void Trim();
+  std::size_t size() const { return blocks_.size(); }
 
   // Whether undulations are in the blocks: between samples at most 240 m apart they are as good as linear. Else
   // Undulation has to be added at each position.

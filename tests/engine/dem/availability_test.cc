@@ -1,4 +1,6 @@
 // The available tiles of several rasters together.
+#include "engine/dem/mosaic/availability.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -71,6 +73,46 @@ TEST(Availability, ATileHasFourChildrenOrNoneWhereACellIsMissing) {
       }
     }
   }
+}
+
+bool Has(const std::vector<std::vector<geo::TileRange>>& levels, const geo::TileKey& key) {
+  return std::ranges::any_of(levels[static_cast<std::size_t>(key.level)],
+                             [&](const geo::TileRange& range) { return range.Contains(key); });
+}
+
+// Across the antimeridian, at a pole, and along a diagonal that would be more ranges than documents should have.
+TEST(Availability, OfAddedTilesIsGraded) {
+  std::vector<geo::TileRange> diagonal;
+  for (std::int64_t i = 0; i < 6000; ++i) diagonal.push_back({5000 + i, 4000 + i, 5000 + i, 4000 + i});
+  const FinerTiles finer[] = {{9, {{0, 200, 0, 200}, {700, 0, 700, 0}, {1023, 511, 1023, 511}}}, {14, diagonal}};
+  const std::vector<std::vector<geo::TileRange>> before = {{{0, 0, 1, 0}}, {{0, 0, 1, 1}}};
+  std::vector<std::vector<geo::TileRange>> levels = before;
+  const auto added = AddTiles(levels, finer);
+  ASSERT_EQ(levels.size(), 15u);
+  ASSERT_EQ(added.size(), levels.size());
+  EXPECT_EQ(levels[0], before[0]);
+  for (int level = 1; level <= 14; ++level) {
+    const auto at = static_cast<std::size_t>(level);
+    EXPECT_LE(levels[at].size(), 2000u) << level;
+    if (level > 1) {
+      EXPECT_EQ(added[at], levels[at]);
+    }
+    int missing = 0;
+    for (const geo::TileRange& range : added[at]) {
+      for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
+        for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
+          for (int around = 0; around < 9; ++around) {
+            const geo::TileKey beside = geo::Neighbour({level, x, y}, around % 3 - 1, around / 3 - 1);
+            if (!geo::IsValid(beside)) continue;
+            missing += Has(levels, {level - 1, beside.x / 2, beside.y / 2}) ? 0 : 1;
+          }
+        }
+      }
+    }
+    EXPECT_EQ(missing, 0) << level;
+  }
+  EXPECT_TRUE(Has(levels, {8, 511, 99}) && Has(levels, {8, 511, 100}));
+  EXPECT_EQ(added[1], (std::vector<geo::TileRange>{{2, 0, 3, 1}}));
 }
 
 }  // namespace

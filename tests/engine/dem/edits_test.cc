@@ -11,55 +11,12 @@
 #include "engine/dem/crs/geoid.h"
 #include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/dem/edits_fixture.h"
 
 namespace terrace::dem {
 namespace {
-
-// A slope of 1 m a pixel to the east from 100 m, at 10 .. 10.4 E, 50 .. 50.4 N.
-std::string WriteSlope(const TempDir& dir) {
-  RasterSpec spec;
-  spec.width = spec.height = 400;
-  spec.geo_transform = {10, 0.001, 0, 50.4, 0, -0.001};
-  spec.value = [](int column, int) { return 100.0 + column; };
-  return WriteRaster(dir, spec);
-}
-
-std::string WriteEdits(const TempDir& dir, const std::string& features, const std::string& name = "edits.geojson") {
-  std::ofstream(dir.File(name)) << R"({"type":"FeatureCollection","features":[)" << features << "]}";
-  return dir.File(name);
-}
-
-std::string Rectangle(const std::string& terrain, double west, double south, double east, double north) {
-  return fmt::format(R"({{"type":"Feature","properties":{{"terrain":{0}}},"geometry":{{"type":"Polygon","coordinates":)"
-                     R"([[[{1},{2}],[{3},{2}],[{3},{4}],[{1},{4}],[{1},{2}]]]}}}})",
-                     terrain, west, south, east, north);
-}
-std::string Middle(const std::string& terrain) { return Rectangle(terrain, 10.15, 50.15, 10.25, 50.25); }
-
-class TerrainEdits : public testing::Test {
- protected:
-  std::unique_ptr<DemSource> Open(const std::string& features) {
-    DemOptions options;
-    options.edits = {WriteEdits(dir_, features)};
-    return OpenOrFail(slope_, options);
-  }
-  std::string MessageOf(const std::string& features) {
-    DemOptions options;
-    options.edits = {WriteEdits(dir_, features)};
-    const auto opened = DemSource::Open(slope_, options);
-    EXPECT_FALSE(opened.has_value());
-    return opened ? "" : opened.error().message;
-  }
-  static double At(const DemSource& source, double longitude, double latitude) {
-    const auto heights = source.ReadPoints(std::array{GeoPosition{longitude, latitude}});
-    EXPECT_TRUE(heights.has_value());
-    return heights ? static_cast<double>(heights->front()) : 0;
-  }
-
-  const TempDir dir_;
-  const std::string slope_ = WriteSlope(dir_);
-};
 
 TEST_F(TerrainEdits, FlattenInsideBlendOutsideAndNothingBeyond) {
   const auto source = Open(Middle(R"({"op":"flatten","height":500,"blend_m":1000})"));
@@ -304,72 +261,6 @@ TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
   EXPECT_GT(changed, 0);
 }
 
-// Deeper levels exist around the edit alone, with all ancestors and siblings, and lattices become finer on them.
-TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
-  const auto plain = OpenOrFail(slope_);
-  const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.5,"blend_m":300})", 10.35, 50.35, 10.36, 50.352));
-  const auto coarse = Open(Rectangle(R"({"op":"precision","error_m":50})", 10.35, 50.35, 10.36, 50.352));
-  ASSERT_TRUE(plain && edited && coarse);
-  const int finest = plain->max_level();
-  EXPECT_EQ(plain->finest_level(), finest);
-  EXPECT_EQ(coarse->Availability(), plain->Availability());
-  EXPECT_EQ(edited->finest_level(), finest);
-  EXPECT_GT(edited->max_level(), finest + 2);
-  EXPECT_LE(geo::DefaultError(edited->max_level()), 0.5);
-  EXPECT_GT(geo::DefaultError(edited->max_level() - 1), 0.5);
-  std::int64_t tiles = 0;
-  for (int level = 0; level <= edited->max_level(); ++level) {
-    if (level <= finest) {
-      EXPECT_EQ(edited->Available(level), plain->Available(level));
-      EXPECT_EQ(edited->LatticeOf(level).cells, plain->LatticeOf(level).cells);
-    } else {
-      EXPECT_EQ(edited->LatticeOf(level).StepDegrees(), edited->LatticeOf(level - 1).StepDegrees() / 2);
-    }
-    const double side = 180.0 / static_cast<double>(geo::TileRows(level));
-    for (const geo::TileRange& range : edited->Available(level)) {
-      for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
-        for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
-          if (level > 0) {
-            EXPECT_TRUE(edited->IsAvailable({level - 1, x / 2, y / 2}));
-            for (const std::int64_t i : {0, 1, 2, 3})
-              EXPECT_TRUE(edited->IsAvailable({level, x / 2 * 2 + i % 2, y / 2 * 2 + i / 2}));
-          }
-          if (level <= finest) continue;
-          ++tiles;
-          // No further away than a sibling of a tile that touches it.
-          const double west = static_cast<double>(x) * side - 180, south = static_cast<double>(y) * side - 90;
-          EXPECT_TRUE(west + 3 * side > 10.35 && west - 2 * side < 10.36 && south + 3 * side > 50.35 &&
-                      south - 2 * side < 50.352);
-        }
-      }
-    }
-  }
-  EXPECT_GT(tiles, 50);
-  // Every tile of the deepest level that meets the polygon exists.
-  const int level = edited->max_level();
-  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
-  for (double latitude = 50.35; latitude < 50.352; latitude += side / 2) {
-    for (double longitude = 10.35; longitude < 10.36; longitude += side / 2) {
-      EXPECT_TRUE(edited->IsAvailable({level, static_cast<std::int64_t>((longitude + 180) / side),
-                                       static_cast<std::int64_t>((latitude + 90) / side)}));
-    }
-  }
-  const geo::TileKey here{finest, static_cast<std::int64_t>((10.355 + 180) / 180 * double(geo::TileRows(finest))),
-                          static_cast<std::int64_t>((50.351 + 90) / 180 * double(geo::TileRows(finest)))};
-  const geo::TileKey there{finest, here.x - 3, here.y};
-  EXPECT_NE(edited->DeeperTilesOf(here), 0u);
-  EXPECT_EQ(edited->DeeperTilesOf(there), 0u);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(here).size()), edited->max_level() + 1);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(there).size()), finest + 1);
-  EXPECT_EQ(plain->ContentBelow(there, finest), edited->ContentBelow(there, finest));
-}
-
-TEST_F(TerrainEdits, GoNoDeeperThanSixLevels) {
-  const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.001})", 10.35, 50.35, 10.3502, 50.3502));
-  ASSERT_NE(edited, nullptr);
-  EXPECT_EQ(edited->max_level(), edited->finest_level() + 6);
-}
-
 // The geoid lies 47 m above the ellipsoid here, by EGM96; PROJ is asked apart from the code under test.
 TEST_F(TerrainEdits, CountFromTheGeoidOfTheSources) {
   const auto geoid = Geoid::OfCrs("EPSG:5773", {10, 50});
@@ -404,6 +295,33 @@ TEST_F(TerrainEdits, CountFromTheGeoidOfTheSources) {
     EXPECT_NEAR(static_cast<double>(above->front()), 500, 0.01);
   }
   EXPECT_GE(stated->info().heights.max, 500 + 40);
+}
+
+// Contours over an edit where the source has a void at its rim count from the same geoid as those beside it.
+TEST_F(TerrainEdits, CountFromTheGeoidOnMapsOverVoidsToo) {
+  RasterSpec spec{.width = 400, .height = 400, .geo_transform = {10, 0.001, 0, 50.4, 0, -0.001}, .nodata = -9999};
+  spec.value = [](int column, int) { return column < 200 ? -9999.0 : 100.0 + column; };
+  DemOptions options;
+  options.source.vertical = "egm96";
+  options.edits = {
+      WriteEdits(dir_, Rectangle(R"({"op":"flatten","height":500,"vertical":"orthometric"})", 10.1, 50.1, 10.3, 50.3))};
+  const auto source = OpenOrFail(WriteRaster(dir_, spec, "rim.tif"), options);
+  ASSERT_NE(source, nullptr);
+  const geo::MercatorGrid grid{10};
+  const NodeWindow window{static_cast<std::int64_t>((10.0 + 180) / 360 * static_cast<double>(grid.columns())), 88'400,
+                          300, 600};
+  const auto known = source->ReadKnownMercator(10, window, HeightDatum::kSource);
+  ASSERT_TRUE(known);
+  int west = 0, east = 0;
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    const auto column = static_cast<std::int64_t>(i % 300), row = static_cast<std::int64_t>(i / 300);
+    const double x = grid.Longitude(window.column + column), y = grid.Latitude(window.row + row);
+    if (x < 10.102 || x > 10.298 || y < 50.102 || y > 50.298) continue;
+    ++(x < 10.19 ? west : east);
+    ASSERT_NEAR((*known)[i], 500, 0.02) << x << " " << y;
+  }
+  EXPECT_GT(west, 1000);
+  EXPECT_GT(east, 1000);
 }
 
 TEST_F(TerrainEdits, RefuseDatumsThatTheyDoNotKnow) {

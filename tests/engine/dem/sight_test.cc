@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "engine/dem/sight/grid_sight.h"
 #include "engine/geo/ellipsoid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -244,6 +245,40 @@ TEST(Sight, CrossesTheAntimeridianOfARasterAroundTheEarth) {
   EXPECT_FALSE((*answers)[0].is_visible);
   // 222 km sag by 3.9 km.
   EXPECT_NEAR((*answers)[1].clearance_m, 9000 - 2000 - 3863, 60);
+}
+
+// A rising strip of 400 blocks: the farther to the south, the less a level ray is above it, so none of them is skipped.
+TEST(Sight, KeepsFewBlocksInMemory) {
+  const TempDir dir;
+  constexpr int kRows = 256 * 400;
+  RasterSpec spec{.width = 2, .height = kRows, .geo_transform = {10, 1e-6, 0, 46, 0, -1e-6}};
+  spec.value = [](int, int row) { return row * 0.01; };
+  auto raster = RasterSource::Open(WriteRaster(dir, spec));
+  ASSERT_TRUE(raster) << raster.error().message;
+  std::vector<GridPlan> plans = PlanGrids({*std::move(raster)});
+  const auto grid = RasterGrid::Make(std::move(plans.front()), {});
+  ASSERT_TRUE(grid);
+  const auto look = [&](GridSights& sights, std::size_t number, double first_row, double last_row) {
+    const auto at = [](double row) { return SightPoint{10 + 1e-6, 46 - (row + 0.5) * 1e-6, 2000}; };
+    const std::vector<RayPart> whole = {{0, 1}};
+    SightSearch search;
+    const std::vector<TrackPiece> pieces = PiecesOf({at(first_row), at(last_row)}, {});
+    const auto open = sights.Of(number, *grid).Search(pieces, whole, SightSurface::kAll, search, {});
+    EXPECT_TRUE(open);
+    EXPECT_NEAR(search.Answer(false).clearance_m, 2000 - last_row * 0.01, 0.1);
+  };
+  std::size_t most = 0;
+  GridSights of_one_ray;
+  look(of_one_ray, 0, 1, kRows - 10);
+  EXPECT_LE(of_one_ray.blocks(), kMaxSightBlocks + 1);
+  GridSights of_many_rays, of_many_grids;
+  for (int block = 0; block < 400; ++block) {
+    look(of_many_rays, 0, 256 * block + 1, 256 * block + 250);
+    look(of_many_grids, static_cast<std::size_t>(block), 256 * block + 1, 256 * block + 250);
+    most = std::max({most, of_many_rays.blocks(), of_many_grids.blocks()});
+  }
+  EXPECT_LE(most, kMaxSightBlocks + 1);
+  EXPECT_GT(most, 100u);
 }
 
 }  // namespace

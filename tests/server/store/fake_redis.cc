@@ -80,11 +80,13 @@ void FakeRedis::Accept() {
 // The commands of these tests are small and sent at once, so a piece that is read has whole commands.
 void FakeRedis::Serve(int fd) {
   std::array<char, 4096> buffer{};
+  bool has_written = false;
   for (ssize_t size = 0; (size = ::recv(fd, buffer.data(), buffer.size(), 0)) > 0;) {
     const std::string_view text(buffer.data(), static_cast<std::size_t>(size));
     const std::uint64_t pings = Count(text, "\r\nPING\r\n"), others = Count(text, "\r\nGETRANGE\r\n");
-    const std::uint64_t erased = Count(text, "\r\nUNLINK\r\n");
-    const bool is_silent = is_silent_;
+    const std::uint64_t erased = Count(text, "\r\nUNLINK\r\n"), written = Count(text, "\r\nSET\r\n");
+    const bool is_silent = is_silent_ || (drops_ && has_written);
+    has_written |= written > 0;
     std::string replies;
     for (std::uint64_t i = 0; i < pings; ++i) replies += "+PONG\r\n";
     for (std::uint64_t i = 0; i < others; ++i) {
@@ -92,6 +94,7 @@ void FakeRedis::Serve(int fd) {
       replies += reply_;
     }
     for (std::uint64_t i = 0; i < erased; ++i) replies += ":1\r\n";
+    for (std::uint64_t i = 0; i < written; ++i) replies += "+OK\r\n";
     if (!is_silent) ::send(fd, replies.data(), replies.size(), MSG_NOSIGNAL);
     pings_ += pings;
     look_ups_ += others;

@@ -1,4 +1,4 @@
-// A server that answers PING, UNLINK and GETRANGE as Redis does, or not at all, and counts them.
+// A server that answers PING, SET, UNLINK and GETRANGE as Redis does, or not at all, and counts them.
 #pragma once
 
 #include <atomic>
@@ -26,6 +26,8 @@ class FakeRedis {
   // Reads and replies nothing, as after a partition; and replies again.
   void FallSilent() { is_silent_ = true; }
   void Speak() { is_silent_ = false; }
+  // Reads and replies nothing on the connections that have written, as when a fire wall has dropped them.
+  void DropWriters() { drops_ = true; }
   // Ends one of the connections that are open, or all.
   void CloseOne();
   void CloseAll();
@@ -40,6 +42,7 @@ class FakeRedis {
   redis::Address address_;
   int listener_ = -1;
   std::atomic<bool> is_silent_{false};
+  std::atomic<bool> drops_{false};
   std::atomic<std::uint64_t> pings_{0}, look_ups_{0};
   std::mutex mutex_;  // of what follows
   std::string reply_;

@@ -139,6 +139,23 @@ TEST(SharedTier, ConnectionsThatRedisHasClosedAreReplacedWithoutAFailure) {
   EXPECT_EQ(tier.stats().errors, 0U);
 }
 
+TEST(SharedTier, DoesNotWriteOnAConnectionThatWasIdle) {
+  FakeRedis redis;
+  SharedTierOptions options = OptionsOf(redis, 1);
+  options.test_after = milliseconds(20);
+  SharedTier tier(options);
+  Await([&] { return tier.stats().on; });
+  const auto value = [] { return std::string("value"); };
+  tier.Keep("key", value, 5);
+  Await([&] { return tier.stats().written == 1; });
+  redis.DropWriters();
+  std::this_thread::sleep_for(2 * options.test_after);
+  tier.Keep("key", value, 5);
+  Await([&] { return tier.stats().written == 2 || !tier.stats().on; });
+  EXPECT_EQ(tier.stats().written, 2U);
+  EXPECT_EQ(tier.stats().switched_off, 0U);
+}
+
 TEST(SharedTier, ComesBackWhenRedisAnswers) {
   FakeRedis redis;
   redis.SetValue(tiler::AddChecksum("key", "value"));

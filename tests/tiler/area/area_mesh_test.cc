@@ -370,6 +370,26 @@ TEST_F(EditedAreaMesh, KeepsThePrecisionAtEverySample) {
   }
 }
 
+TEST_F(EditedAreaMesh, GoesNoDeeperThanItsSamplesAllow) {
+  area_.error_m = 0.1;
+  area_.west = -84.23, area_.east = -84.22, area_.south = 36.266, area_.north = 36.272;
+  const auto plain = PlanArea(*source_, 0.5, area_, kMany);
+  ASSERT_TRUE(plain);
+  Edit(R"({"op":"precision","error_m":0.1})", kPolygon);
+  const auto deep = PlanArea(*source_, 0.5, area_, kMany);
+  ASSERT_TRUE(deep);
+  ASSERT_GT(deep->level, plain->level);
+  const auto samples = [](const AreaPlan& plan) {
+    return static_cast<std::size_t>(plan.window.columns) * static_cast<std::size_t>(plan.window.rows);
+  };
+  const auto shallower = PlanArea(*source_, 0.5, area_, samples(*deep) - 1);
+  ASSERT_TRUE(shallower) << shallower.error().message;
+  EXPECT_EQ(shallower->level, deep->level - 1);
+  const auto as_before = PlanArea(*source_, 0.5, area_, samples(*plain));
+  ASSERT_TRUE(as_before) << as_before.error().message;
+  EXPECT_EQ(as_before->level, plain->level);
+}
+
 TEST_F(EditedAreaMesh, HasHolesAndBreaklines) {
   area_.error_m = 40;
   Edit(R"({"op":"hole"})", kPolygon);

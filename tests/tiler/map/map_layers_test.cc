@@ -229,6 +229,28 @@ TEST(Contours, VerticesLieBetweenTheirSamples) {
   EXPECT_GT(vertices, 1000u);
 }
 
+// Vector Tile Specification 2.1, 4.3.4.2 and 4.3.4.3: a line has at least two points, and no piece without length.
+TEST(Contours, HaveLength) {
+  const MapWindow window({12, 1234, 1500}, 256, kContourMargin);
+  // Peaks that reach a line by a little: rings within a unit or two.
+  const MapHeights heights = HeightsOf(window, [](std::int64_t column, std::int64_t row) {
+    const bool is_peak = column % 7 == 0 && row % 7 == 0;
+    return is_peak ? 100 + static_cast<double>((column * 31 + row * 17) % 40) / 10 : 80;
+  });
+  const auto features = ContoursOf(heights, 10000, {});
+  ASSERT_TRUE(features);
+  std::size_t lines = 0;
+  for (const proto::ContourFeature& feature : *features) {
+    for (const auto& line : feature.lines) {
+      ++lines;
+      ASSERT_GE(line.size(), 2u);
+      for (std::size_t i = 1; i < line.size(); ++i)
+        ASSERT_FALSE(line[i] == line[i - 1]) << line[i].x << ' ' << line[i].y;
+    }
+  }
+  EXPECT_GT(lines, 100u) << "larger rings are kept";
+}
+
 // The lines with all points, from GDAL, against the simplified ones.
 TEST(Contours, PointsThatAreLeftOutLieNearTheLine) {
   const MapWindow window({12, 1234, 1500}, 256, kContourMargin);

@@ -5,12 +5,16 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
+#include "tiler/store/baked_tiles.h"
 #include "tiler/surface/drawn_mesh.h"
 #include "tiler/tile_pipeline.h"
 
@@ -97,6 +101,47 @@ TEST(DrawnHoles, BlockNoRay) {
     ASSERT_TRUE((*cut)[1].blocked_at.has_value());
     EXPECT_NEAR(*(*cut)[1].blocked_at, 0.012 / 0.018, 0.06);  // the outline follows the lattice
   }
+}
+
+// All levels to 20, with tiles that cannot be read.
+class UnreadableArchive final : public BakedTiles {
+ public:
+  UnreadableArchive() {
+    extent_.formats = {TileFormat::kQuantizedMesh};
+    for (int level = 0; level <= 20; ++level) {
+      extent_.available.push_back({{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1}});
+    }
+  }
+  Coding coding() const override { return Coding::kGzip; }
+  const BakedExtent& extent() const override { return extent_; }
+  Result<std::optional<EncodedTile>> Find(const TileRequest&) const override {
+    return MakeError(ErrorCode::kUnavailable, "unreadable");
+  }
+  dem::HeightRange RangeBound(const geo::TileKey&) const override { return {}; }
+  Error WhyAbsent(const TileRequest&) const override { return {}; }
+
+ private:
+  BakedExtent extent_;
+};
+
+TEST(DrawnSight, OverArchivesAloneIsBoundedToo) {
+  std::vector<Dataset> datasets(1);
+  datasets.front().name = "archive";
+  datasets.front().baked = std::make_shared<const UnreadableArchive>();
+  const TilePipeline pipeline(std::move(datasets));
+  const auto refusal_of = [&](int level, std::size_t count) {
+    DrawnSurface surface;
+    surface.level = level;
+    const std::vector<dem::SightRay> rays(count, {{0, 0, 9000}, {26, 0, 9000}});  // 2,894 km
+    const auto answers = pipeline.LookAlong(0, surface, rays, {}, {});
+    EXPECT_FALSE(answers);
+    return answers ? "" : answers.error().message;
+  };
+  // Tiles of level 20 have a side of 19 m, so 2 * 10^8 samples are 14,900 km of them.
+  EXPECT_NE(refusal_of(20, 6).find("the rays together cross"), std::string::npos) << refusal_of(20, 6);
+  EXPECT_NE(refusal_of(20, 5).find("unreadable"), std::string::npos) << refusal_of(20, 5);
+  EXPECT_NE(refusal_of(10, 6).find("unreadable"), std::string::npos) << refusal_of(10, 6);
+  EXPECT_NE(refusal_of(5, 40'000).find("the rays together cross"), std::string::npos) << "one every 500 m";
 }
 
 // Triangles of a whole hemisphere, each of which lies in every bucket.
