@@ -231,7 +231,7 @@ class ArchiveTest(unittest.TestCase):
         done = subprocess.run([BINARY, "bake", "--config", config, "--out", place, "--format", "terrain", "--extensions", "metadata"],
                               capture_output=True, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
-        manifest = json.loads((place / "terrain" / "manifest.json").read_text())
+        manifest = json.loads((place / "manifest.json").read_text())
         finest = manifest["dataset"]["finest_level"]
         self.assertGreater(len(manifest["available"]), finest + 2)
         headers = {"Accept": "application/vnd.quantized-mesh;extensions=metadata"}
