@@ -27,10 +27,11 @@ proto::QuantizedMeshOptions ExtensionsOf(const TileRequest& request) {
 }
 
 // The extensions that the archive's tile has.
-proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, int level) {
+proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, const geo::TileKey& key) {
   const BakedDataset& dataset = manifest.dataset;
   return {manifest.kind.normals, manifest.kind.water_mask,
-          manifest.kind.metadata && proto::CarriesMetadata(level, dataset.metadata_levels, dataset.max_level)};
+          manifest.kind.metadata &&
+              proto::CarriesMetadata(key, dataset.metadata_levels, dataset.finest_level, manifest.available)};
 }
 
 // Whether the archive's tiles, but for their coding and for extensions that can be removed, are what the request asks
@@ -46,7 +47,7 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   if (request.format == TileFormat::kGlb) {
     return request.compression == kind.compression && request.texture == kind.texture;
   }
-  const proto::QuantizedMeshOptions extensions = ExtensionsIn(manifest, level);
+  const proto::QuantizedMeshOptions extensions = ExtensionsIn(manifest, request.key);
   return request.normals <= extensions.normals && request.water_mask <= extensions.water_mask &&
          request.metadata <= extensions.metadata;
 }
@@ -55,8 +56,8 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
 // coding. Nothing: they are not what the manifest says.
 std::optional<std::string> AsRequested(std::string bytes, const Manifest& manifest, const TileRequest& request) {
   constexpr std::size_t kMaxTileBytes = std::size_t{1} << 30;
-  const bool is_smaller = request.format == TileFormat::kQuantizedMesh &&
-                          ExtensionsOf(request) != ExtensionsIn(manifest, request.key.level);
+  const bool is_smaller =
+      request.format == TileFormat::kQuantizedMesh && ExtensionsOf(request) != ExtensionsIn(manifest, request.key);
   if (!is_smaller && request.coding == manifest.kind.coding) return bytes;
   if (manifest.kind.coding == tiler::Coding::kGzip) {
     std::optional<std::string> plain = proto::Gunzip(bytes, kMaxTileBytes);

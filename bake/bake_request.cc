@@ -206,7 +206,8 @@ tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileK
   tiler::TileRequest request = manifest.kind;
   request.key = key;
   if (!manifest.error_steps.empty()) request.error_step = manifest.error_steps[static_cast<std::size_t>(key.level)];
-  request.metadata &= proto::CarriesMetadata(key.level, manifest.dataset.metadata_levels, manifest.dataset.max_level);
+  request.metadata = request.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_levels,
+                                                                manifest.dataset.finest_level, manifest.available);
   return request;
 }
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/dem/common/content_hash.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
@@ -63,6 +64,15 @@ HasTile TilesOf(const Dataset& dataset) {
   };
 }
 
+// Of two hashes; 0 if both are.
+std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
+  if (edits == 0 || deeper == 0) return edits | deeper;
+  dem::ContentHasher hasher;
+  hasher.Add(edits);
+  hasher.Add(deeper);
+  return hasher.Hash().low | 1;
+}
+
 }  // namespace
 
 std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
@@ -70,8 +80,8 @@ std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
-      if (const std::uint64_t edits = source.EditsOf(request.key); edits != 0 || !request.metadata) return edits;
-      return source.DeeperTilesOf(request.key);
+      return request.metadata ? Mixed(source.EditsOf(request.key), source.DeeperTilesOf(request.key))
+                              : source.EditsOf(request.key);
     case TileFormat::kImagery:
     case TileFormat::kGeodeticImagery:
       return 0;

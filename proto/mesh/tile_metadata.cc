@@ -24,8 +24,15 @@ Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, i
 
 }  // namespace
 
-bool CarriesMetadata(int level, int metadata_levels, int max_level) {
-  return metadata_levels > 0 && level % metadata_levels == 0 && level < max_level;
+bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int finest_level,
+                     std::span<const std::vector<geo::TileRange>> available) {
+  if (metadata_levels <= 0 || key.level % metadata_levels != 0) return false;
+  if (key.level < finest_level) return true;
+  const int below = key.level + 1;
+  return below < static_cast<int>(available.size()) &&
+         std::ranges::any_of(available[static_cast<std::size_t>(below)], [&](const geo::TileRange& range) {
+           return !geo::IsEmpty(geo::Common(range, geo::TilesBelow(key, below)));
+         });
 }
 
 std::string EncodeTileMetadata(const geo::TileKey& key, std::span<const std::vector<geo::TileRange>> available,

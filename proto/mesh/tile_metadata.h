@@ -10,9 +10,11 @@
 
 namespace terrace::proto {
 
-// Whether a tile has metadata: on levels 0, N, 2N and so on for N = `metadata_levels`, except the deepest level
-// (layer.json's metadataAvailability). 0: no tile has.
-bool CarriesMetadata(int level, int metadata_levels, int max_level);
+// Whether a tile has metadata: on levels 0, N, 2N and so on for N = `metadata_levels` (layer.json's
+// metadataAvailability), above `finest_level`, the deepest level of the sources; from that level on, where edits added
+// tiles, if it has children. 0: no tile has. `available`: as below.
+bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int finest_level,
+                     std::span<const std::vector<geo::TileRange>> available);
 
 // {"available":[[ranges of the next level], [of the one after it], ...]}: the part of `available` below the tile, for
 // `metadata_levels` levels. `available` is by level, from 0. Columns and rows are global, from the south.

@@ -46,7 +46,8 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   tile.normals = wanted.octvertexnormals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
   tile.water_mask = wanted.watermask && dataset.has_water;
   tile.metadata =
-      wanted.metadata && proto::CarriesMetadata(tile.key.level, dataset.metadata_levels, dataset.deepest_level());
+      wanted.metadata &&
+      proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.finest_level(), dataset.available);
   return {};
 }
 

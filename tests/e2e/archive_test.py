@@ -219,6 +219,36 @@ class ArchiveTest(unittest.TestCase):
             self.expect_same("/cell/layer.json", {}, live, server)
             self.assertEqual((folder / "layer.json").read_bytes(), gzip.decompress(live.get("/cell/layer.json")[2]))
 
+    def test_levels_that_edits_add_have_metadata_where_tiles_lie_below(self):
+        box = [[7.2, 46.2], [7.201, 46.2], [7.201, 46.201], [7.2, 46.201], [7.2, 46.2]]
+        (self.scratch / "precise.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
+            {"type": "Feature", "properties": {"terrain": {"op": "precision", "error_m": 20}},
+             "geometry": {"type": "Polygon", "coordinates": [box]}}]}))
+        options = {"name": "cell", "sources": [str(self.scratch / NAME)], "edits": [str(self.scratch / "precise.geojson")],
+                   "metadata_availability": 1, "finest_error": 160}
+        config, place = self.scratch / "precise.json", self.scratch / "precise"
+        config.write_text(json.dumps({"datasets": [options]}))
+        done = subprocess.run([BINARY, "bake", "--config", config, "--out", place, "--format", "terrain", "--extensions", "metadata"],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        manifest = json.loads((place / "manifest.json").read_text())
+        finest = manifest["dataset"]["finest_level"]
+        self.assertGreater(len(manifest["available"]), finest + 2)
+        headers = {"Accept": "application/vnd.quantized-mesh;extensions=metadata"}
+        counts = {True: 0, False: 0}
+        with Server({"datasets": [options]}, self.scratch) as live, self.serve_alone(place) as alone:
+            for level in range(finest - 1, len(manifest["available"])):
+                for west, south, east, north in manifest["available"][level]:
+                    for x in range(west, east + 1):
+                        for y in range(south, north + 1):
+                            target = f"/cell/{level}/{x}/{y}.terrain?v={manifest['dataset']['version']}"
+                            self.expect_same(target, headers, live, alone)
+                            status, fields, body = alone.get(target, headers)
+                            stated, has = "metadata" in fields["Content-Type"], b'{"available":' in gzip.decompress(body)
+                            self.assertEqual((status, stated), (200, has), target)
+                            counts[has and level >= finest] += 1
+        self.assertGreater(min(counts.values()), 8)
+
     def test_missing_archive_is_named_before_the_start(self):
         done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--check-config"], text=True, timeout=60,
                               input=json.dumps({"datasets": [{"name": "cell", "baked": "/nowhere/baked"}]}), capture_output=True)

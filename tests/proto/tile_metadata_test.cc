@@ -14,12 +14,25 @@ const std::vector<std::vector<geo::TileRange>> kAvailable = {
     {{0, 0, 1, 0}}, {{1, 0, 2, 1}}, {{3, 1, 4, 2}}, {{6, 3, 8, 4}}};
 
 TEST(CarriesMetadata, EveryNthLevelButTheDeepest) {
+  const std::vector<std::vector<geo::TileRange>> available(10, {{0, 0, 0, 0}});
   std::vector<int> levels;
   for (int level = 0; level <= 9; ++level) {
-    if (CarriesMetadata(level, 3, 9)) levels.push_back(level);
-    EXPECT_FALSE(CarriesMetadata(level, 0, 9));
+    if (CarriesMetadata({level, 0, 0}, 3, 9, available)) levels.push_back(level);
+    EXPECT_FALSE(CarriesMetadata({level, 0, 0}, 0, 9, available));
   }
   EXPECT_EQ(levels, (std::vector<int>{0, 3, 6}));
+}
+
+// Levels 2 and 3 are those of edits.
+TEST(CarriesMetadata, FromTheFinestLevelOnWhereItHasChildren) {
+  EXPECT_TRUE(CarriesMetadata({0, 0, 0}, 1, 1, kAvailable));
+  EXPECT_TRUE(CarriesMetadata({1, 1, 0}, 1, 1, kAvailable));
+  EXPECT_TRUE(CarriesMetadata({1, 2, 1}, 1, 1, kAvailable));
+  EXPECT_FALSE(CarriesMetadata({1, 0, 0}, 1, 1, kAvailable));
+  EXPECT_TRUE(CarriesMetadata({1, 0, 0}, 1, 2, kAvailable));
+  EXPECT_TRUE(CarriesMetadata({2, 3, 1}, 1, 1, kAvailable));
+  EXPECT_FALSE(CarriesMetadata({2, 1, 1}, 1, 1, kAvailable));
+  EXPECT_FALSE(CarriesMetadata({3, 6, 3}, 1, 1, kAvailable));
 }
 
 TEST(TileMetadata, AreTheseBytes) {

@@ -42,16 +42,17 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
   proto::QuantizedMeshOptions options;
   options.normals = request.normals;
   options.water_mask = request.water_mask && dataset.water.any();
-  const auto available = dataset.source->AvailabilityBelow(request.key);
-  options.metadata = request.metadata && proto::CarriesMetadata(request.key.level, dataset.metadata_levels,
-                                                                static_cast<int>(available.size()) - 1);
+  options.metadata =
+      request.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels, dataset.source->finest_level(),
+                                                 dataset.source->Availability());
   if (options.water_mask) {
     Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());
     tile.water_mask = *std::move(mask);
   }
   if (options.metadata) {
-    tile.metadata = proto::EncodeTileMetadata(request.key, available, dataset.metadata_levels);
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.source->AvailabilityBelow(request.key),
+                                              dataset.metadata_levels);
   }
   return options;
 }
