@@ -94,14 +94,14 @@ void SharedTier::Drop(Loan loan) {
 
 // What fails in an earlier epoch was ended by the failure that began this one.
 void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
-  std::deque<Idle> gone;  // closed after the lock is released
+  if (IsTimeout(why)) ++timeouts_;  // of everybody who has waited for it
+  std::deque<Idle> gone;            // closed after the lock is released
   const std::lock_guard lock(mutex_);
   if (epoch != epoch_ || !on_) return;
   on_ = false;
   ++epoch_;
   ++switched_off_;
   ++errors_;
-  if (IsTimeout(why)) ++timeouts_;
   gone.swap(idle_);
   for (const redis::Connection* const connection : borrowed_) connection->Interrupt();
   borrowed_.clear();
