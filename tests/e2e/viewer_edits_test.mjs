@@ -64,7 +64,7 @@ describe('edits in the viewer', () => {
     ] }));
     server = await serve('--config', config);
     browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
-    page = await browser.newPage({ viewport: { width: 700, height: 420 }, acceptDownloads: true });
+    page = await browser.newPage({ viewport: { width: 700, height: 420 }, deviceScaleFactor: 0.5, acceptDownloads: true });
     page.wrongs = [];
     page.on('pageerror', (error) => page.wrongs.push(String(error)));
   });
@@ -106,8 +106,10 @@ describe('edits in the viewer', () => {
     await page.locator('#tool-draft').click();
     await page.waitForFunction(() => terrace.state.draft?.isOpen, undefined, kWait);
     assert.ok(await page.locator('#draft-save').isDisabled(), 'three corners make a polygon');
-    const places = [[400, 200], [590, 205], [470, 130]];  // below the horizon, beside the panels
+    const places = [[350, 165], [590, 180], [440, 125]];  // below the horizon, beside the panels
     for (const [i, [x, y]] of places.entries()) {
+      // A place is known where ground is drawn.
+      await page.waitForFunction(() => !terrace.globe.loading && terrace.globe.drawn().tiles > 1, undefined, kWait);
       await page.mouse.click(x, y);
       await page.waitForFunction((count) => terrace.state.draft.corners.length === count, i + 1, kWait);
       await page.waitForTimeout(400);  // two clicks at once are a double click

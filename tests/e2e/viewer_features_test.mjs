@@ -64,7 +64,7 @@ describe('features of the viewer', () => {
     write(dataset);
     server = await serve('--config', config);
     browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
-    page = await browser.newPage({ viewport: { width: 760, height: 480 } });
+    page = await browser.newPage({ viewport: { width: 760, height: 480 }, deviceScaleFactor: 0.5 });
     page.wrongs = [];
     page.on('pageerror', (error) => page.wrongs.push(String(error)));
     await page.goto(`${server.url}/#dataset=hills&fraction=1`);

@@ -11,13 +11,15 @@ import { samples, serve } from './harness.mjs';
 const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
 const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
                 '--disable-background-networking', '--no-first-run'];
+// A software renderer draws a quarter of the pixels.
+const kScale = 0.5;
 const kSettleMs = 90000;  // a software renderer on a busy machine draws two frames a second
 // Messages of Chromium about its graphics driver.
 const kDriverTalk = /GL Driver Message|GPU stall|SwiftShader/i;
 
 // Opens a page of the viewer and records all its errors.
 async function openPage(browser, url, size = { width: 800, height: 500 }) {
-  const page = await browser.newPage({ viewport: size });
+  const page = await browser.newPage({ viewport: size, deviceScaleFactor: kScale });
   const origin = new URL(url).origin;
   page.wrongs = [];
   page.requested = [];
