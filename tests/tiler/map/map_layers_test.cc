@@ -51,7 +51,8 @@ TEST(Relief, SlopesOfPlanesAreTrueSlopes) {
     const geo::MercatorGrid grid{window.depth};
     const double middle = grid.Latitude(key.y * 256 + 128), west = grid.Longitude(key.x * 256);
     const Metres metres(middle);
-    for (const auto& [east, north] : {std::pair(0.5773502691896258, 0.0), std::pair(0.0, -1.0), std::pair(0.3, 0.4)}) {
+    for (const auto& slope : {std::pair(0.5773502691896258, 0.0), std::pair(0.0, -1.0), std::pair(0.3, 0.4)}) {
+      const double east = slope.first, north = slope.second;
       const MapHeights heights = HeightsOf(window, [&](std::int64_t column, std::int64_t row) {
         return east * (grid.Longitude(column) - west) * metres.east +
                north * (grid.Latitude(row) - middle) * metres.north;
