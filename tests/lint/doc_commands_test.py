@@ -33,7 +33,8 @@ PREAMBLE = """
 set -eo pipefail
 terrace() {
   if [[ $1 != serve ]]; then command terrace "$@"; return; fi
-  command terrace "$@" --listen 127.0.0.1:0 > served.txt & local pid=$! code=0
+  rm -f served.txt; touch served.txt  # of the server before
+  command terrace "$@" --listen 127.0.0.1:0 >> served.txt & local pid=$! code=0
   until grep -q http:// served.txt; do kill -0 $pid || { wait $pid; return; }; sleep 0.05; done
   kill -TERM $pid; wait $pid || code=$?
   return $code

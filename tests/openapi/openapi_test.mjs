@@ -84,7 +84,7 @@ describe('/openapi.json', () => {
     // And with imagery: the heights as grey.
     const picture = path.join(scratch, 'picture.tif');
     await promisify(execFile)('gdal_translate', ['-q', '-ot', 'Byte', '-scale', '-b', '1', '-b', '1', '-b', '1', path.join(samples, 'jacksboro.tif'), picture]);
-    config.datasets.find((dataset) => dataset.name === 'jacksboro').imagery = picture;
+    config.datasets.find((dataset) => dataset.name === 'jacksboro').imagery = { image: picture };
     // And with an edit.
     const ring = [[-84.25, 36.3], [-84.24, 36.3], [-84.24, 36.31], [-84.25, 36.3]];
     fs.writeFileSync(path.join(scratch, 'edits.geojson'), JSON.stringify({ type: 'FeatureCollection', features: [
