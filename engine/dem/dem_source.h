@@ -121,10 +121,9 @@ class DemSource {
 
   // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
   // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
-  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours; below
-  // finest_level(), of available tiles.
-  // Conservative: a change of a source near the tiles may change the hash although no height changes. Precondition: top
-  // is a valid key, top.level <= deepest <= geo::kMaxLevel.
+  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours;
+  // below finest_level(), of available tiles. Conservative: a change of a source near the tiles may change the hash
+  // although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
   ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.

@@ -45,9 +45,8 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
   tile.normals = wanted.octvertexnormals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
   tile.water_mask = wanted.watermask && dataset.has_water;
-  tile.metadata =
-      wanted.metadata &&
-      proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.finest_level(), dataset.available);
+  tile.metadata = wanted.metadata &&
+                  proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.finest_level(), dataset.available);
   return {};
 }
 

@@ -51,8 +51,8 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
     tile.water_mask = *std::move(mask);
   }
   if (options.metadata) {
-    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.source->AvailabilityBelow(request.key),
-                                              dataset.metadata_levels);
+    tile.metadata =
+        proto::EncodeTileMetadata(request.key, dataset.source->AvailabilityBelow(request.key), dataset.metadata_levels);
   }
   return options;
 }

@@ -31,8 +31,8 @@ struct GridRequest {
   // Units of the CRS. Of geographic ones degrees; west > east: across the antimeridian.
   double west = 0, south = 0, east = 0, north = 0;
   // Either both numbers of nodes, or the spacing, which makes the box smaller to the east and to the south.
-  std::optional<std::int64_t> columns, rows;
-  std::optional<double> spacing;
+  std::optional<std::int64_t> columns = {}, rows = {};
+  std::optional<double> spacing = {};
 };
 
 // kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has no easting and northing; the box
