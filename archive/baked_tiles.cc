@@ -133,7 +133,6 @@ class Baked final : public tiler::BakedTiles {
     extent_.floor_m = dataset.floor_m;
     extent_.has_datum = dataset.has_datum;
     extent_.sources = static_cast<std::size_t>(dataset.sources);
-    extent_.deepest_level = dataset.max_level;
     extent_.finest_level = dataset.finest_level;
     if (manifest.kind.format == TileFormat::kHeightPng) {
       extent_.max_mercator_depth = manifest.max_level + (manifest.kind.height_size == 512 ? 1 : 0);

@@ -39,9 +39,7 @@ std::vector<geo::TileKey> SamplesOf(const std::vector<geo::TileRange>& ranges, i
     if (!parents.emplace(x, y).second) continue;
     for (const geo::TileKey& key : {geo::TileKey{level, 2 * x, 2 * y}, geo::TileKey{level, 2 * x + 1, 2 * y},
                                     geo::TileKey{level, 2 * x, 2 * y + 1}, geo::TileKey{level, 2 * x + 1, 2 * y + 1}}) {
-      if (std::ranges::any_of(ranges, [&](const geo::TileRange& range) { return range.Contains(key); })) {
-        samples.push_back(key);
-      }
+      if (geo::Contains(ranges, key)) samples.push_back(key);
     }
   }
   return samples;

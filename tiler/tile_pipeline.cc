@@ -8,6 +8,7 @@
 #include "engine/core/check.h"
 #include "engine/dem/common/content_hash.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
 #include "tiler/map/contour_tile.h"
@@ -57,11 +58,7 @@ const std::vector<std::vector<geo::TileRange>>& AvailableIn(const Dataset& datas
 int DeepestOf(const Dataset& dataset) { return static_cast<int>(AvailableIn(dataset).size()) - 1; }
 
 HasTile TilesOf(const Dataset& dataset) {
-  return [&available = AvailableIn(dataset)](const geo::TileKey& key) {
-    return geo::IsValid(key) && key.level < static_cast<int>(available.size()) &&
-           std::ranges::any_of(available[static_cast<std::size_t>(key.level)],
-                               [&](const geo::TileRange& range) { return range.Contains(key); });
-  };
+  return [&available = AvailableIn(dataset)](const geo::TileKey& key) { return geo::IsAvailable(available, key); };
 }
 
 // Of two hashes; 0 if both are.

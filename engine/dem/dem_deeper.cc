@@ -55,7 +55,7 @@ void DemSource::Impl::AddDeeperLevels(double error_fraction) {
 std::uint64_t DemSource::DeeperTilesOf(const geo::TileKey& key) const {
   if (!geo::IsValid(key) || key.level >= static_cast<int>(impl_->above_added.size())) return 0;
   const auto& touched = impl_->above_added[static_cast<std::size_t>(key.level)];
-  if (std::ranges::none_of(touched, [&](const geo::TileRange& range) { return range.Contains(key); })) return 0;
+  if (!geo::Contains(touched, key)) return 0;
   const Impl::HashKey memo_key = {key.level, key.x, key.y, -1, -1};
   if (const auto known = impl_->KnownHash(memo_key)) return *known;
   ContentHasher hasher;

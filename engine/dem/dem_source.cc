@@ -22,6 +22,7 @@
 #include "engine/dem/sources/raster_source.h"
 #include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/octave.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::dem {
 namespace {
@@ -294,10 +295,7 @@ const std::vector<geo::TileRange>& DemSource::Available(int level) const {
 
 const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
 
-bool DemSource::IsAvailable(const geo::TileKey& key) const {
-  return geo::IsValid(key) &&
-         std::ranges::any_of(Available(key.level), [&](const geo::TileRange& range) { return range.Contains(key); });
-}
+bool DemSource::IsAvailable(const geo::TileKey& key) const { return geo::IsAvailable(impl_->available, key); }
 
 Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));

@@ -75,4 +75,13 @@ TileRange Common(const TileRange& a, const TileRange& b) {
           std::min(a.end_y, b.end_y)};
 }
 
+bool Contains(const std::vector<TileRange>& ranges, const TileKey& key) {
+  return std::ranges::any_of(ranges, [&](const TileRange& range) { return range.Contains(key); });
+}
+
+bool IsAvailable(const std::vector<std::vector<TileRange>>& available, const TileKey& key) {
+  return IsValid(key) && key.level < static_cast<int>(available.size()) &&
+         Contains(available[static_cast<std::size_t>(key.level)], key);
+}
+
 }  // namespace terrace::geo

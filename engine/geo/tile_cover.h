@@ -11,6 +11,11 @@ namespace terrace::geo {
 // rectangles that are adjacent in a row, and rectangles above each other with the same columns.
 std::vector<TileRange> Disjoint(std::vector<TileRange> ranges);
 
+// Whether a tile lies in one of the ranges of its level.
+bool Contains(const std::vector<TileRange>& ranges, const TileKey& key);
+// Whether a tile is valid and available. `available`: the ranges of each level, from 0.
+bool IsAvailable(const std::vector<std::vector<TileRange>>& available, const TileKey& key);
+
 // Returns the tiles of `level` in `key`. Precondition: `level` is not above the key's.
 constexpr TileRange TilesBelow(const TileKey& key, int level) {
   const int down = level - key.level;

@@ -22,12 +22,10 @@ bool IsImagery(tiler::TileFormat format) {
 using SetParameter = Result<void> (*)(std::string_view text, MapTileParameters& parameters);
 
 Result<void> SetSize(std::string_view text, MapTileParameters& parameters) {
-  for (const int size : tiler::kHeightSizes) {
-    if (text != fmt::format("{}", size)) continue;
-    parameters.size = size;
-    return {};
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+  const Result<int> size = ParseTileSize(text);
+  if (!size) return tl::unexpected(size.error());
+  parameters.size = *size;
+  return {};
 }
 
 Result<void> SetAzimuth(std::string_view text, MapTileParameters& parameters) {
@@ -116,14 +114,14 @@ Error UnknownParameter(tiler::TileFormat format, bool in_tile_json) {
   return {ErrorCode::kInvalidArgument, "unknown parameter; known are " + known};
 }
 
-// Whether two boxes meet; west > east: across the antimeridian. `tile` does not cross it.
-bool Meets(const dem::GeoBounds& box, const dem::GeoBounds& tile) {
-  if (tile.north < box.south || tile.south > box.north) return false;
-  if (box.west > box.east) return tile.west <= box.east || tile.east >= box.west;
-  return tile.west <= box.east && tile.east >= box.west;
-}
-
 }  // namespace
+
+Result<int> ParseTileSize(std::string_view text) {
+  for (const int size : tiler::kHeightSizes) {
+    if (text == fmt::format("{}", size)) return size;
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+}
 
 Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format, bool in_tile_json) {
   const Result<QueryParameters> sent = ParseQuery(query);
@@ -172,6 +170,13 @@ int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size) 
   }
 }
 
+int MinMapLevel(const MapTileParameters& parameters) {
+  if (parameters.map.interval_cm == 0) return 0;
+  int level = 0;
+  while (tiler::MinIntervalCm(level) > parameters.map.interval_cm) ++level;
+  return level;
+}
+
 dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
   if (IsImagery(format)) return dataset.imagery->bounds;
   return {dataset.west, dataset.south, dataset.east, dataset.north};
@@ -188,7 +193,7 @@ Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, til
   if (!parameters) return tl::unexpected(parameters.error());
   const bool is_there =
       tile.key.level <= MaxMapLevel(dataset, tile.format, parameters->size) &&
-      Meets(MapBounds(dataset, tile.format), tiler::TileBounds(tile.key, tiler::IsMercator(tile.format)));
+      Intersects(MapBounds(dataset, tile.format), tiler::TileBounds(tile.key, tiler::IsMercator(tile.format)));
   if (!is_there) {
     return MakeError(ErrorCode::kNotFound,
                      "the dataset has no such tile; the tiles.json of this layer tells the bounds and levels of what "

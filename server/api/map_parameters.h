@@ -19,6 +19,9 @@ struct MapTileParameters {
   std::optional<proto::PictureFormat> picture;  // TileJSON's `format`
 };
 
+// The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kHeightSizes.
+Result<int> ParseTileSize(std::string_view text);
+
 // Parses the parameters of a format: `azimuth`, `altitude`, `zfactor` and `size` of hillshades; `style` and `size` of
 // slopes; `interval` of contours; `size` of imagery. `in_tile_json`: also `format` of pictures. `v` may be repeated.
 // kInvalidArgument, with a message for the client: an unknown or repeated parameter, or a value out of range.
@@ -31,6 +34,8 @@ std::string MapTileQuery(const MapTileParameters& parameters);
 // The level of the finest tiles of a format, 0 if the size would put it above. Precondition for imagery: the dataset
 // has an image.
 int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size);
+// The level of the coarsest tiles that these parameters are valid for: coarse contours need a large interval.
+int MinMapLevel(const MapTileParameters& parameters);
 // Where tiles of a format are. Precondition: as above.
 dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
 

@@ -242,9 +242,9 @@ Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
       if (!encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding must be mapbox or terrarium");
     } else if (name == "size") {
       if (size) return MakeError(ErrorCode::kInvalidArgument, "size is given more than once");
-      if (value == "256") size = 256;
-      if (value == "512") size = 512;
-      if (!size) return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+      const Result<int> known = ParseTileSize(value);
+      if (!known) return tl::unexpected(known.error());
+      size = *known;
     } else {
       return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are encoding, size");
     }

@@ -173,8 +173,8 @@ DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& co
 using IsSeen = std::function<bool(const DatasetView&)>;
 
 // {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
-//   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","mesh",
-//   "hillshade","slope","contours","imagery","imagery_geodetic"},"imagery":{"attribution","bounds","max_level",
+//   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","grid","sight",
+//   "mesh","edits","hillshade","slope","contours","imagery","imagery_geodetic"},"imagery":{"attribution","bounds","max_level",
 //   "geodetic_max_level"}}],"more_with_token":true}
 // Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server. `more_with_token` is
 // present for every client that may not see all datasets, whether or not there are more, so that it reveals nothing.

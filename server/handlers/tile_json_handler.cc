@@ -95,15 +95,11 @@ Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
   tiles.tile_template = fmt::format("{}/{}/{}/{{z}}/{{x}}/{{y}}{}?{}", OriginOf(*context.request),
                                     PercentEncode(dataset.name), row->folder, row->suffix, WithToken(query, context));
   tiles.max_zoom = MaxMapLevel(dataset, row->format, parameters->size);
-  if (is_lines && parameters->map.interval_cm != 0) {
-    while (tiles.min_zoom < tiles.max_zoom && tiler::MinIntervalCm(tiles.min_zoom) > parameters->map.interval_cm) {
-      ++tiles.min_zoom;
-    }
-    if (const std::uint32_t min = tiler::MinIntervalCm(tiles.min_zoom); min > parameters->map.interval_cm) {
-      return refuse(
-          Error{ErrorCode::kInvalidArgument,
-                fmt::format("interval must be at least {} m at the finest level, {}", min / 100.0, tiles.max_zoom)});
-    }
+  tiles.min_zoom = MinMapLevel(*parameters);
+  if (tiles.min_zoom > tiles.max_zoom) {
+    return refuse(
+        {ErrorCode::kInvalidArgument, fmt::format("interval must be at least {} m at the finest level, {}",
+                                                  tiler::MinIntervalCm(tiles.max_zoom) / 100.0, tiles.max_zoom)});
   }
   tiles.tile_size = parameters->size;
   SetBounds(MapBounds(dataset, row->format), tiles);

@@ -62,130 +62,67 @@ constexpr ExampleRequest kGeodeticImageryWebpExamples[] = {{"/jacksboro/imagery/
 constexpr ExampleRequest kGeodeticImageryJpegExamples[] = {{"/jacksboro/imagery/geodetic/9/272/359.jpg"},
                                                            {"/jacksboro/imagery/geodetic/9/272/359.jpg?size=512"}};
 
+constexpr std::string_view kMercatorTile = "EPSG:3857 in the XYZ scheme of web maps, y from the north.";
+constexpr std::string_view kMercatorImage =
+    "EPSG:3857 in the XYZ scheme of web maps, y from the north. 404 where the dataset has no imagery.";
+constexpr std::string_view kGeodeticImage =
+    "The terrain tile of this number: EPSG:4326, y from the south. 404 where the dataset has no imagery.";
+constexpr std::string_view kTileJson = "Its URLs are absolute, made from the request's `Host`.";
+constexpr std::string_view kImageTileJson =
+    "Its URLs are absolute, made from the request's `Host`. 404 where the dataset has no imagery.";
+
+constexpr Operation MapTile(std::string_view id, std::string_view summary, std::string_view description,
+                            std::span<const ParameterNote> parameters, std::span<const MediaNote> replies,
+                            std::span<const ExampleRequest> examples) {
+  return {.id = id,
+          .tag = "maps",
+          .summary = summary,
+          .description = description,
+          .parameters = parameters,
+          .replies = replies,
+          .headers = kMapHeaders,
+          .examples = examples};
+}
+
+constexpr Operation MapTileJson(std::string_view id, std::string_view summary, std::string_view description,
+                                std::span<const ParameterNote> parameters, std::span<const ExampleRequest> examples) {
+  Operation operation = MapTile(id, summary, description, parameters, kMapTileJsonReplies, examples);
+  operation.headers = kDocumentHeaders;
+  return operation;
+}
+
 }  // namespace
 
-const Operation kHillshadePngOperation{.id = "getHillshadePng",
-                                       .tag = "maps",
-                                       .summary = "Shades of the relief as PNG",
-                                       .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north.",
-                                       .parameters = kHillshadeParameters,
-                                       .replies = kPngReplies,
-                                       .headers = kMapHeaders,
-                                       .examples = kHillshadePngExamples};
+const Operation kHillshadePngOperation = MapTile("getHillshadePng", "Shades of the relief as PNG", kMercatorTile,
+                                                 kHillshadeParameters, kPngReplies, kHillshadePngExamples);
+const Operation kHillshadeWebpOperation = MapTile("getHillshadeWebp", "Shades of the relief as WebP", kMercatorTile,
+                                                  kHillshadeParameters, kWebpReplies, kHillshadeWebpExamples);
+const Operation kHillshadeTileJsonOperation = MapTileJson("getHillshadeTileJson", "TileJSON 3.0 of the layer hillshade",
+                                                          kTileJson, kHillshadeJsonParameters, kHillshadeJsonExamples);
 
-const Operation kHillshadeWebpOperation{.id = "getHillshadeWebp",
-                                        .tag = "maps",
-                                        .summary = "Shades of the relief as WebP",
-                                        .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north.",
-                                        .parameters = kHillshadeParameters,
-                                        .replies = kWebpReplies,
-                                        .headers = kMapHeaders,
-                                        .examples = kHillshadeWebpExamples};
+const Operation kSlopePngOperation =
+    MapTile("getSlopePng", "Slopes as PNG", kMercatorTile, kSlopeParameters, kPngReplies, kSlopePngExamples);
+const Operation kSlopeWebpOperation =
+    MapTile("getSlopeWebp", "Slopes as WebP", kMercatorTile, kSlopeParameters, kWebpReplies, kSlopeWebpExamples);
+const Operation kSlopeTileJsonOperation = MapTileJson("getSlopeTileJson", "TileJSON 3.0 of the layer slope", kTileJson,
+                                                      kSlopeJsonParameters, kSlopeJsonExamples);
 
-const Operation kHillshadeTileJsonOperation{.id = "getHillshadeTileJson",
-                                            .tag = "maps",
-                                            .summary = "TileJSON 3.0 of the layer hillshade",
-                                            .description = "Its URLs are absolute, made from the request's `Host`.",
-                                            .parameters = kHillshadeJsonParameters,
-                                            .replies = kMapTileJsonReplies,
-                                            .headers = kDocumentHeaders,
-                                            .examples = kHillshadeJsonExamples};
+const Operation kContoursOperation = MapTile("getContours", "Contour lines as a Mapbox Vector Tile", kMercatorTile,
+                                             kContoursParameters, kMvtReplies, kContoursExamples);
+const Operation kContoursTileJsonOperation = MapTileJson("getContoursTileJson", "TileJSON 3.0 of the layer contours",
+                                                         kTileJson, kContoursParameters, kContoursJsonExamples);
 
-const Operation kSlopePngOperation{.id = "getSlopePng",
-                                   .tag = "maps",
-                                   .summary = "Slopes as PNG",
-                                   .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north.",
-                                   .parameters = kSlopeParameters,
-                                   .replies = kPngReplies,
-                                   .headers = kMapHeaders,
-                                   .examples = kSlopePngExamples};
-
-const Operation kSlopeWebpOperation{.id = "getSlopeWebp",
-                                    .tag = "maps",
-                                    .summary = "Slopes as WebP",
-                                    .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north.",
-                                    .parameters = kSlopeParameters,
-                                    .replies = kWebpReplies,
-                                    .headers = kMapHeaders,
-                                    .examples = kSlopeWebpExamples};
-
-const Operation kSlopeTileJsonOperation{.id = "getSlopeTileJson",
-                                        .tag = "maps",
-                                        .summary = "TileJSON 3.0 of the layer slope",
-                                        .description = "Its URLs are absolute, made from the request's `Host`.",
-                                        .parameters = kSlopeJsonParameters,
-                                        .replies = kMapTileJsonReplies,
-                                        .headers = kDocumentHeaders,
-                                        .examples = kSlopeJsonExamples};
-
-const Operation kContoursOperation{.id = "getContours",
-                                   .tag = "maps",
-                                   .summary = "Contour lines as a Mapbox Vector Tile",
-                                   .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north.",
-                                   .parameters = kContoursParameters,
-                                   .replies = kMvtReplies,
-                                   .headers = kMapHeaders,
-                                   .examples = kContoursExamples};
-
-const Operation kContoursTileJsonOperation{.id = "getContoursTileJson",
-                                           .tag = "maps",
-                                           .summary = "TileJSON 3.0 of the layer contours",
-                                           .description = "Its URLs are absolute, made from the request's `Host`.",
-                                           .parameters = kContoursParameters,
-                                           .replies = kMapTileJsonReplies,
-                                           .headers = kDocumentHeaders,
-                                           .examples = kContoursJsonExamples};
-
-const Operation kImageryWebpOperation{
-    .id = "getImageryWebp",
-    .tag = "maps",
-    .summary = "The imagery in Web Mercator as WebP",
-    .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north. 404 where the dataset has no imagery.",
-    .parameters = kImageryParameters,
-    .replies = kWebpReplies,
-    .headers = kMapHeaders,
-    .examples = kImageryWebpExamples};
-
-const Operation kImageryJpegOperation{
-    .id = "getImageryJpeg",
-    .tag = "maps",
-    .summary = "The imagery in Web Mercator as JPEG",
-    .description = "EPSG:3857 in the XYZ scheme of web maps, y from the north. 404 where the dataset has no imagery.",
-    .parameters = kImageryParameters,
-    .replies = kJpegReplies,
-    .headers = kMapHeaders,
-    .examples = kImageryJpegExamples};
-
-const Operation kImageryTileJsonOperation{
-    .id = "getImageryTileJson",
-    .tag = "maps",
-    .summary = "TileJSON 3.0 of the layer imagery",
-    .description = "Its URLs are absolute, made from the request's `Host`. 404 where the dataset has no imagery.",
-    .parameters = kImageryJsonParameters,
-    .replies = kMapTileJsonReplies,
-    .headers = kDocumentHeaders,
-    .examples = kImageryJsonExamples};
-
-const Operation kGeodeticImageryWebpOperation{
-    .id = "getGeodeticImageryWebp",
-    .tag = "maps",
-    .summary = "The imagery of a terrain tile as WebP",
-    .description =
-        "The terrain tile of this number: EPSG:4326, y from the south. 404 where the dataset has no imagery.",
-    .parameters = kImageryParameters,
-    .replies = kWebpReplies,
-    .headers = kMapHeaders,
-    .examples = kGeodeticImageryWebpExamples};
-
-const Operation kGeodeticImageryJpegOperation{
-    .id = "getGeodeticImageryJpeg",
-    .tag = "maps",
-    .summary = "The imagery of a terrain tile as JPEG",
-    .description =
-        "The terrain tile of this number: EPSG:4326, y from the south. 404 where the dataset has no imagery.",
-    .parameters = kImageryParameters,
-    .replies = kJpegReplies,
-    .headers = kMapHeaders,
-    .examples = kGeodeticImageryJpegExamples};
+const Operation kImageryWebpOperation = MapTile("getImageryWebp", "The imagery in Web Mercator as WebP", kMercatorImage,
+                                                kImageryParameters, kWebpReplies, kImageryWebpExamples);
+const Operation kImageryJpegOperation = MapTile("getImageryJpeg", "The imagery in Web Mercator as JPEG", kMercatorImage,
+                                                kImageryParameters, kJpegReplies, kImageryJpegExamples);
+const Operation kImageryTileJsonOperation = MapTileJson("getImageryTileJson", "TileJSON 3.0 of the layer imagery",
+                                                        kImageTileJson, kImageryJsonParameters, kImageryJsonExamples);
+const Operation kGeodeticImageryWebpOperation =
+    MapTile("getGeodeticImageryWebp", "The imagery of a terrain tile as WebP", kGeodeticImage, kImageryParameters,
+            kWebpReplies, kGeodeticImageryWebpExamples);
+const Operation kGeodeticImageryJpegOperation =
+    MapTile("getGeodeticImageryJpeg", "The imagery of a terrain tile as JPEG", kGeodeticImage, kImageryParameters,
+            kJpegReplies, kGeodeticImageryJpegExamples);
 
 }  // namespace terrace::server

@@ -64,7 +64,6 @@ struct DatasetView {
     return baked_alone ? baked_alone->extent().finest_level : sources_finest_level.value_or(max_level());
   }
   // The deepest level of the sources; an archive may end above it.
-  int deepest_level() const { return baked_alone ? baked_alone->extent().deepest_level : max_level(); }
 };
 
 struct Catalog {
@@ -81,6 +80,9 @@ bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 // Returns the bounds of the largest connected group of ranges of the deepest tiles without edits, clipped to the
 // dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
+
+// Whether two boxes share a point, be it on an edge. `tile` does not cross the antimeridian.
+bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile);
 
 // Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the
 // dataset's bounds. Also false for keys outside the scheme.

@@ -6,20 +6,18 @@ It flies, and prints "requests N status 200:N ..." (negative: no reply) and "til
 Skipped (exit code 77) without the client, nginx or openssl.
 """
 import asyncio
-import contextlib
 import os
 import pathlib
 import re
 import shutil
-import signal
 import sys
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import cluster  # noqa: E402
-from rolling import DELAY_SECONDS, Balancer, roll  # noqa: E402
+from rolling import DELAY_SECONDS, Balancer, RollingTest, roll  # noqa: E402
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+RollingTest.binary = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.argv.pop(1)
 CLIENT = os.environ.get("TERRACE_NATIVE_CLIENT", "")
 IS_LONG = os.environ.get("TERRACE_LONG_TESTS") == "1"
@@ -59,19 +57,7 @@ class Flights:
         return task.result()
 
 
-class NativeRestarts(unittest.TestCase):
-    def setUp(self):
-        stack = contextlib.ExitStack()
-        self.addCleanup(stack.close)
-        self.stack, self.folder = stack, stack.enter_context(cluster.scratch())
-
-    def nodes(self, **options):
-        nodes = [cluster.Node(BINARY, self.folder, cluster.earth(), options) for _ in range(3)]
-        for node in nodes:
-            self.stack.callback(node.stop, signal.SIGKILL)
-            node.start()
-        return nodes
-
+class NativeRestarts(RollingTest):
     def check(self, statuses, flights):
         self.assertEqual(statuses, [0] * (3 * ROUNDS), "each drain ends in time")
         self.assertEqual(flights.failures, [])

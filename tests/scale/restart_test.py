@@ -4,7 +4,6 @@ Behind the ring, and behind a balancer that only asks /readyz, as that of Kubern
 Skipped (exit code 77) without nginx, openssl or wrk.
 """
 import asyncio
-import contextlib
 import os
 import pathlib
 import re
@@ -16,26 +15,14 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import cluster  # noqa: E402
-from rolling import DELAY_SECONDS, Balancer, roll  # noqa: E402
+from rolling import DELAY_SECONDS, Balancer, RollingTest, roll  # noqa: E402
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+RollingTest.binary = pathlib.Path(sys.argv.pop(1)).resolve()
 sys.argv.pop(1)
 ROUNDS = 20 if os.environ.get("TERRACE_LONG_TESTS") == "1" else 2
 
 
-class Restarts(unittest.TestCase):
-    def setUp(self):
-        stack = contextlib.ExitStack()
-        self.addCleanup(stack.close)
-        self.stack, self.folder = stack, stack.enter_context(cluster.scratch())
-
-    def nodes(self, **options):
-        nodes = [cluster.Node(BINARY, self.folder, cluster.earth(), options) for _ in range(3)]
-        for node in nodes:
-            self.stack.callback(node.stop, signal.SIGKILL)
-            node.start()
-        return nodes
-
+class Restarts(RollingTest):
     def wrk(self, url, targets, seconds):
         script = self.folder / "paths.lua"
         script.write_text("local paths = {" + ",".join(f'"{target}"' for target in targets) + "}\nlocal at = 0\n"

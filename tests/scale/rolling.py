@@ -2,6 +2,8 @@
 import asyncio
 import contextlib
 import http.client
+import signal
+import unittest
 
 import cluster
 
@@ -66,6 +68,23 @@ class Balancer:
             pass
         with contextlib.suppress(OSError):
             writer.close()
+
+
+class RollingTest(unittest.TestCase):
+    """Has a folder, and starts three nodes of one dataset."""
+    binary = None  # the program; set by the script
+
+    def setUp(self):
+        stack = contextlib.ExitStack()
+        self.addCleanup(stack.close)
+        self.stack, self.folder = stack, stack.enter_context(cluster.scratch())
+
+    def nodes(self, **options):
+        nodes = [cluster.Node(self.binary, self.folder, cluster.earth(), options) for _ in range(3)]
+        for node in nodes:
+            self.stack.callback(node.stop, signal.SIGKILL)
+            node.start()
+        return nodes
 
 
 async def roll(nodes, rounds, balancer=None):

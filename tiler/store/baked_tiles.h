@@ -24,7 +24,6 @@ struct BakedExtent {
   double floor_m = 0;
   bool has_datum = true;
   std::size_t sources = 0;                      // number of sources that it was baked from
-  int deepest_level = 0;                        // of the sources' dataset, also if the archive ends above it
   int finest_level = 0;                         // likewise, without edits (dem::DemSource::finest_level)
   int max_mercator_depth = 0;                   // of the height tiles in the archive
   bool normals = false, water_mask = false;     // extensions that the tiles of quantized-mesh have

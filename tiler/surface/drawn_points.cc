@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <tuple>
 #include <utility>
 
 #include "engine/geo/error_ladder.h"
@@ -16,12 +15,6 @@ namespace {
 constexpr std::size_t kStopPeriod = 1024;
 
 tl::unexpected<Error> Stopped() { return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more"); }
-
-geo::TileKey DeepestAt(const HasTile& has_tile, const dem::GeoPosition& point, int level) {
-  geo::TileKey key = TileAt(point, level);
-  while (level > 0 && !has_tile(key)) key = TileAt(point, --level);
-  return key;
-}
 
 // The tile beyond the northern or southern edge that the point is nearest to.
 std::optional<geo::TileKey> NeighbourOf(const HasTile& has_tile, const geo::TileKey& key,
@@ -51,6 +44,12 @@ geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
   return {level, number(longitude + 180, geo::TileColumns(level)), number(point.latitude + 90, geo::TileRows(level))};
 }
 
+geo::TileKey DeepestTileAt(const HasTile& has_tile, const dem::GeoPosition& point, int level) {
+  geo::TileKey key = TileAt(point, level);
+  while (level > 0 && !has_tile(key)) key = TileAt(point, --level);
+  return key;
+}
+
 Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction) {
   if (surface.level && *surface.level > max_level) {
     return MakeError(ErrorCode::kInvalidArgument, "level: the dataset has levels from 0 to {}", max_level);
@@ -68,10 +67,7 @@ Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::sp
   read.heights.resize(points.size());
   read.tile_of_point.resize(points.size());
   if (normals) read.normals.resize(points.size());
-  const auto is_before = [](const geo::TileKey& a, const geo::TileKey& b) {
-    return std::tie(a.level, a.y, a.x) < std::tie(b.level, b.y, b.x);
-  };
-  std::map<geo::TileKey, std::uint32_t, decltype(is_before)> numbers(is_before);
+  std::map<geo::TileKey, std::uint32_t, IsTileBefore> numbers;
   std::vector<std::shared_ptr<const DrawnMesh>> meshes;
   const auto number_of = [&](const geo::TileKey& key) -> Result<std::uint32_t> {
     const auto [found, is_new] = numbers.try_emplace(key, static_cast<std::uint32_t>(read.tiles.size()));
@@ -89,7 +85,7 @@ Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::sp
   // All tiles are counted before the first is made.
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % kStopPeriod == 0 && stop.stop_requested()) return Stopped();
-    const Result<std::uint32_t> number = number_of(DeepestAt(has_tile, points[i], level));
+    const Result<std::uint32_t> number = number_of(DeepestTileAt(has_tile, points[i], level));
     if (!number) return tl::unexpected(number.error());
     read.tile_of_point[i] = *number;
   }

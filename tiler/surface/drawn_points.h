@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <stop_token>
+#include <tuple>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -50,5 +51,14 @@ Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::sp
 
 // The tile of a level that contains a point.
 geo::TileKey TileAt(const dem::GeoPosition& point, int level);
+// The deepest tile of at most this level that contains a point.
+geo::TileKey DeepestTileAt(const HasTile& has_tile, const dem::GeoPosition& point, int level);
+
+// An order of tiles, for maps.
+struct IsTileBefore {
+  bool operator()(const geo::TileKey& a, const geo::TileKey& b) const {
+    return std::tie(a.level, a.y, a.x) < std::tie(b.level, b.y, b.x);
+  }
+};
 
 }  // namespace terrace::tiler

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <tuple>
 #include <utility>
 
 namespace terrace::tiler {
@@ -13,12 +12,6 @@ namespace {
 
 // Metres: within a part of this length a ray is straight in degrees to a few millimetres.
 constexpr double kPartLength = 500;
-
-struct IsBefore {
-  bool operator()(const geo::TileKey& a, const geo::TileKey& b) const {
-    return std::tie(a.level, a.y, a.x) < std::tie(b.level, b.y, b.x);
-  }
-};
 
 // A value along a part of a ray, by its values at 0, 0.5 and 1: a polynomial of the second degree.
 struct Along {
@@ -96,8 +89,7 @@ class Walk {
 
  private:
   Result<const DrawnMesh*> MeshAt(const dem::GeoPosition& point) {
-    geo::TileKey key = TileAt(point, level_);
-    for (int level = level_; level > 0 && !has_tile_(key);) key = TileAt(point, --level);
+    const geo::TileKey key = DeepestTileAt(has_tile_, point, level_);
     if (last_ != nullptr && last_->key() == key) return last_;
     auto& mesh = meshes_[key];
     if (mesh == nullptr) {
@@ -187,7 +179,7 @@ class Walk {
   const int level_;
   const dem::SightOptions& options_;
   const MeshOfTile& mesh_of_;
-  std::map<geo::TileKey, std::shared_ptr<const DrawnMesh>, IsBefore> meshes_;
+  std::map<geo::TileKey, std::shared_ptr<const DrawnMesh>, IsTileBefore> meshes_;
   const DrawnMesh* last_ = nullptr;
 };
 
