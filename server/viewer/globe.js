@@ -77,13 +77,14 @@ export class Globe {
     globe.material = this.material = makeTerrainMaterial();
   }
 
-  // The air is drawn with the first ground, and the stars when all of it is there: their shaders and images take longer
-  // than the ground's.
+  // The air is drawn once ground is drawn and every tile of level 0 is there: without one of them the air makes that part
+  // of the globe white. The stars follow when all ground is there: their shaders and images take longer than the ground's.
   #awaitGround() {
     this.hasGround = false;
     this.#hideAir();
     const stop = this.scene.postRender.addEventListener(() => {
-      if (this.scene.globe._surface._tilesToRender.length === 0) return;
+      const { _tilesToRender: drawn, _levelZeroTiles: roots } = this.scene.globe._surface;
+      if (drawn.length === 0 || !roots.every(({ renderable }) => renderable)) return;
       stop();
       this.hasGround = true;
       performance.mark("terrace.ground");
