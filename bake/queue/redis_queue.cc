@@ -233,10 +233,10 @@ void RedisQueue::EndBecause(End end, const Error& why) {
 // Nothing: ask again.
 std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
   if (end() != End::kNone) return Taken{Taken::State::kOver};
-  if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
   std::vector<std::string> arguments;
   {
     const std::lock_guard lock(mutex_);
+    if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
     arguments = {incarnation_, options_.worker, Millis(lease_)};
   }
   const auto reply = Exchange(ScriptCommand(options_.place, scripts::kTake, std::move(arguments)));
@@ -300,6 +300,7 @@ void RedisQueue::Done(std::size_t unit) {
   Send(held.mapped(), scripts::kDone, {options_.units[unit], options_.worker, fmt::format("{:.3f}", seconds)});
   outbox_.back().done = held.mapped().id;
   done_.insert(held.mapped().id);
+  next_take_ = {};  // it may have been the last unit of the job: the next call of Take asks at once
 }
 
 void RedisQueue::Return(std::size_t unit) {

@@ -110,10 +110,11 @@ class RedisQueue : public UnitQueue {
 
   std::mutex calls_;  // held while Redis is waited for; taken before mutex_
   std::unique_ptr<redis::Connection> connection_;
-  Clock::time_point next_take_{}, next_connect_{};
+  Clock::time_point next_connect_{};
   std::optional<Clock::time_point> away_since_;
 
   mutable std::mutex mutex_;  // of what follows; never held while Redis is waited for
+  Clock::time_point next_take_{};  // Take does not ask before
   std::string incarnation_;
   std::chrono::milliseconds lease_;
   std::map<std::size_t, Held> held_;
