@@ -11,7 +11,7 @@
 #include "archive/files/input_file.h"
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
-#include "engine/dem/gdal/remote_file.h"
+#include "engine/gdal/remote_file.h"
 #include "tiler/tile_bounds.h"
 
 namespace terrace::archive {

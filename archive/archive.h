@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "archive/manifest.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/encoded_tile.h"
 

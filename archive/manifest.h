@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/tile_request.h"
 

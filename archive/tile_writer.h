@@ -6,8 +6,8 @@
 #include <string>
 
 #include "archive/manifest.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/encoded_tile.h"
 #include "tiler/tile_request.h"

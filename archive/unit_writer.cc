@@ -12,7 +12,7 @@
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/tile_scheme.h"
 #include "archive/tile_writer.h"
-#include "engine/dem/common/content_hash.h"
+#include "engine/common/content_hash.h"
 #include "tiler/tile_bounds.h"
 
 namespace terrace::archive {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "archive/manifest.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "proto/media_type.h"
 #include "tiler/requested_error.h"
 #include "tiler/tile_pipeline.h"

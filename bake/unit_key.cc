@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "bake/bake_request.h"
-#include "engine/dem/common/content_hash.h"
+#include "engine/common/content_hash.h"
 #include "engine/dem/planned_tiles.h"
 #include "engine/geo/mercator_grid.h"
 #include "engine/geo/tile_cover.h"

@@ -1,5 +1,5 @@
 # terrace_library(NAME SOURCES a.cc b.cc [DEPS ...public] [PRIVATE_DEPS ...])
-# One folder, one target terrace::NAME, one namespace.
+# One folder, one target terrace::NAME, one namespace. engine/common to engine/dem share the namespace terrace::dem.
 function(terrace_library name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPS;PRIVATE_DEPS" ${ARGN})
   add_library(terrace_${name} STATIC ${ARG_SOURCES})
@@ -7,6 +7,11 @@ function(terrace_library name)
   list(TRANSFORM ARG_PRIVATE_DEPS REPLACE "^(Boost::headers|nlohmann_json::nlohmann_json)$" "$<BUILD_INTERFACE:\\1>")
   add_library(terrace::${name} ALIAS terrace_${name})
   target_link_libraries(terrace_${name} PUBLIC terrace_options ${ARG_DEPS} PRIVATE ${ARG_PRIVATE_DEPS})
+endfunction()
+
+# terrace_vectorized(SOURCE...): sources with loops over samples. g++ 12 makes vectors of loops of unknown length from -O3 on only.
+function(terrace_vectorized)
+  set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
 endfunction()
 
 # terrace_test(NAME SOURCES a_test.cc [DEPS ...] [LABELS ...] [TIMEOUT seconds] [SHARDS n]) One GoogleTest binary, one

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "config/common/listen_address.h"
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/tin/criterion.h"
 #include "proto/gltf/gltf_types.h"
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 
 #include "engine/core/result.h"
-#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/gdal/gdal_runtime.h"
 
 namespace terrace::server {
 

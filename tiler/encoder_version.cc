@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/gdal/gdal_runtime.h"
 #include "proto/library_versions.h"
 
 namespace terrace::tiler {

@@ -1,7 +1,7 @@
 // The two tiling schemes: TMS geodetic with two roots, and Web Mercator's XYZ.
 #pragma once
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::tiler {

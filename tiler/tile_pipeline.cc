@@ -5,8 +5,8 @@
 #include <iterator>
 #include <utility>
 
+#include "engine/common/content_hash.h"
 #include "engine/core/check.h"
-#include "engine/dem/common/content_hash.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"

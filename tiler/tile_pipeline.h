@@ -12,8 +12,8 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/image/imagery.h"
-#include "engine/dem/image/water_raster.h"
+#include "engine/image/imagery.h"
+#include "engine/image/water_raster.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "proto/lattice_view.h"

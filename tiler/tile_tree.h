@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
 #include "proto/height_span.h"

@@ -16,8 +16,8 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# A room is a module. The order is core <- {geo, tin} <- {dem, proto} <- tiler <- archive <- {bake, server}, and core <-
-# config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
+# A room is a module. The order is core <- {geo, tin}; geo <- DEM <- dem; {geo, tin} <- proto; {dem, proto} <- tiler <- archive
+# <- {bake, server}, and core <- config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
 # itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
 # jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
 # <- handlers; {frontend, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
@@ -28,18 +28,19 @@ PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
 # Modules of elevation models: each may include those before it.
-DEM = ["engine/dem/dem_types.h", "engine/dem/common", "engine/dem/gdal", "engine/dem/crs", "engine/dem/raster", "engine/dem/statistics",
-       "engine/dem/sources", "engine/dem/mosaic", "engine/dem/sight", "engine/dem/bound", "engine/dem/edits", "engine/dem/image", "engine/dem/export", "engine/dem/contour"]
-# Headers below a module that count as that module's own: every module that may include it may include these.
-PUBLIC_HEADERS = {front + "/" + name: front for front, names in {
-    "engine/dem": ("dem_types.h", "export/output_grid.h", "common/box_index.h", "common/content_hash.h", "contour/contour_lines.h", "crs/geodesic_path.h", "gdal/file_content.h", "gdal/file_stamp.h",
-                   "gdal/gdal_runtime.h", "gdal/remote_file.h", "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h",
-                   "sight/sight_ray.h", "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h"),
-    "config": ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h", "common/working_directory.h",
-               "options/options.h"),
-}.items() for name in names}
+DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/statistics", "engine/sources", "engine/mosaic", "engine/sight",
+       "engine/bound", "engine/edits", "engine/image", "engine/export"]
+# Headers of other modules that count as the own of the first: every module that may include it may include these.
+PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
+    ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/dem_types.h", "crs/geodesic_path.h", "export/contour_lines.h",
+                              "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
+                              "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sight/sight_ray.h",
+                              "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h")),
+    ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h",
+                          "common/working_directory.h", "options/options.h")),
+) for name in names}
 # Plain values in the configuration's structs: config may include nothing else of these modules.
-VALUES = {"engine/dem/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
+VALUES = {"engine/common/dem_types.h", "engine/tin/criterion.h", "proto/gltf/gltf_types.h"}
 # The client that flies: scene <- select; {select, content} <- tree; {tree, http} <- flight <- report <- cli/fly.
 FLY = ["fly/scene", "fly/select", "fly/content", "fly/tree", "fly/http", "fly/flight", "fly/report"]
 HTTP = ["server/net", "server/http"]
@@ -95,12 +96,13 @@ MODULES = {
 
 # Library: its headers, and the files that may include them (regular expressions on paths). The first match counts.
 Library = collections.namedtuple("Library", "name headers files")
+DEM_FILES = r"engine/(?!core/|geo/|tin/)\w+"  # of the modules of DEM, and of engine/dem
 LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
-    Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
-    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
-    Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/dem/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
+    Library("Highway", r"hwy/.*", r"(engine/(bound|raster|tin)|proto/error)/.*(\.cc|-inl\.h)"),
+    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/(gdal|crs|raster|statistics|sources|image|export)/"),
+    Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
@@ -112,28 +114,28 @@ LIBRARIES = [
     Library("meshoptimizer", r"meshoptimizer\.h", r"proto/.*\.cc"),
     Library("hiredis", r"hiredis/.*", r"redis/.*\.cc"),
     Library("RocksDB", r"rocksdb/.*", r"server/store/record_db\.cc"),
-    Library("xxHash", r"xxhash\.h", r"(engine/dem|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
-    Library("spdlog", r"spdlog/.*", r"(engine/dem|server)/.*\.cc"),
+    Library("xxHash", r"xxhash\.h", rf"({DEM_FILES}|engine/tin|proto|tiler|archive|bake|server)/.*\.cc"),
+    Library("spdlog", r"spdlog/.*", rf"({DEM_FILES}|server)/.*\.cc"),
     Library("Beast", r"boost/beast.*", r"(server/http/request|fly/http/http_client)\.cc"),
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|fly/http/http_client|redis/socket|server/net/.*)\.cc"),
-    Library("Boost.Geometry", r"boost/geometry/.*", r"engine/dem/.*\.cc"),
+    Library("Boost.Geometry", r"boost/geometry/.*", r"engine/(common|edits)/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
     Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc)"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # Libraries that a module promises not to use: threads and clocks, files, sockets.
-    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", r"(engine/dem|tiler/store|archive|bake|fly/(flight|http)|server)/|redis/resolver\.cc"),
-    Library("clocks", r"(chrono|ctime)", r"(config|bake|fly/(flight|http)|tiler|redis|server|engine/dem)/"),
-    Library("files", r"(filesystem|fstream)", r"(config/|engine/dem/|archive/|bake/|server/|proto/gltf/mesh_file)"),
+    Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", rf"({DEM_FILES}|tiler/store|archive|bake|fly/(flight|http)|server)/|redis/resolver\.cc"),
+    Library("clocks", r"(chrono|ctime)", rf"(config|bake|fly/(flight|http)|tiler|redis|server|{DEM_FILES})/"),
+    Library("files", r"(filesystem|fstream)", rf"(config/|{DEM_FILES}/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",
-            r"(config|engine/dem|tiler|archive|bake|redis|server)/.*\.cc"),
+            rf"(config|{DEM_FILES}|tiler|archive|bake|redis|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]
 
 # These may appear in headers that other modules include. So may Boost inside the server (awaitable results), GDAL
-# between the modules of engine/dem, and JSON between those of config.
+# between the modules of DEM, and JSON between those of config.
 PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files"}
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
@@ -200,7 +202,7 @@ class Tree:
         if other not in MODULES[room] and not (room in CONFIG and quoted in VALUES):
             return f'{room} may not know {other} ("{quoted}")'
         public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
-        public |= {"GDAL", "Boost.Geometry"} if room.startswith("engine/dem") and other.startswith("engine/dem/") else set()
+        public |= {"GDAL", "Boost.Geometry"} if other in DEM and room in [*DEM, "engine/dem"] else set()
         public |= {"nlohmann_json"} if room in CONFIG and other in CONFIG else set()
         hidden = self.libraries_behind(quoted) - public
         if hidden:
@@ -245,7 +247,8 @@ class SelfTest(unittest.TestCase):
 
     def test_arrows_refused(self):
         for user, used in (("engine/core", "engine/geo"), ("engine/tin", "engine/geo"), ("engine/geo", "engine/tin"),
-                           ("proto", "engine/dem"), ("engine/dem", "proto"), ("config", "engine/geo"), ("engine/tin", "server/tiles"),
+                           ("proto", "engine/dem"), ("engine/dem", "proto"), ("engine/gdal", "engine/crs"), ("engine/export", "engine/dem"),
+                           ("config", "engine/geo"), ("engine/tin", "server/tiles"),
                            ("server/tiles", "server/http"), ("server/http", "server/tiles"), ("server/http", "tiler"), ("server/http", "server/api"),
                            ("server/jobs", "server/tiles"), ("server/jobs", "tiler"), ("server/net", "server/http"), ("server/api", "server/handlers"),
                            ("server/handlers", "server/cli"),
@@ -256,8 +259,10 @@ class SelfTest(unittest.TestCase):
     def test_config_knows_plain_values_alone(self):
         self.assert_clean({"proto/gltf/gltf_types.h": "", "config/a.h": '#include "proto/gltf/gltf_types.h"\n'})
         self.assert_refused({"proto/gltf/glb_tile.h": "", "config/a.h": '#include "proto/gltf/glb_tile.h"\n'}, "config may not know proto")
-        self.assert_refused({"engine/dem/dem_types.h": "#include <gdal.h>\n", "config/a.h": '#include "engine/dem/dem_types.h"\n'},
-                            "shows GDAL to config")
+        found = self.check({"engine/common/dem_types.h": "#include <gdal.h>\n", "config/a.h": '#include "engine/common/dem_types.h"\n'})
+        self.assertEqual(len(found), 2, found)
+        self.assertIn("shows GDAL to config", found[0])
+        self.assertIn("GDAL (<gdal.h>) may not appear here", found[1])
 
     def test_front_room_shows_its_doors_alone(self):
         self.assert_clean({"config/options/options.h": "", "server/cli/serve/a.cc": '#include "config/options/options.h"\n'})
@@ -284,8 +289,8 @@ class SelfTest(unittest.TestCase):
 
     def test_libraries_in_their_places(self):
         self.assert_clean({
-            "engine/dem/handle.h": "#include <gdal_priv.h>\n#include <mutex>\n",
-            "engine/dem/source.cc": '#include "engine/dem/handle.h"\n#include <sys/stat.h>\n',
+            "engine/gdal/handle.h": "#include <gdal_priv.h>\n#include <mutex>\n",
+            "engine/dem/source.cc": '#include "engine/gdal/handle.h"\n#include <sys/stat.h>\n',
             "server/http/request.cc": "#include <boost/beast/http.hpp>\n#include <boost/asio/awaitable.hpp>\n",
             "server/cli/main.cc": "#include <CLI/CLI.hpp>\n",
             "proto/compress.cc": "#include <libdeflate.h>\n#include <vector>\n",
@@ -295,8 +300,8 @@ class SelfTest(unittest.TestCase):
 
     def test_library_shown_through_another_header(self):
         self.assert_refused({
-            "engine/dem/handle.h": "#include <gdal.h>\n",
-            "engine/dem/source.h": '#include "engine/dem/handle.h"\n',
+            "engine/gdal/handle.h": "#include <gdal.h>\n",
+            "engine/dem/source.h": '#include "engine/gdal/handle.h"\n',
             "server/tiles/pipeline.cc": '#include "engine/dem/source.h"\n',
         }, "shows GDAL to server/tiles")
 

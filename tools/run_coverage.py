@@ -19,7 +19,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build/coverage"
 PROFILES = BUILD / "profiles"
-MODULES = ("engine/core", "engine/geo", "engine/tin", "engine/dem", "proto", "config", "tiler", "server/jobs", "server/store", "server/tiles", "server/net", "server/http",
+MODULES = ("engine/core", "engine/geo", "engine/tin", "engine", "proto", "config", "tiler", "server/jobs", "server/store", "server/tiles", "server/net", "server/http",
          "server/telemetry", "server/query", "server/api", "server/frontend", "server/documents", "server/handlers",
          "server/reload", "fly", "server/cli", "server")
 WANTED = 90.0

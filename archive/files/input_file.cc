@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "engine/dem/gdal/remote_file.h"
+#include "engine/gdal/remote_file.h"
 
 namespace terrace::archive {
 namespace {

@@ -12,7 +12,7 @@
 #include <tuple>
 #include <utility>
 
-#include "engine/dem/common/content_hash.h"
+#include "engine/common/content_hash.h"
 
 namespace terrace::archive {
 namespace {

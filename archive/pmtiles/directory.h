@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 
 namespace terrace::archive {
 

@@ -9,8 +9,8 @@
 #include "archive/files/output_file.h"
 #include "archive/pmtiles/directory.h"
 #include "archive/tile_writer.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "tiler/encoded_tile.h"
 
 namespace terrace::archive {

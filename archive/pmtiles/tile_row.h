@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "tiler/encoded_tile.h"
 
 namespace terrace::archive {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
-#include "engine/dem/crs/node_positions.h"
+#include "engine/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/geo/tile_cover.h"
 

@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <utility>
 
-#include "engine/dem/common/content_hash.h"
+#include "engine/common/content_hash.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/edits/deeper_tiles.h"
-#include "engine/dem/mosaic/availability.h"
+#include "engine/edits/deeper_tiles.h"
 #include "engine/geo/tile_cover.h"
+#include "engine/mosaic/availability.h"
 
 namespace terrace::dem {
 namespace {

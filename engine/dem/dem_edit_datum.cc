@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "engine/dem/crs/geoid.h"
+#include "engine/crs/geoid.h"
 #include "engine/dem/dem_impl.h"
 
 namespace terrace::dem {

@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/dem/crs/node_positions.h"
+#include "engine/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/edits/edit_shape.h"
-#include "engine/dem/edits/read_edits.h"
-#include "engine/dem/raster/grid_cells.h"
+#include "engine/edits/edit_shape.h"
+#include "engine/edits/read_edits.h"
 #include "engine/geo/mercator_grid.h"
+#include "engine/raster/grid_cells.h"
 
 namespace terrace::dem {
 namespace {

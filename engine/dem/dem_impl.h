@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/edits/edit_set.h"
-#include "engine/dem/mosaic/raster_grid.h"
+#include "engine/edits/edit_set.h"
+#include "engine/mosaic/raster_grid.h"
 
 namespace terrace::dem {
 

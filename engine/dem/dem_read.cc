@@ -5,11 +5,11 @@
 #include <map>
 #include <utility>
 
+#include "engine/bound/source_error_bound.h"
 #include "engine/core/check.h"
-#include "engine/dem/bound/source_error_bound.h"
-#include "engine/dem/crs/node_positions.h"
+#include "engine/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/raster/node_rows.h"
+#include "engine/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {

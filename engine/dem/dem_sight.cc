@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/sight/grid_sight.h"
+#include "engine/sight/grid_sight.h"
 
 namespace terrace::dem {
 namespace {

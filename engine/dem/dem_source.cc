@@ -10,19 +10,19 @@
 #include <set>
 #include <utility>
 
+#include "engine/common/content_hash.h"
+#include "engine/common/parallel_for.h"
 #include "engine/core/check.h"
-#include "engine/dem/common/content_hash.h"
-#include "engine/dem/common/parallel_for.h"
-#include "engine/dem/crs/footprint.h"
-#include "engine/dem/crs/level_plan.h"
+#include "engine/crs/footprint.h"
+#include "engine/crs/level_plan.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/dem/mosaic/availability.h"
-#include "engine/dem/mosaic/point_blocks.h"
-#include "engine/dem/sources/open_rasters.h"
-#include "engine/dem/sources/raster_source.h"
-#include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/octave.h"
 #include "engine/geo/tile_cover.h"
+#include "engine/mosaic/availability.h"
+#include "engine/mosaic/point_blocks.h"
+#include "engine/sources/open_rasters.h"
+#include "engine/sources/raster_source.h"
+#include "engine/statistics/cache_folder.h"
 
 namespace terrace::dem {
 namespace {

@@ -13,13 +13,13 @@
 #include <string>
 #include <vector>
 
+#include "engine/common/content_hash.h"
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/common/content_hash.h"
-#include "engine/dem/dem_types.h"
-#include "engine/dem/gdal/file_stamp.h"
-#include "engine/dem/sight/sight_ray.h"
+#include "engine/gdal/file_stamp.h"
 #include "engine/geo/lattice.h"
 #include "engine/geo/tile_key.h"
+#include "engine/sight/sight_ray.h"
 
 namespace terrace::dem {
 

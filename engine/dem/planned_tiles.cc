@@ -2,9 +2,9 @@
 
 #include <algorithm>
 
-#include "engine/dem/crs/footprint.h"
-#include "engine/dem/crs/level_plan.h"
-#include "engine/dem/mosaic/availability.h"
+#include "engine/crs/footprint.h"
+#include "engine/crs/level_plan.h"
+#include "engine/mosaic/availability.h"
 
 namespace terrace::dem {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::dem {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/help_format.h"
 #include "server/cli/common/usage_error.h"

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <string>
 
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "server/asio.h"
 #include "server/handlers/handlers.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/gdal/gdal_runtime.h"
 #include "proto/library_versions.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"

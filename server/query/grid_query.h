@@ -7,7 +7,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/export/output_grid.h"
+#include "engine/export/output_grid.h"
 #include "tiler/surface/drawn_points.h"
 
 namespace terrace::server {

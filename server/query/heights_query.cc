@@ -7,7 +7,7 @@
 
 #include "engine/core/bytes.h"
 #include "engine/core/plain_number.h"
-#include "engine/dem/crs/geodesic_path.h"
+#include "engine/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
 #include "server/http/text.h"
 #include "server/query/drawn_parameters.h"

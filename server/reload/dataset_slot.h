@@ -13,7 +13,7 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "engine/dem/gdal/file_stamp.h"
+#include "engine/gdal/file_stamp.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::server {

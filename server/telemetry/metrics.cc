@@ -20,7 +20,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/gdal/gdal_runtime.h"
 
 namespace terrace::server {
 namespace {

@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/image/imagery.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
+#include "engine/image/imagery.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "tiler/encoder_version.h"

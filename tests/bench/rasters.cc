@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/dem/mosaic/void_fill.h"
+#include "engine/mosaic/void_fill.h"
 #include "tests/support/source_dir.h"
 #include "tests/support/test_data.h"
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include "engine/dem/crs/geoid.h"
+#include "engine/crs/geoid.h"
 #include "tests/support/test_data.h"
 #include "tests/tiler/certified_sources.h"
 

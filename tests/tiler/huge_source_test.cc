@@ -19,7 +19,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/statistics/cache_folder.h"
+#include "engine/statistics/cache_folder.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/tile_pipeline.h"
 

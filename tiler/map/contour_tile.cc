@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
-#include "engine/dem/contour/contour_lines.h"
+#include "engine/export/contour_lines.h"
 
 namespace terrace::tiler {
 namespace {

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_types.h"
 #include "engine/geo/tile_key.h"
 #include "proto/gltf/texture.h"
 #include "tiler/coding.h"

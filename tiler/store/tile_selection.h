@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::tiler {

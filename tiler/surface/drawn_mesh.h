@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/tile_key.h"
 

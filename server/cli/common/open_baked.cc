@@ -10,7 +10,7 @@
 #include "archive/archive.h"
 #include "archive/baked_tiles.h"
 #include "archive/manifest.h"
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {

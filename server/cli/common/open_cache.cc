@@ -8,8 +8,8 @@
 #include <system_error>
 
 #include "config/common/cache_place.h"
-#include "engine/dem/statistics/averages_budget.h"
-#include "engine/dem/statistics/cache_folder.h"
+#include "engine/statistics/averages_budget.h"
+#include "engine/statistics/cache_folder.h"
 #include "server/cli/common/check_folder.h"
 
 namespace terrace::cli {

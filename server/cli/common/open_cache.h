@@ -2,7 +2,7 @@
 #pragma once
 
 #include "config/config.h"
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 
 namespace terrace::cli {
 

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/gdal/file_content.h"
-#include "engine/dem/statistics/cache_folder.h"
+#include "engine/gdal/file_content.h"
+#include "engine/statistics/cache_folder.h"
 #include "server/cli/common/open_baked.h"
 #include "tiler/encoder_version.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "config/common/nearest_name.h"
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 
 namespace terrace::cli {
 namespace {

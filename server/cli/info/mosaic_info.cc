@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "engine/common/box_index.h"
 #include "engine/core/plain_number.h"
-#include "engine/dem/common/box_index.h"
 #include "engine/geo/error_ladder.h"
 
 namespace terrace::cli {

@@ -24,8 +24,8 @@
 
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
-#include "engine/dem/gdal/source_policy.h"
-#include "engine/dem/sources/read_raster.h"
+#include "engine/gdal/source_policy.h"
+#include "engine/sources/read_raster.h"
 #include "engine/tin/decimate/drop_pass.h"
 #include "engine/tin/extended/block_joiner.h"
 #include "engine/tin/extended/field_partition.h"

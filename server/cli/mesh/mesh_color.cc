@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "engine/core/plain_number.h"
-#include "engine/dem/image/raster_colors.h"
-#include "engine/dem/sources/read_raster.h"
+#include "engine/image/raster_colors.h"
+#include "engine/sources/read_raster.h"
 #include "engine/tin/extended/extended_error.h"
 #include "engine/tin/extended/extended_field.h"
 #include "proto/gltf/mesh_file.h"

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "engine/dem/sources/read_raster.h"
+#include "engine/sources/read_raster.h"
 #include "proto/gltf/mesh_file.h"
 
 namespace terrace::cli {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "engine/dem/dem_source.h"
-#include "engine/dem/sources/read_raster.h"
+#include "engine/sources/read_raster.h"
 
 namespace CLI {
 class App;

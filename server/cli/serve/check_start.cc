@@ -5,7 +5,7 @@
 #include <system_error>
 #include <vector>
 
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 #include "server/cli/common/check_folder.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/source_files.h"

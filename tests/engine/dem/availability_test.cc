@@ -1,5 +1,5 @@
 // The available tiles of several rasters together.
-#include "engine/dem/mosaic/availability.h"
+#include "engine/mosaic/availability.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The folder of statistics files: its bound, which files are removed, sharing, and the fallback if it fails.
-#include "engine/dem/statistics/cache_folder.h"
+#include "engine/statistics/cache_folder.h"
 
 #include <gdal_priv.h>
 #include <spdlog/sinks/ostream_sink.h>
@@ -20,12 +20,12 @@
 #include <sstream>
 #include <utility>
 
-#include "engine/dem/gdal/raster_file.h"
-#include "engine/dem/raster/sample_grid.h"
-#include "engine/dem/sources/prepare.h"
-#include "engine/dem/sources/raster_source.h"
-#include "engine/dem/statistics/kept_factors.h"
-#include "engine/dem/statistics/memory_averages.h"
+#include "engine/gdal/raster_file.h"
+#include "engine/raster/sample_grid.h"
+#include "engine/sources/prepare.h"
+#include "engine/sources/raster_source.h"
+#include "engine/statistics/kept_factors.h"
+#include "engine/statistics/memory_averages.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -12,9 +12,9 @@
 #include <iterator>
 #include <string>
 
-#include "engine/dem/gdal/file_content.h"
-#include "engine/dem/image/imagery.h"
-#include "engine/dem/image/water_raster.h"
+#include "engine/gdal/file_content.h"
+#include "engine/image/imagery.h"
+#include "engine/image/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/engine/dem/geoid_grids.h"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <sstream>
 
-#include "engine/dem/image/water_raster.h"
+#include "engine/image/water_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/support/resident_memory.h"
 

@@ -9,8 +9,8 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "engine/dem/statistics/cache_folder.h"
 #include "engine/geo/tile_cover.h"
+#include "engine/statistics/cache_folder.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::dem {

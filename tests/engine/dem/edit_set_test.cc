@@ -1,5 +1,5 @@
 // Edits of many vertices and many edits: what is found by bands, boxes and windows is what is found without.
-#include "engine/dem/edits/edit_set.h"
+#include "engine/edits/edit_set.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/common/box_index.h"
-#include "engine/dem/edits/edit_shape.h"
+#include "engine/common/box_index.h"
+#include "engine/edits/edit_shape.h"
 
 namespace terrace::dem {
 namespace {

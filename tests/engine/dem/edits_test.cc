@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/crs/geoid.h"
+#include "engine/crs/geoid.h"
 #include "engine/dem/dem_source.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/mercator_grid.h"

@@ -6,8 +6,8 @@
 #include <memory>
 #include <string>
 
-#include "engine/dem/gdal/gdal_runtime.h"
-#include "engine/dem/gdal/raster_file.h"
+#include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

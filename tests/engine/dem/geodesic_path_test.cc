@@ -1,4 +1,4 @@
-#include "engine/dem/crs/geodesic_path.h"
+#include "engine/crs/geodesic_path.h"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The distance of tiles from samples of a source above a geoid never exceeds the bound, whatever the curvature of the
 // geoid.
-#include "engine/dem/bound/geoid_error_bound.h"
+#include "engine/bound/geoid_error_bound.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "engine/dem/crs/geoid.h"
+#include "engine/crs/geoid.h"
 
 #include <fmt/format.h>
 

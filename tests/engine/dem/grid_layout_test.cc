@@ -1,5 +1,5 @@
 // Grouping many rasters into raster grids gives the same result as comparing all pairs, but compares few pairs.
-#include "engine/dem/mosaic/grid_layout.h"
+#include "engine/mosaic/grid_layout.h"
 
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>

@@ -1,5 +1,5 @@
 // Idle objects of several pools, with a common limit.
-#include "engine/dem/common/idle_pool.h"
+#include "engine/common/idle_pool.h"
 
 #include <gtest/gtest.h>
 

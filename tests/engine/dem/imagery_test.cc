@@ -1,4 +1,4 @@
-#include "engine/dem/image/imagery.h"
+#include "engine/image/imagery.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

@@ -10,10 +10,10 @@
 #include <sstream>
 #include <utility>
 
-#include "engine/dem/bound/grid_statistics.h"
-#include "engine/dem/mosaic/grid_voids.h"
-#include "engine/dem/mosaic/raster_grid.h"
-#include "engine/dem/sources/raster_source.h"
+#include "engine/bound/grid_statistics.h"
+#include "engine/mosaic/grid_voids.h"
+#include "engine/mosaic/raster_grid.h"
+#include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

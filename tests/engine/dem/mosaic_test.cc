@@ -7,8 +7,8 @@
 #include <limits>
 #include <span>
 
-#include "engine/dem/common/idle_pool.h"
-#include "engine/dem/crs/geoid.h"
+#include "engine/common/idle_pool.h"
+#include "engine/crs/geoid.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 

@@ -7,8 +7,8 @@
 #include <optional>
 #include <utility>
 
-#include "engine/dem/crs/geoid.h"
-#include "engine/dem/image/image_pool.h"
+#include "engine/crs/geoid.h"
+#include "engine/image/image_pool.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace {

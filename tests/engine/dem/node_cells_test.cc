@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/raster/grid_cells.h"
-#include "engine/dem/raster/node_rows.h"
+#include "engine/raster/grid_cells.h"
+#include "engine/raster/node_rows.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {

@@ -1,5 +1,5 @@
 // Steps between places are measured in vectors; what comes out is what each node gives on its own.
-#include "engine/dem/bound/node_steps.h"
+#include "engine/bound/node_steps.h"
 
 #include <gtest/gtest.h>
 

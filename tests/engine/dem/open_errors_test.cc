@@ -4,7 +4,7 @@
 #include <fstream>
 #include <limits>
 
-#include "engine/dem/gdal/raster_file.h"
+#include "engine/gdal/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

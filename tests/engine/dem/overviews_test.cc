@@ -6,9 +6,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "engine/dem/crs/level_plan.h"
-#include "engine/dem/raster/sample_grid.h"
-#include "engine/dem/sources/raster_source.h"
+#include "engine/crs/level_plan.h"
+#include "engine/raster/sample_grid.h"
+#include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

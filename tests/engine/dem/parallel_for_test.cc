@@ -1,4 +1,4 @@
-#include "engine/dem/common/parallel_for.h"
+#include "engine/common/parallel_for.h"
 
 #include <gtest/gtest.h>
 

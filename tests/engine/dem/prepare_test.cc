@@ -1,6 +1,6 @@
 // Statistics of rasters and their cache: equal heights with and without it, continued after interruptions, shared, and
 // rejected if damaged.
-#include "engine/dem/sources/prepare.h"
+#include "engine/sources/prepare.h"
 
 #include <gdal_priv.h>
 #include <sys/wait.h>
@@ -16,9 +16,9 @@
 #include <map>
 #include <random>
 
-#include "engine/dem/gdal/raster_file.h"
-#include "engine/dem/raster/grid_cells.h"
-#include "engine/dem/sources/raster_source.h"
+#include "engine/gdal/raster_file.h"
+#include "engine/raster/grid_cells.h"
+#include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

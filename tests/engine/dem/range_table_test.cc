@@ -1,4 +1,4 @@
-#include "engine/dem/common/range_table.h"
+#include "engine/common/range_table.h"
 
 #include <gtest/gtest.h>
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "engine/dem/image/raster_colors.h"
-#include "engine/dem/sources/read_raster.h"
+#include "engine/image/raster_colors.h"
+#include "engine/sources/read_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

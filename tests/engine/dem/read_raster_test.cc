@@ -1,4 +1,4 @@
-#include "engine/dem/sources/read_raster.h"
+#include "engine/sources/read_raster.h"
 
 #include <algorithm>
 #include <cmath>

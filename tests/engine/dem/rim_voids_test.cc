@@ -1,5 +1,5 @@
 // Compares the one-pass search for voids that touch the rim with a flood fill.
-#include "engine/dem/statistics/rim_voids.h"
+#include "engine/statistics/rim_voids.h"
 
 #include <gtest/gtest.h>
 

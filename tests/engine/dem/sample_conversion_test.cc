@@ -12,8 +12,8 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/gdal/sample_rules.h"
-#include "engine/dem/raster/block_averages.h"
+#include "engine/gdal/sample_rules.h"
+#include "engine/raster/block_averages.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

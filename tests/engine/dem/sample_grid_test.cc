@@ -1,4 +1,4 @@
-#include "engine/dem/raster/sample_grid.h"
+#include "engine/raster/sample_grid.h"
 
 #include <gdal_priv.h>
 

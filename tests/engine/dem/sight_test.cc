@@ -6,8 +6,8 @@
 #include <limits>
 #include <random>
 
-#include "engine/dem/sight/grid_sight.h"
 #include "engine/geo/ellipsoid.h"
+#include "engine/sight/grid_sight.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

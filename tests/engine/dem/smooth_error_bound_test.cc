@@ -1,5 +1,5 @@
 // The bound of a box does not depend on prepared tables.
-#include "engine/dem/bound/smooth_error_bound.h"
+#include "engine/bound/smooth_error_bound.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/bound/geoid_error_bound.h"
-#include "engine/dem/bound/grid_statistics.h"
-#include "engine/dem/crs/node_positions.h"
-#include "engine/dem/mosaic/raster_grid.h"
+#include "engine/bound/geoid_error_bound.h"
+#include "engine/bound/grid_statistics.h"
+#include "engine/crs/node_positions.h"
+#include "engine/mosaic/raster_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

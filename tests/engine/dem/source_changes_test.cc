@@ -6,7 +6,7 @@
 #include <fstream>
 #include <thread>
 
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -1,6 +1,6 @@
 // Names of sources that are not plain files are rejected before GDAL gets them, without network access and without
 // opening files outside the data roots.
-#include "engine/dem/gdal/source_policy.h"
+#include "engine/gdal/source_policy.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>
@@ -15,8 +15,8 @@
 #include <set>
 #include <thread>
 
-#include "engine/dem/gdal/gdal_runtime.h"
-#include "engine/dem/gdal/raster_file.h"
+#include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {

@@ -1,5 +1,5 @@
 // Voids that files do not declare. Each case has a counterpart: real terrain that looks similar and must stay.
-#include "engine/dem/statistics/undeclared_nodata.h"
+#include "engine/statistics/undeclared_nodata.h"
 
 #include <cpl_conv.h>
 #include <gdal_priv.h>

@@ -1,5 +1,5 @@
 // Compares grids of undulations with the results of PROJ.
-#include "engine/dem/crs/undulation_grid.h"
+#include "engine/crs/undulation_grid.h"
 
 #include <cpl_string.h>
 #include <gdal_priv.h>
@@ -7,8 +7,8 @@
 #include <cmath>
 #include <random>
 
-#include "engine/dem/crs/undulations.h"
-#include "engine/dem/gdal/gdal_runtime.h"
+#include "engine/crs/undulations.h"
+#include "engine/gdal/gdal_runtime.h"
 #include "tests/engine/dem/geoid_grids.h"
 
 namespace terrace::dem {

@@ -1,4 +1,4 @@
-#include "engine/dem/crs/undulations.h"
+#include "engine/crs/undulations.h"
 
 #include <gtest/gtest.h>
 

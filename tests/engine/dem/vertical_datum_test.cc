@@ -1,5 +1,5 @@
 // Heights above geoids become ellipsoidal in the same way in tiles, at points, on Web Mercator, and in bounds.
-#include "engine/dem/crs/vertical_datum.h"
+#include "engine/crs/vertical_datum.h"
 
 #include <gdal_priv.h>
 #include <stdlib.h>
@@ -10,7 +10,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "engine/dem/gdal/sample_rules.h"
+#include "engine/gdal/sample_rules.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
 

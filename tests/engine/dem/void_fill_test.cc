@@ -1,4 +1,4 @@
-#include "engine/dem/mosaic/void_fill.h"
+#include "engine/mosaic/void_fill.h"
 
 #include <gtest/gtest.h>
 

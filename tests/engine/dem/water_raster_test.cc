@@ -1,4 +1,4 @@
-#include "engine/dem/image/water_raster.h"
+#include "engine/image/water_raster.h"
 
 #include <gdal_priv.h>
 #include <gtest/gtest.h>

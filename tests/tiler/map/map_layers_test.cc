@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "engine/dem/contour/contour_lines.h"
+#include "engine/export/contour_lines.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/map/contour_tile.h"

@@ -1,0 +1,91 @@
+// Error bound for single tile cells, for nodes that are not evenly spaced on the raster grid: the largest difference
+// between served heights and the raster grid's samples.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "engine/bound/geoid_error_bound.h"
+#include "engine/bound/grid_statistics.h"
+#include "engine/bound/tile_cells.h"
+#include "engine/mosaic/raster_grid.h"
+
+namespace terrace::dem {
+
+// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may lie one turn further on.
+struct SampleBox {
+  std::int64_t west = 0, north = 0, east = -1, south = -1;
+
+  bool empty() const { return west > east || north > south; }
+  std::int64_t columns() const { return east - west + 1; }
+  std::int64_t rows() const { return south - north + 1; }
+  // The smallest box that contains both.
+  SampleBox Around(const SampleBox& other) const {
+    if (empty()) return other;
+    if (other.empty()) return *this;
+    return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
+            std::max(south, other.south)};
+  }
+
+  friend bool operator==(const SampleBox&, const SampleBox&) = default;
+};
+
+class CellErrorBound {
+ public:
+  // The arguments must outlive this object.
+  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+                 const GridStatistics& statistics, const GeoidErrorBound& geoid)
+      : tile_(tile),
+        grid_(grid),
+        trace_(trace),
+        statistics_(statistics),
+        geoid_(geoid),
+        columns_(GridAxis(grid.columns(), trace.factor, grid.wraps()).count()),
+        rows_(GridAxis(grid.rows(), trace.factor, false).count()) {}
+
+  // Returns a bound from the averages that the cell's nodes are interpolated from: the surface lies between the
+  // averages, and the samples lie within the averaging error of it. Sets `has_voids` if some averages are void.
+  // Precondition: all nodes of the cell took their height from the raster grid.
+  double BoundByAverages(const TileCell& cell, bool& has_voids) const;
+
+  // The positions of a cell's nodes in pixels, and the samples that may lie in the cell.
+  struct CellSamples {
+    std::array<Position, 4> corners;
+    SampleBox samples;
+    bool between = false;  // heights between samples count as well
+  };
+
+  // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
+  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
+  // `place` if BoundBySamples can give a tighter bound from samples that have not been read.
+  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, std::optional<CellSamples>& place) const;
+
+  // Whether BoundBySurroundings returns 0 for every cell of a box, because there is no sample around any of them: on
+  // the sea of a raster grid that is void there. Precondition: nothing is blended. False does not mean the contrary.
+  bool HasNoSamples(const CellBox& box) const;
+
+  // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of
+  // the window's columns against the cell's, in columns.
+  double BoundBySamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+                        const std::vector<float>& samples, std::int64_t turn) const;
+
+ private:
+  std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;
+  bool IsOnBothEnds(const PixelBounds& box) const;
+  SampleBox Clipped(SampleBox box) const;
+  double DistanceBound(const TileCell& cell, double lowest, double highest) const;
+  double BoundByBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const;
+  double BoundByAveragesNear(const TileCell& cell, const PixelBounds& box) const;
+
+  const TileNodes tile_;
+  const RasterGrid& grid_;
+  const GridTrace& trace_;
+  const GridStatistics& statistics_;
+  const GeoidErrorBound& geoid_;
+  const std::int64_t columns_, rows_;  // of averages of the trace's factor
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,135 @@
+#include "engine/bound/grid_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace terrace::dem {
+namespace {
+
+// Up to this number, members are checked one by one; for more, the index is used.
+constexpr std::size_t kFewMembers = 8;
+
+}  // namespace
+
+GridStatistics::GridStatistics(const RasterGrid& grid, const GridTrace& trace)
+    : grid_(grid), trace_(trace), turn_(grid.georeference().period()), around_(BoxAround()), near_(MembersAround()) {
+  for (const std::size_t i : near_) {
+    const Position& off = grid.members()[i].misplacement;
+    misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
+  }
+  if (near_.size() > kFewMembers) return;
+  for (const std::size_t i : near_) statistics_.push_back(grid.members()[i].raster->statistics());
+}
+
+// Columns of grids around the Earth jump by one turn somewhere. They are followed from node to node, which are less
+// than half a turn apart. Nodes without a position are far from the raster grid and need no table.
+Box GridStatistics::BoxAround() const {
+  Box hull{1e300, 1e300, -1e300, -1e300};
+  if (grid_.members().size() == 1) return hull;  // near members are not needed
+  const NodePositions& positions = trace_.cells.positions();
+  // For separable nodes, the first row and the first column represent all others.
+  const bool is_separable = positions.is_separable();
+  double of_row = grid_.columns() / 2.0;
+  for (std::size_t j = 0; j < positions.rows(); ++j) {
+    double last = of_row;
+    for (std::size_t i = 0; i < positions.columns() && (i == 0 || j == 0 || !is_separable); ++i) {
+      const Position p = positions.At(i, j);
+      if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
+      double x = p.x;
+      if (std::abs(x - last) > turn_ / 2 && turn_ > 0) x += turn_ * std::round((last - x) / turn_);
+      if (i == 0) of_row = x;
+      last = x;
+      hull = {std::min(hull.west, x), std::min(hull.south, p.y), std::max(hull.east, x), std::max(hull.north, p.y)};
+    }
+  }
+  const double halo = 4.0 * trace_.factor;
+  return {hull.west - halo, hull.south - halo, hull.east + halo, hull.north + halo};
+}
+
+std::vector<std::size_t> GridStatistics::MembersAround() const {
+  if (grid_.members().size() == 1) return {0};
+  std::vector<std::size_t> members;
+  for (const double turns : {0, -1, 1}) {
+    if (turns != 0 && turn_ == 0) break;
+    const double shift = turns * turn_;
+    const auto here = grid_.MembersAt({around_.west + shift, around_.south, around_.east + shift, around_.north});
+    members.insert(members.end(), here.begin(), here.end());
+  }
+  std::ranges::sort(members);
+  members.erase(std::unique(members.begin(), members.end()), members.end());
+  return members;
+}
+
+bool GridStatistics::IsAround(const Box& pixels) const {
+  const double middle = (around_.west + around_.east) / 2;
+  const double shift = turn_ > 0 ? turn_ * std::round((middle - (pixels.west + pixels.east) / 2) / turn_) : 0;
+  return pixels.west + shift >= around_.west && pixels.east + shift <= around_.east && pixels.south >= around_.south &&
+         pixels.north <= around_.north;
+}
+
+template <typename Visit>
+void GridStatistics::ForMembersAt(const Box& pixels, const Visit& visit) const {
+  const std::vector<GridMember>& members = grid_.members();
+  if (!statistics_.empty() && (members.size() == 1 || IsAround(pixels))) {
+    members_visited_ += near_.size();
+    for (std::size_t k = 0; k < near_.size(); ++k) visit(members[near_[k]], statistics_[k].get());
+    return;
+  }
+  for (const std::size_t i : grid_.MembersAt(pixels)) {
+    ++members_visited_;
+    visit(members[i], nullptr);
+  }
+}
+
+BlockRange GridStatistics::Ranges(double west, double north, double east, double south) const {
+  BlockRange range;
+  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
+    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+    range.Add(statistics != nullptr ? statistics->table.Query(west - x, north - y, east - x, south - y)
+                                    : member.raster->RangeIn(west - x, north - y, east - x, south - y));
+  });
+  return range;
+}
+
+float GridStatistics::ErrorOfAverages(double west, double north, double east, double south) const {
+  const int factor = trace_.factor;
+  if (factor == 1) return 0;  // averages of one sample
+  const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics) {
+    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+    const StatisticsPages::Statistics read = statistics == nullptr ? member.raster->statistics() : nullptr;
+    return (statistics != nullptr ? *statistics : *read)
+        .errors.Largest(factor, west - x, north - y, east - x, south - y);
+  };
+  if (grid_.members().size() == 1) return error_of(grid_.members().front(), statistics_.front().get());
+  constexpr float kNotTold = std::numeric_limits<float>::infinity();
+  if (grid_.alignment() < factor) return kNotTold;
+  int met = 0;
+  float error = 0;
+  ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
+    const geo::TileRange pixels = member.pixels();
+    if (east < static_cast<double>(pixels.start_x) || west > static_cast<double>(pixels.end_x + 1) ||
+        south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
+      return;
+    }
+    const RasterLayout& layout = member.raster->layout();
+    const auto whole = [factor](int samples) { return static_cast<double>(samples / factor * factor); };
+    const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
+    const bool is_inside =
+        west >= x && north >= y && east <= x + whole(layout.columns) && south <= y + whole(layout.height);
+    error = ++met == 1 && is_inside ? error_of(member, statistics) : kNotTold;
+  });
+  return error;
+}
+
+float GridStatistics::AveragingError(double west, double north, double east, double south) const {
+  const double factor = trace_.factor, turn = grid_.columns();
+  west *= factor, north *= factor, east = (east + 1) * factor, south = (south + 1) * factor;
+  const auto error = [&](double shift) { return ErrorOfAverages(west + shift, north, east + shift, south); };
+  float largest = error(0);
+  if (grid_.wraps() && west < 0) largest = std::max(largest, error(turn));
+  if (grid_.wraps() && east > turn) largest = std::max(largest, error(-turn));
+  return largest;
+}
+
+}  // namespace terrace::dem

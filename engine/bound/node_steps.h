@@ -1,0 +1,26 @@
+// Steps between the places of neighbouring nodes, with SIMD. Results are bit-equal on all instruction sets.
+#pragma once
+
+#include <cstddef>
+
+#include "engine/bound/tile_cells.h"
+
+namespace terrace::dem {
+
+// Largest steps between neighbouring nodes of a box (east_*, north_*), and largest difference between two steps that
+// follow each other (bend_*): twice the distance of the middle node from the midpoint of its neighbours.
+struct NodeSteps {
+  double east_x = 0, east_y = 0, north_x = 0, north_y = 0, bend_x = 0, bend_y = 0;
+};
+
+// Places by node, row by row from the south.
+struct NodePlaces {
+  const double *x, *y;  // of the south-western node of the box
+  std::size_t stride;
+};
+
+// Measures a box of columns x rows cells and adds its nodes to `at`. Returns false if a node or a neighbour of one has
+// no place (NaN).
+bool MeasureSteps(const NodePlaces& places, int columns, int rows, NodeSteps& steps, PixelBounds& at);
+
+}  // namespace terrace::dem

@@ -1,0 +1,336 @@
+#include "engine/bound/smooth_error_bound.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "engine/raster/node_rows.h"
+
+namespace terrace::dem {
+namespace {
+
+// A bound on the deviation from its chord over `length` samples of a function that is linear between samples and has
+// second differences of at most 1. A chord of less than one sample has at most one kink; longer ones deviate by
+// (length^2 + 1) / 8.
+double ChordError(double length) { return length < 1 ? length / 4 : (length * length + 1) / 8; }
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+// A row of averages with its neighbours, null where they lie outside the range. First and second differences of the
+// average in column c, to the east (X) and to the south (Y).
+struct Row {
+  const float *above, *here, *below;
+
+  float X(std::size_t c) const { return here[c + 1] - here[c]; }
+  float XX(std::size_t c) const { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); }
+  float Y(std::size_t c) const { return below[c] - here[c]; }
+  float YY(std::size_t c) const { return below[c] - here[c] - (here[c] - above[c]); }
+  float XY(std::size_t c) const { return here[c + 1] - here[c] - (below[c + 1] - below[c]); }
+};
+
+// Several independent running maxima, so that the compiler can vectorize.
+class Lanes {
+ public:
+  // The largest |value(i)| for i in 0 .. count - 1; ignores NaN.
+  template <typename Value>
+  void Raise(std::size_t count, const Value& value) {
+    ForEach(count, [&](std::size_t lane, std::size_t i) {
+      const float size = std::abs(value(i));
+      lanes_[lane] = size > lanes_[lane] ? size : lanes_[lane];
+    });
+  }
+  template <typename Value>
+  void Add(std::size_t count, const Value& value) {
+    ForEach(count, [&](std::size_t lane, std::size_t i) { lanes_[lane] += value(i); });
+  }
+  float Largest() const { return *std::ranges::max_element(lanes_); }
+  float Sum() const { return std::accumulate(lanes_.begin(), lanes_.end(), 0.0f); }
+
+ private:
+  static constexpr std::size_t kLanes = 8;
+
+  template <typename Step>
+  static void ForEach(std::size_t count, const Step& step) {
+    std::size_t i = 0;
+    for (; i + kLanes <= count; i += kLanes) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) step(lane, i + lane);
+    }
+    for (; i < count; ++i) step(i % kLanes, i);
+  }
+
+  std::array<float, kLanes> lanes_{};
+};
+
+}  // namespace
+
+SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+                                   const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends)
+    : tile_(tile),
+      trace_(trace),
+      statistics_(statistics),
+      geoid_(geoid),
+      blends_(blends),
+      misplacement_{statistics.misplacement().x / trace.factor, statistics.misplacement().y / trace.factor} {
+  PlaceNodes(grid);
+}
+
+// Nodes that took their height from this raster grid, away from its rim: averages are not evenly spaced at the end of
+// the surface, where the last average of an axis covers fewer samples.
+void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
+  const GridAxis columns(grid.columns(), trace_.factor, grid.wraps()), rows(grid.rows(), trace_.factor, false);
+  const auto last = [&](const GridAxis& axis, int samples) {
+    return static_cast<double>(axis.count() - (samples % trace_.factor == 0 ? 1 : 2));
+  };
+  const double last_x = last(columns, grid.columns()) - misplacement_.x;
+  const double last_y = last(rows, grid.rows()) - misplacement_.y;
+  const auto of_column = [&](std::int64_t column, double weight) {
+    const double x = static_cast<double>(column) + weight;
+    const bool is_even =
+        grid.wraps() ? grid.columns() % trace_.factor == 0 || (x >= 0 && x <= last_x) : x > 0 && x < last_x;
+    return is_even ? x : kUnknown;
+  };
+  const auto of_row = [&](std::int64_t row, double weight) {
+    const double y = static_cast<double>(row) + weight;
+    return y > 0 && y < last_y ? y : kUnknown;
+  };
+  const NodeCells& cells = trace_.cells;
+  const NodeWindow& part = cells.window();  // nodes beyond have no height from this raster grid
+  const auto west = static_cast<std::size_t>(part.column - tile_.window.column);
+  const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
+  is_separable_ = cells.is_separable();
+  if (is_separable_) {
+    const auto rows_there = static_cast<std::size_t>(tile_.window.rows);
+    x_ = std::make_unique_for_overwrite<double[]>(tile_.stride());
+    y_ = std::make_unique_for_overwrite<double[]>(rows_there);
+    std::fill_n(x_.get(), tile_.stride(), kUnknown);
+    std::fill_n(y_.get(), rows_there, kUnknown);
+    for (std::size_t i = 0; i < cells.columns().size(); ++i) {
+      x_[west + i] = of_column(cells.columns()[i].index, cells.columns()[i].weight);
+    }
+    for (std::size_t j = 0; j < cells.rows().size(); ++j) {
+      y_[south + j] = of_row(cells.rows()[j].index, cells.rows()[j].weight);
+    }
+    return;
+  }
+  const std::size_t nodes = trace_.heights.size(), columns_here = cells.positions().columns();
+  x_ = std::make_unique_for_overwrite<double[]>(nodes);
+  y_ = std::make_unique_for_overwrite<double[]>(nodes);
+  if (cells.positions().rows() < static_cast<std::size_t>(tile_.window.rows) || columns_here < tile_.stride()) {
+    std::fill_n(x_.get(), nodes, kUnknown);
+    std::fill_n(y_.get(), nodes, kUnknown);
+  }
+  for (std::size_t j = 0; j < cells.positions().rows(); ++j) {
+    const std::size_t first = (south + j) * tile_.stride() + west;
+    double *const x = x_.get() + first, *const y = y_.get() + first;
+    const float* const heights = trace_.heights.data() + first;
+    const bool are_all_known = GridCoordinatesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
+                                                 {last_x, last_y}, {x, columns_here}, {y, columns_here});
+    for (std::size_t i = 0; !are_all_known && i < columns_here; ++i) {
+      if (std::isnan(heights[i]) || !std::isnan(x[i])) continue;
+      const GridCell cell = cells.At(i, j);
+      x[i] = of_column(cell.column, cell.x);
+      y[i] = of_row(cell.row, cell.y);
+      if (std::isnan(x[i] + y[i])) x[i] = y[i] = kUnknown;
+    }
+  }
+}
+
+// Returns false if one of the nodes `first` to `end` of a row of the tile's window has no height from this raster grid.
+bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size_t end) const {
+  return !HasVoids(std::span(trace_.heights).subspan(row * tile_.stride() + first, end - first));
+}
+
+PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
+  PixelBounds bounds;
+  for (int j = box.south; j <= box.north; ++j) {
+    for (int i = box.west; i <= box.east; ++i) {
+      const std::size_t n = tile_.NodeOf(i, j);
+      const double x = is_separable_ ? x_[static_cast<std::size_t>(i + 1)] : x_[n];
+      const double y = is_separable_ ? y_[static_cast<std::size_t>(j + 1)] : y_[n];
+      if (std::isnan(x + y) || std::isnan(trace_.heights[n])) return {};
+      bounds.Add(x, y);
+    }
+  }
+  return bounds;
+}
+
+double SmoothErrorBound::Largest(const Bends& bends, const NodeSteps& steps) {
+  const auto along = [&](double x, double y) {
+    return ChordError(x) * bends.xx + ChordError(y) * bends.yy + x * y * bends.xy / 4;
+  };
+  return along(steps.east_x, steps.east_y) + along(steps.north_x, steps.north_y) + steps.bend_x * bends.x +
+         steps.bend_y * bends.y;
+}
+
+// The largest difference between served heights and the raster grid's own, at the nodes of a box.
+double SmoothErrorBound::LargestBlend(const CellBox& box) const {
+  if (!blends_) return 0;
+  float largest = 0;
+  for (int j = box.south; j <= box.north; ++j) {
+    for (int i = box.west; i <= box.east; ++i) {
+      const std::size_t n = tile_.NodeOf(i, j);
+      largest = std::max(largest, std::abs(tile_.heights[n] - trace_.heights[n]));
+    }
+  }
+  return largest;
+}
+
+bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
+  if (is_separable_) {
+    if (!MeasureAxes(box, steps, at)) return false;
+  } else {
+    const std::size_t n = tile_.NodeOf(box.west, box.south);
+    const NodePlaces places{x_.get() + n, y_.get() + n, tile_.stride()};
+    if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
+  }
+  // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
+  // directions. Positions are exact to a hundred-thousandth, those of samples to their misplacement.
+  constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
+  steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
+  steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
+  at.Grow(misplacement_.x, misplacement_.y);
+  return true;
+}
+
+// Columns of nodes run along columns of samples, rows along rows: each step has one axis.
+bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const {
+  const auto west = static_cast<std::size_t>(box.west + 1), south = static_cast<std::size_t>(box.south + 1);
+  const auto east = static_cast<std::size_t>(box.east + 1), north = static_cast<std::size_t>(box.north + 1);
+  // A node's neighbours count as well.
+  const bool are_known = box.south >= known_south_ && box.north <= known_north_;
+  if (!are_known) {
+    if (!GaveHeights(south - 1, west, east + 1) || !GaveHeights(north + 1, west, east + 1)) return false;
+    for (std::size_t j = south; j <= north; ++j) {
+      if (!GaveHeights(j, west - 1, east + 2)) return false;
+    }
+  }
+  double finite = 0;  // becomes NaN with any place
+  const auto measure = [&](const double* places, std::size_t first, std::size_t last, double& step, double& bend) {
+    for (std::size_t k = first; k <= last; ++k) {
+      const double after = places[k + 1] - places[k], before = places[k] - places[k - 1];
+      finite += after + before;
+      if (k < last) step = std::max(step, std::abs(after));
+      bend = std::max(bend, std::abs(after - before));
+    }
+  };
+  measure(x_.get(), west, east, steps.east_x, steps.bend_x);
+  measure(y_.get(), south, north, steps.north_y, steps.bend_y);
+  for (std::size_t i = west; i <= east; ++i) at.Add(x_[i], y_[south]);
+  for (std::size_t j = south; j <= north; ++j) at.Add(x_[west], y_[j]);
+  return std::isfinite(finite);
+}
+
+double SmoothErrorBound::BoundOver(const CellBox& box) const {
+  NodeSteps steps;
+  PixelBounds at;
+  if (!Measure(box, steps, at)) return kUnknown;
+  Bends bends;
+  const SampleRange range = RangeOf(at);
+  if (!Measure(range, bends)) return kUnknown;
+  return Largest(bends, steps) + geoid_.BoundOver(box) + LargestBlend(box) +
+         statistics_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
+                                    static_cast<double>(range.right), static_cast<double>(range.bottom));
+}
+
+SmoothErrorBound::SampleRange SmoothErrorBound::RangeOf(const PixelBounds& at) const {
+  const auto first = [](double place) { return static_cast<std::int64_t>(std::floor(place)); };
+  return {first(at.west), first(at.north), first(at.east) + 1, first(at.south) + 1};
+}
+
+// Beyond the outermost averages the surface is constant.
+SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const {
+  const GridWindow& window = trace_.window;
+  return {std::max(range.left, window.column), std::max(range.top, window.row),
+          std::min(range.right, window.column + window.columns - 1),
+          std::min(range.bottom, window.row + window.rows - 1)};
+}
+
+bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
+  const SampleRange in = Clipped(range);
+  constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
+  if (in.top == band_.top && in.bottom == band_.bottom) {
+    const auto first = static_cast<std::size_t>(in.left - trace_.window.column);
+    const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
+    const auto largest = [&](const std::vector<float>& of_column, std::size_t count) {
+      Lanes lanes;
+      lanes.Raise(count, [&](std::size_t c) { return of_column[first + c]; });
+      return lanes.Largest() * kUp;
+    };
+    Lanes sum;
+    sum.Add(columns, [&](std::size_t c) { return band_.sum[first + c]; });
+    bends = {largest(band_.x, columns - 1), largest(band_.y, columns), largest(band_.xx, columns > 2 ? columns - 2 : 0),
+             largest(band_.yy, columns), largest(band_.xy, columns - 1)};
+    return std::isfinite(sum.Sum());
+  }
+  const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
+  Lanes x, y, xx, yy, xy, sum;
+  ForRows(in, [&](const Row& row) {
+    sum.Add(columns, [&](std::size_t c) { return row.here[c]; });
+    x.Raise(columns - 1, [&](std::size_t c) { return row.X(c); });
+    if (columns > 2) xx.Raise(columns - 2, [&](std::size_t c) { return row.XX(c); });
+    if (row.below == nullptr) return;
+    y.Raise(columns, [&](std::size_t c) { return row.Y(c); });
+    xy.Raise(columns - 1, [&](std::size_t c) { return row.XY(c); });
+    if (row.above != nullptr) yy.Raise(columns, [&](std::size_t c) { return row.YY(c); });
+  });
+  bends = {x.Largest() * kUp, y.Largest() * kUp, xx.Largest() * kUp, yy.Largest() * kUp, xy.Largest() * kUp};
+  return std::isfinite(sum.Sum());
+}
+
+// Calls step(row) for all rows of the range.
+template <typename Step>
+void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const {
+  const GridWindow& window = trace_.window;
+  for (std::int64_t row = range.top; row <= range.bottom; ++row) {
+    const float* const here =
+        trace_.samples.data() + (row - window.row) * window.columns + (range.left - window.column);
+    step(Row{row == range.top ? nullptr : here - window.columns, here,
+             row == range.bottom ? nullptr : here + window.columns});
+  }
+}
+
+// All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
+void SmoothErrorBound::PrepareRows(int south, int north) {
+  band_ = {};
+  if (!is_separable_ || trace_.samples.empty()) return;
+  const auto rows = static_cast<std::size_t>(north - south + 3);
+  const auto nodes = std::span(trace_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
+  const bool are_known = !HasVoids(nodes.first(rows * tile_.stride()));
+  known_south_ = are_known ? south : 0;
+  known_north_ = are_known ? north : -1;
+  const double y0 = y_[static_cast<std::size_t>(south + 1)], y1 = y_[static_cast<std::size_t>(north + 1)];
+  if (std::isnan(y0 + y1)) return;
+  PixelBounds at;
+  at.Add(0, y0);
+  at.Add(0, y1);
+  at.Grow(0, misplacement_.y);
+  const GridWindow& window = trace_.window;
+  SampleRange range = RangeOf(at);
+  range.left = window.column, range.right = window.column + window.columns - 1;
+  range = Clipped(range);
+  const auto columns = static_cast<std::size_t>(window.columns);
+  band_.top = range.top, band_.bottom = range.bottom;
+  for (std::vector<float>* of_column : {&band_.x, &band_.y, &band_.xx, &band_.yy, &band_.xy, &band_.sum}) {
+    of_column->assign(columns, 0);
+  }
+  const auto raise = [](std::vector<float>& largest, std::size_t count, const auto& value) {
+    float* const out = largest.data();
+    for (std::size_t c = 0; c < count; ++c) {
+      const float size = std::abs(value(c));
+      out[c] = size > out[c] ? size : out[c];
+    }
+  };
+  ForRows(range, [&](const Row& row) {
+    for (std::size_t c = 0; c < columns; ++c) band_.sum[c] += row.here[c];
+    raise(band_.x, columns - 1, [&](std::size_t c) { return row.X(c); });
+    raise(band_.xx, columns > 2 ? columns - 2 : 0, [&](std::size_t c) { return row.XX(c); });
+    if (row.below == nullptr) return;
+    raise(band_.y, columns, [&](std::size_t c) { return row.Y(c); });
+    raise(band_.xy, columns - 1, [&](std::size_t c) { return row.XY(c); });
+    if (row.above != nullptr) raise(band_.yy, columns, [&](std::size_t c) { return row.YY(c); });
+  });
+}
+
+}  // namespace terrace::dem

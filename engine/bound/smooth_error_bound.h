@@ -1,0 +1,77 @@
+// Error bound for tile cells whose nodes are evenly spaced on the raster grid. The bound follows from the second
+// differences of the samples: they limit how far the surface between nodes departs from the one between samples.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "engine/bound/geoid_error_bound.h"
+#include "engine/bound/grid_statistics.h"
+#include "engine/bound/node_steps.h"
+#include "engine/bound/tile_cells.h"
+#include "engine/mosaic/raster_grid.h"
+
+namespace terrace::dem {
+
+class SmoothErrorBound {
+ public:
+  // `blends`: raster grids are blended where one gives way to the next. The other arguments must outlive this object.
+  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+                   const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends);
+
+  // Makes BoundOver faster for boxes of cell rows `south` to `north`. Results do not depend on it.
+  void PrepareRows(int south, int north);
+
+  // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
+  // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
+  double BoundOver(const CellBox& box) const;
+
+  // Returns the bounds of the box's nodes, in averages; empty if one of them is not evenly spaced.
+  PixelBounds BoundsOf(const CellBox& box) const;
+
+ private:
+  // Largest first (x, y) and second (xx, yy, xy) differences of the samples in a box, in metres.
+  struct Bends {
+    double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
+  };
+  void PlaceNodes(const RasterGrid& grid);
+  bool GaveHeights(std::size_t row, std::size_t first, std::size_t end) const;
+  bool MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
+  // Returns false if a node or a neighbour of one is not evenly spaced.
+  bool Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
+  // Columns and rows of averages, ends included.
+  struct SampleRange {
+    std::int64_t left = 0, top = 0, right = -1, bottom = -1;
+  };
+  SampleRange RangeOf(const PixelBounds& at) const;
+  SampleRange Clipped(SampleRange range) const;
+  // Returns false if one of the averages is void.
+  bool Measure(const SampleRange& range, Bends& bends) const;
+  template <typename Step>
+  void ForRows(const SampleRange& range, const Step& step) const;
+  static double Largest(const Bends& bends, const NodeSteps& steps);
+  double LargestBlend(const CellBox& box) const;
+
+  const TileNodes tile_;
+  const GridTrace& trace_;
+  const GridStatistics& statistics_;
+  const GeoidErrorBound& geoid_;
+  const bool blends_;
+  const Position misplacement_;  // of samples, in averages
+  // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
+  std::unique_ptr<double[]> x_, y_;
+  bool is_separable_ = false;
+  int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
+
+  // By column of the trace's window, over rows `top` to `bottom` of the averages: the largest differences, as in Bends,
+  // of each average from the next ones to the east and to the south. And the sum of the averages; NaN if one is void.
+  struct Band {
+    std::int64_t top = 0, bottom = -1;
+    std::vector<float> x, y, xx, yy, xy, sum;
+  };
+  Band band_;
+};
+
+}  // namespace terrace::dem

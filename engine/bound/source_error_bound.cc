@@ -1,0 +1,291 @@
+#include "engine/bound/source_error_bound.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "engine/bound/cell_error_bound.h"
+#include "engine/bound/geoid_error_bound.h"
+#include "engine/bound/grid_statistics.h"
+#include "engine/bound/smooth_error_bound.h"
+#include "engine/common/dem_types.h"
+
+namespace terrace::dem {
+namespace {
+
+// Cells with a loose bound, at joints of averaged rasters, at rims and beside voids. Reading their samples tightens it.
+class LooseCells {
+ public:
+  // For larger factors the blocks of the statistics are as fine as the cells.
+  static bool MayRead(int factor) { return factor > 1 && factor <= 16; }
+
+  // The arguments must outlive this.
+  LooseCells(const RasterGrid& grid, const CellErrorBound& single) : grid_(grid), single_(single) {}
+
+  // Cells of a group are adjacent; their samples are read together.
+  void BeginGroup() { groups_.emplace_back(); }
+
+  // `error`: the known bound of the cell. Precondition: a group has begun.
+  void Add(const TileCell& cell, const CellErrorBound::CellSamples& place, double error) {
+    groups_.back().cells.push_back({cell, place, error});
+    groups_.back().error = std::max(groups_.back().error, error);
+  }
+
+  // Raises `bound` to the bound of all cells. Reads only groups that could raise it, and a bounded number of samples.
+  Result<void> Read(double& bound, const std::stop_token& stop) {
+    // Limit of samples for one tile and raster grid: about as many as the tile's heights are averaged from at the
+    // largest factor of MayRead.
+    constexpr std::int64_t kMaxSamples = std::int64_t{1} << 20;
+    // Largest bounds first: their results make reads of smaller ones unnecessary.
+    std::ranges::stable_sort(groups_, std::ranges::greater(), &Group::error);
+    std::int64_t left = kMaxSamples;
+    for (const Group& group : groups_) {
+      if (group.error <= bound) return {};
+      SampleBox all;
+      for (const Cell& loose : group.cells) {
+        if (loose.error > bound && !loose.place.samples.empty()) all = all.Around(loose.place.samples);
+      }
+      if (all.empty()) continue;
+      if (all.columns() > left || all.rows() > left || all.columns() * all.rows() > left) {
+        bound = group.error;
+        return {};
+      }
+      left -= all.columns() * all.rows();
+      const GridWindow window{all.west, all.north, all.columns(), all.rows()};
+      const auto samples = grid_.ReadSamples(window, stop);
+      if (!samples) return tl::unexpected(samples.error());
+      for (const Cell& loose : group.cells) {
+        if (loose.error <= bound) continue;
+        bound = std::max(bound,
+                         std::min(loose.error, single_.BoundBySamples(loose.cell, loose.place, window, *samples, 0)));
+      }
+    }
+    return {};
+  }
+
+ private:
+  struct Cell {
+    TileCell cell;
+    CellErrorBound::CellSamples place;
+    double error;
+  };
+  struct Group {
+    std::vector<Cell> cells;
+    double error = 0;
+  };
+
+  const RasterGrid& grid_;
+  const CellErrorBound& single_;
+  std::vector<Group> groups_;
+};
+
+}  // namespace
+
+// The bound for one raster grid: by groups of cells, and by single cells of groups that cannot be bounded as a whole.
+class GridErrorBound {
+ public:
+  GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridTrace& trace)
+      : tile_(tile),
+        nodes_{tile.lattice_, tile.window_, tile.heights_},
+        grid_(grid),
+        trace_(trace),
+        statistics_(grid, trace),
+        geoid_(nodes_, grid.undulations(), trace.undulations),
+        smooth_(nodes_, grid, trace, statistics_, geoid_, tile.blends_),
+        single_(nodes_, grid, trace, statistics_, geoid_),
+        loose_(grid, single_) {}
+
+  Result<void> Add(const std::stop_token& stop) {
+    constexpr int kGroup = SourceErrorBound::kGroup;
+    const int cells = nodes_.cells();
+    for (int south = 0; south < cells; south += kGroup) {
+      for (int west = 0; west < cells; west += kGroup) {
+        AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
+      }
+    }
+    return loose_.Read(tile_.bound_, stop);
+  }
+
+ private:
+  std::size_t CellIndex(int i, int j) const { return Area(j, nodes_.cells()) + static_cast<std::size_t>(i); }
+  bool Touches(const CellBox& box) const {
+    return grid_.reach().Touches(nodes_.West(box), nodes_.South(box), nodes_.Width(box), nodes_.Height(box));
+  }
+  void Raise(double error) { tile_.bound_ = std::max(tile_.bound_, error); }
+
+  // If raster grids are blended, every contributing raster grid is bounded separately, because blended heights lie
+  // between them. Filled heights count, too.
+  bool MayBlend(const CellBox& box) const {
+    if (!tile_.blends_) return false;
+    const PixelBounds at = smooth_.BoundsOf(box);
+    const double factor = trace_.factor;
+    if (!(at.west <= at.east)) return true;
+    if (trace_.includes_filled && CountInFull(at)) return false;
+    return grid_.MayBlend({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
+                          trace_.factor);
+  }
+
+  // Checks all samples around a box. Weights are rounded to 2^-10.
+  bool CountInFull(const PixelBounds& at) const {
+    if (trace_.weights.empty()) return true;
+    const GridWindow& window = trace_.window;
+    const auto west = static_cast<std::int64_t>(std::floor(at.west)) - 1;
+    const auto east = static_cast<std::int64_t>(std::floor(at.east)) + 2;
+    const auto north = static_cast<std::int64_t>(std::floor(at.north)) - 1;
+    const auto south = static_cast<std::int64_t>(std::floor(at.south)) + 2;
+    if (west < window.column || east >= window.column + window.columns || north < window.row ||
+        south >= window.row + window.rows) {
+      return false;
+    }
+    for (std::int64_t row = north; row <= south; ++row) {
+      const auto first = trace_.weights.begin() + (row - window.row) * window.columns + (west - window.column);
+      if (std::any_of(first, first + (east - west + 1), [](float weight) { return weight < 1; })) return false;
+    }
+    return true;
+  }
+
+  // Whether the box may have filled heights that the trace does not contain.
+  bool MayBeFilled(const CellBox& box) const {
+    if (trace_.includes_filled) return false;
+    const PixelBounds at = smooth_.BoundsOf(box);
+    const double factor = trace_.factor;
+    const auto has_voids = [&] {
+      return grid_
+          .Ranges({(at.west - 1) * factor, (at.north - 1) * factor, (at.east + 2) * factor, (at.south + 2) * factor})
+          .has_voids;
+    };
+    return !(at.west <= at.east) || has_voids();
+  }
+
+  bool HasCell(const CellBox& box, std::uint8_t covered) const {
+    for (int j = box.south; j < box.north; ++j) {
+      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+      const auto end = first + (box.east - box.west);
+      if (std::find(first, end, covered) != end) return true;
+    }
+    return false;
+  }
+  bool IsPartlyCovered(const CellBox& box) const { return HasCell(box, 1); }
+  bool IsCovered(const CellBox& box) const { return !HasCell(box, 0); }
+
+  void AddGroup(const CellBox& box) {
+    if (IsCovered(box) || !Touches(box)) return;
+    if (prepared_south_ != box.south) smooth_.PrepareRows(box.south, box.north);
+    prepared_south_ = box.south;
+    has_loose_group_ = false;
+    AddBox(box, true);
+  }
+
+  // Bounds the box as a whole if possible; else its quarters, down to single cells. `may_give_way`: the box that this
+  // is a quarter of is blended.
+  void AddBox(const CellBox& box, bool may_give_way) {
+    if (!Touches(box)) return;
+    const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
+    const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
+    const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
+    if (!std::isfinite(error)) {
+      if (!tile_.blends_ && HasNoHeights(box) && single_.HasNoSamples(box)) return;
+      return Divide(box, may_blend);
+    }
+    Raise(error);
+    if (may_blend) return;
+    for (int j = box.south; j < box.north; ++j) {
+      const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(box.west, j));
+      std::fill_n(first, box.east - box.west, 1);
+    }
+  }
+
+  // Whether no node of the box took its height from the raster grid.
+  bool HasNoHeights(const CellBox& box) const {
+    for (int j = box.south; j <= box.north; ++j) {
+      const auto first = trace_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeOf(box.west, j));
+      if (!std::all_of(first, first + (box.east - box.west + 1), [](float height) { return std::isnan(height); })) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+  void Divide(const CellBox& box, bool may_blend) {
+    constexpr int kSmallest = 2;
+    if (box.east - box.west <= kSmallest) {
+      for (int j = box.south; j < box.north; ++j) {
+        for (int i = box.west; i < box.east; ++i) {
+          if (tile_.covered_[CellIndex(i, j)] == 0) AddCell(i, j, may_blend && MayBlend({i, j, i + 1, j + 1}));
+        }
+      }
+      return;
+    }
+    const int middle_x = (box.west + box.east) / 2, middle_y = (box.south + box.north) / 2;
+    for (const CellBox& quarter :
+         {CellBox{box.west, box.south, middle_x, middle_y}, CellBox{middle_x, box.south, box.east, middle_y},
+          CellBox{box.west, middle_y, middle_x, box.north}, CellBox{middle_x, middle_y, box.east, box.north}}) {
+      if (!IsCovered(quarter)) AddBox(quarter, may_blend);
+    }
+  }
+
+  void AddCell(int i, int j, bool may_blend) {
+    const bool fills = may_blend && !trace_.includes_filled;
+    const TileCell cell = nodes_.Cell(i, j);
+    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return std::isnan(trace_.heights[node]); })) {
+      if (Touches(cell.box())) AddUneven(cell, may_blend, fills, kUnknownError);
+      return;
+    }
+    bool has_voids = false;
+    double error = single_.BoundByAverages(cell, has_voids);
+    if (fills && (has_voids || MayBeFilled(cell.box()))) return AddUneven(cell, true, true, kUnknownError);
+    double smooth = kUnknownError;
+    if (!has_voids) {
+      if (!may_blend) tile_.covered_[CellIndex(i, j)] = 1;
+      smooth = smooth_.BoundOver(cell.box());
+      if (smooth < error) error = smooth;
+    }
+    if (std::isfinite(smooth)) return Raise(error);
+    AddUneven(cell, may_blend, fills, error);
+  }
+
+  // `known`: a bound known so far.
+  void AddUneven(const TileCell& cell, bool may_blend, bool fills, double known) {
+    if (known <= tile_.bound_) return;
+    std::optional<CellErrorBound::CellSamples> place;
+    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, place));
+    if (error <= tile_.bound_) return;
+    if (!place || !LooseCells::MayRead(trace_.factor)) return Raise(error);
+    if (!has_loose_group_) loose_.BeginGroup();
+    has_loose_group_ = true;
+    loose_.Add(cell, *place, error);
+  }
+
+  SourceErrorBound& tile_;
+  const TileNodes nodes_;
+  const RasterGrid& grid_;
+  const GridTrace& trace_;
+  const GridStatistics statistics_;
+  const GeoidErrorBound geoid_;
+  SmoothErrorBound smooth_;
+  const CellErrorBound single_;
+  LooseCells loose_;
+  int prepared_south_ = -1;       // of smooth_
+  bool has_loose_group_ = false;  // the current group
+};
+
+SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,
+                                   std::span<const float> heights, bool blends)
+    : lattice_(lattice),
+      window_(window),
+      heights_(heights),
+      blends_(blends),
+      covered_(Area(lattice.cells, lattice.cells)) {}
+
+Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {
+  return GridErrorBound(*this, grid, trace).Add(stop);
+}
+
+bool SourceErrorBound::is_covered() const {
+  return std::ranges::all_of(covered_, [](std::uint8_t covered) { return covered != 0; });
+}
+
+}  // namespace terrace::dem

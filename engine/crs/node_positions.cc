@@ -1,0 +1,273 @@
+#include "engine/crs/node_positions.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+namespace terrace::dem {
+namespace {
+
+constexpr int kCellNodes = 32;  // divides the size of all grids, so cells never cross the antimeridian or a pole
+
+// A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
+struct Cell {
+  std::int64_t column, row;
+  int size;
+};
+
+// Cells are interpolated from kKnots x kKnots positions, the outermost on their edges.
+constexpr int kKnots = 5;
+constexpr int kMinCell = 2 * (kKnots - 1);  // smaller ones have hardly more nodes than that
+
+// Lagrange weights of the knots at `step` nodes from a cell's edge.
+std::array<double, kKnots> Weights(double step, int size) {
+  const double t = step * (kKnots - 1) / size;
+  std::array<double, kKnots> weights;
+  for (int i = 0; i < kKnots; ++i) {
+    double weight = 1;
+    for (int k = 0; k < kKnots; ++k) {
+      if (k != i) weight *= (t - k) / (i - k);
+    }
+    weights[static_cast<std::size_t>(i)] = weight;
+  }
+  return weights;
+}
+
+// Centres of a lattice's cells, each counted as the node at its south-western corner.
+struct CellCentres {
+  explicit CellCentres(const geo::Lattice& lattice) : halves{lattice.level, 2 * lattice.cells} {}
+
+  double Longitude(std::int64_t column) const { return halves.Longitude(2 * column + 1); }
+  double Latitude(std::int64_t row) const { return halves.Latitude(2 * row + 1); }
+  double StepDegrees() const { return 2 * halves.StepDegrees(); }
+  std::int64_t rows() const { return halves.rows() / 2; }
+
+  geo::Lattice halves;
+};
+
+template <typename Grid>
+class GridNodes {
+ public:
+  GridNodes(const Georeference& georeference, const Footprint& footprint, const Grid& grid, const NodeWindow& window,
+            double tolerance)
+      : georeference_(georeference), footprint_(footprint), grid_(grid), window_(window), tolerance_(tolerance) {}
+
+  NodePositions Compute() && {
+    if (georeference_.is_affine() && georeference_.is_geographic_grid()) return ColumnsAndRows();
+    positions_.assign(Area(window_.columns, window_.rows), kNowhere);
+    FillNodes();
+    return {window_, std::move(positions_)};
+  }
+
+ private:
+  void FillNodes() {
+    if (georeference_.is_affine()) {
+      FillExactly(window_.column, window_.row, window_.columns, window_.rows);
+    } else {
+      const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
+      const std::int64_t east = window_.column + window_.columns;
+      first_column_ = FloorCell(window_.column);
+      first_row_ = FloorCell(std::max<std::int64_t>(window_.row, 0));
+      knots_across_ = (FloorCell(east - 1) - first_column_) / kKnotSpacing + kKnots;
+      const std::int64_t knots_up = std::max<std::int64_t>(FloorCell(last_row) - first_row_, 0) / kKnotSpacing + kKnots;
+      knots_.assign(static_cast<std::size_t>(knots_across_ * knots_up), kNotAsked);
+      for (std::int64_t row = first_row_; row <= last_row; row += kCellNodes) {
+        for (std::int64_t column = first_column_; column < east; column += kCellNodes) {
+          Fill({column, row, kCellNodes});
+        }
+      }
+    }
+    FillPoleRows();
+  }
+
+  static std::int64_t FloorCell(std::int64_t node) { return node - (node % kCellNodes + kCellNodes) % kCellNodes; }
+
+  Position Degrees(std::int64_t column, std::int64_t row) const {
+    return {grid_.Longitude(column), grid_.Latitude(row)};
+  }
+  Position* At(std::int64_t column, std::int64_t row) {
+    return &positions_[static_cast<std::size_t>((row - window_.row) * window_.columns + (column - window_.column))];
+  }
+
+  // Part of a cell inside the tile's window, as ranges of columns and rows (end exclusive).
+  struct Part {
+    std::int64_t west, south, east, north;
+    bool empty() const { return west >= east || south >= north; }
+  };
+  Part Inside(const Cell& cell) const {
+    return {std::max(cell.column, window_.column), std::max(cell.row, window_.row),
+            std::min(cell.column + cell.size, window_.column + window_.columns),
+            std::min(cell.row + cell.size, window_.row + window_.rows)};
+  }
+
+  void FillExactly(std::int64_t column, std::int64_t row, std::int64_t columns, std::int64_t rows) {
+    for (std::int64_t r = row; r < row + rows; ++r) {
+      for (std::int64_t c = column; c < column + columns; ++c) *At(c, r) = Degrees(c, r);
+      georeference_.ToPixels({At(column, r), static_cast<std::size_t>(columns)});
+    }
+  }
+
+  NodePositions ColumnsAndRows() const {
+    std::vector<Position> columns(static_cast<std::size_t>(window_.columns)),
+        rows(static_cast<std::size_t>(window_.rows));
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      columns[c] = Degrees(window_.column + static_cast<std::int64_t>(c), window_.row);
+    }
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      rows[r] = Degrees(window_.column, window_.row + static_cast<std::int64_t>(r));
+    }
+    georeference_.ToPixels(columns);
+    georeference_.ToPixels(rows);
+    std::vector<double> x, y;
+    for (const Position& column : columns) x.push_back(column.x);
+    for (const Position& row : rows) y.push_back(row.y);
+    return {window_, std::move(x), std::move(y)};
+  }
+
+  bool Touches(const Cell& cell) const {
+    const auto [south, north] = std::minmax({grid_.Latitude(cell.row), grid_.Latitude(cell.row + cell.size)});
+    return footprint_.Touches(grid_.Longitude(cell.column), south, cell.size * grid_.StepDegrees(), north - south);
+  }
+
+  void Fill(const Cell& cell) {
+    const Part part = Inside(cell);
+    if (part.empty() || !Touches(cell)) return;
+    if (cell.size < kMinCell) {
+      FillExactly(part.west, part.south, part.east - part.west, part.north - part.south);
+    } else if (!Interpolate(cell, part)) {
+      const int half = cell.size / 2;
+      Fill({cell.column, cell.row, half});
+      Fill({cell.column + half, cell.row, half});
+      Fill({cell.column, cell.row + half, half});
+      Fill({cell.column + half, cell.row + half, half});
+    }
+  }
+
+  bool Interpolate(const Cell& cell, const Part& part) {
+    // The knots, and four nodes where a polynomial term of the next degree is near its maximum.
+    constexpr std::size_t kTried = 4;
+    const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
+    const std::array<std::array<int, 2>, kTried> tried = {
+        {{near, half}, {half, near}, {cell.size - near, half}, {half, cell.size - near}}};
+    constexpr std::size_t kAll = kKnots * kKnots + kTried;
+    std::array<Position, kAll> known, fresh;
+    std::array<Position*, kAll> place_of;
+    std::size_t asked = 0;
+    const auto ask = [&](std::int64_t column, std::int64_t row, Position* place) {
+      fresh[asked] = Degrees(column, row);
+      place_of[asked++] = place;
+    };
+    // Whole cells share the knots on their edges.
+    const bool is_whole = cell.size == kCellNodes;
+    for (int i = 0; i < kKnots * kKnots; ++i) {
+      const std::int64_t column = cell.column + i % kKnots * spacing, row = cell.row + i / kKnots * spacing;
+      Position* const place = is_whole ? KnotAt(column, row) : &known[static_cast<std::size_t>(i)];
+      if (!is_whole || !IsAsked(*place)) ask(column, row, place);
+    }
+    for (std::size_t i = 0; i < kTried; ++i) {
+      ask(cell.column + tried[i][0], cell.row + tried[i][1], &known[kKnots * kKnots + i]);
+    }
+    georeference_.ToPixels({fresh.data(), asked});
+    for (std::size_t i = 0; i < asked; ++i) *place_of[i] = fresh[i];
+    for (int i = 0; i < kKnots * kKnots && is_whole; ++i) {
+      known[static_cast<std::size_t>(i)] = *KnotAt(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
+    }
+    if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
+    // Interpolates the knots' columns at one row, then any node of that row.
+    const auto row_at = [&](std::int64_t row) {
+      const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
+      std::array<Position, kKnots> sums;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        for (std::size_t j = 0; j < kKnots; ++j) {
+          sums[i].x += y[j] * known[kKnots * j + i].x;
+          sums[i].y += y[j] * known[kKnots * j + i].y;
+        }
+      }
+      return sums;
+    };
+    const auto at = [](const std::array<Position, kKnots>& sums, const std::array<double, kKnots>& x) {
+      Position sum;
+      for (std::size_t i = 0; i < kKnots; ++i) {
+        sum.x += x[i] * sums[i].x;
+        sum.y += x[i] * sums[i].y;
+      }
+      return sum;
+    };
+    for (std::size_t i = 0; i < kTried; ++i) {
+      const Position tried_at = at(row_at(cell.row + tried[i][1]), Weights(tried[i][0], cell.size));
+      const Position& exact = known[kKnots * kKnots + i];
+      if (!(std::abs(tried_at.x - exact.x) <= tolerance_ && std::abs(tried_at.y - exact.y) <= tolerance_)) return false;
+    }
+    std::array<std::array<double, kKnots>, kCellNodes> weights;
+    for (std::int64_t column = part.west; column < part.east; ++column) {
+      weights[static_cast<std::size_t>(column - cell.column)] =
+          Weights(static_cast<double>(column - cell.column), cell.size);
+    }
+    for (std::int64_t row = part.south; row < part.north; ++row) {
+      const auto sums = row_at(row);
+      for (std::int64_t column = part.west; column < part.east; ++column) {
+        *At(column, row) = at(sums, weights[static_cast<std::size_t>(column - cell.column)]);
+      }
+    }
+    return true;
+  }
+
+  Position* KnotAt(std::int64_t column, std::int64_t row) {
+    return &knots_[static_cast<std::size_t>((row - first_row_) / kKnotSpacing * knots_across_ +
+                                            (column - first_column_) / kKnotSpacing)];
+  }
+  static bool IsAsked(const Position& knot) { return knot.x != kNotAsked.x; }  // NaN: it has no position
+
+  void FillPoleRows() {
+    for (std::int64_t row = window_.row; row < window_.row + window_.rows; ++row) {
+      if (!IsPoleRow(grid_, row)) continue;
+      Position pole{0, grid_.Latitude(row)};
+      georeference_.ToPixels({&pole, 1});
+      std::fill_n(At(window_.column, row), window_.columns, pole);
+    }
+  }
+
+  const Georeference& georeference_;
+  const Footprint& footprint_;
+  const Grid grid_;
+  const NodeWindow window_;
+  const double tolerance_;
+  std::vector<Position> positions_;
+
+  // Of whole cells, row by row from the first one.
+  static constexpr int kKnotSpacing = kCellNodes / (kKnots - 1);
+  static constexpr Position kNotAsked{std::numeric_limits<double>::infinity(), 0};
+  std::int64_t first_column_ = 0, first_row_ = 0, knots_across_ = 0;
+  std::vector<Position> knots_;
+};
+
+}  // namespace
+
+NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key) {
+  return {lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3, lattice.cells + 3};
+}
+
+template <typename Grid>
+NodePositions NodePositions::Of(const Georeference& georeference, const Footprint& footprint, const Grid& grid,
+                                const NodeWindow& window, double tolerance) {
+  return GridNodes(georeference, footprint, grid, window, tolerance).Compute();
+}
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::Lattice&, const NodeWindow&,
+                                         double);
+template NodePositions NodePositions::Of(const Georeference&, const Footprint&, const geo::MercatorGrid&,
+                                         const NodeWindow&, double);
+
+std::vector<Position> CellCentrePositions(const Georeference& georeference, const Footprint& footprint,
+                                          const geo::Lattice& lattice, const geo::TileKey& key, double tolerance) {
+  const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells, lattice.cells};
+  const NodePositions found = NodePositions::Of(georeference, footprint, CellCentres(lattice), window, tolerance);
+  std::vector<Position> centres;
+  centres.reserve(found.columns() * found.rows());
+  for (std::size_t j = 0; j < found.rows(); ++j) {
+    for (std::size_t i = 0; i < found.columns(); ++i) centres.push_back(found.At(i, j));
+  }
+  return centres;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,41 @@
+#include "engine/crs/vertical_datum.h"
+
+#include <filesystem>
+#include <system_error>
+#include <utility>
+
+#include "engine/gdal/source_policy.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr const char* kWayOut =
+    "; or let `vertical` say what the heights count from (\"ellipsoid\", \"egm96\", \"egm2008\", \"unknown\" to pass "
+    "them through, or a grid of undulations)";
+
+Result<VerticalDatum> Above(Result<std::shared_ptr<const Geoid>> geoid) {
+  if (!geoid) return MakeError(geoid.error().code, "{}{}", geoid.error().message, kWayOut);
+  std::string name = (*geoid)->name();
+  return VerticalDatum{std::move(name), *std::move(geoid)};
+}
+
+}  // namespace
+
+Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georeference& stated, Position centre) {
+  if (wanted == "unknown") return VerticalDatum{};
+  if (wanted == "ellipsoid") return VerticalDatum{"ellipsoid", nullptr};
+  if (wanted == "egm96") return Above(Geoid::OfCrs("EPSG:5773", centre));
+  if (wanted == "egm2008") return Above(Geoid::OfCrs("EPSG:3855", centre));
+  if (wanted.starts_with("EPSG:")) return Above(Geoid::OfCrs(wanted, centre));
+  if (wanted != "crs") {
+    std::error_code ignored;
+    if (std::filesystem::exists(wanted, ignored)) {
+      if (auto allowed = CheckPlainFile(wanted); !allowed) return tl::unexpected(allowed.error());
+    }
+    return Above(Geoid::OfGrid(wanted, centre));
+  }
+  if (!stated.vertical_crs().empty()) return Above(Geoid::OfCrs(stated.vertical_crs(), centre));
+  return VerticalDatum{stated.vertical_datum(), nullptr};
+}
+
+}  // namespace terrace::dem

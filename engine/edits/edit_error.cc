@@ -1,0 +1,82 @@
+#include "engine/edits/edit_error.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace terrace::dem {
+namespace {
+
+// A bound of the distance between the target and the surface between its values at the nodes of a cell. The target
+// beyond a polygon is that of the nearest point of its outline, which for a convex one is no further away than the
+// points themselves.
+double TargetError(const Edit& edit, double diagonal_m, double furthest_m) {
+  if (edit.op == EditOp::kOffset) return 0;
+  const double range = edit.high_m - edit.low_m;  // of flatten: of the geoid
+  if (edit.is_convex) return std::min(range, 2 * edit.steepest * diagonal_m);
+  if (edit.is_area && edit.triangles.empty()) {
+    return std::min(range, 2 * edit.steepest * (diagonal_m + 2 * furthest_m));
+  }
+  return range;
+}
+
+}  // namespace
+
+EditError::EditError(const NodeWindow& window, double error_m) : window_(window), before_(error_m) {
+  cells_.assign(Area(window.columns - 1, window.rows - 1), -1);
+}
+
+void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
+                    double tau_m) {
+  const auto stride = static_cast<std::size_t>(part.columns);
+  for (int j = 0; j + 1 < part.rows; ++j) {
+    for (int i = 0; i + 1 < part.columns; ++i) {
+      const std::size_t at = Area(part.columns, j) + static_cast<std::size_t>(i);
+      const std::array<const EditedNode*, 4> corners = {&nodes[at], &nodes[at + 1], &nodes[at + stride],
+                                                        &nodes[at + stride + 1]};
+      double nearest = std::numeric_limits<double>::infinity(), furthest = 0, difference = 0;
+      bool is_above = false, is_below = false;
+      for (const EditedNode* node : corners) {
+        const double distance = node->place.distance_m;
+        nearest = std::min(nearest, distance);
+        furthest = std::max(furthest, distance);
+        const double low = std::isnan(node->target) ? edit.low_m : node->target;
+        const double high = std::isnan(node->target) ? edit.high_m : node->target;
+        const bool is_unknown = edit.op == EditOp::kReplace && std::isnan(node->target);
+        if (edit.op == EditOp::kOffset) {
+          difference = std::abs(edit.offset_m);
+        } else if (!is_unknown) {
+          difference = std::max({difference, std::abs(node->height - low), std::abs(node->height - high)});
+        }
+        is_above |= node->height > low;
+        is_below |= node->height < high;
+      }
+      // A distance changes by at most the length of a move, and each point of the cell is within half a diagonal of a
+      // node.
+      const double high_share = edit.ShareAt(std::max(nearest - diagonal_m / 2, 0.0));
+      const double low_share = edit.ShareAt(furthest + diagonal_m / 2);
+      if (high_share <= 0) continue;
+      double& error = cells_[Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i)];
+      const double before = error < 0 ? before_ : error;
+      const double tau = edit.op == EditOp::kReplace ? tau_m : TargetError(edit, diagonal_m, furthest + diagonal_m / 2);
+      const bool one_way = edit.op == EditOp::kCarve || edit.op == EditOp::kRaise;
+      const double kept = one_way || edit.op == EditOp::kOffset ? 1 : 1 - low_share;
+      error = kept * before + (high_share - low_share) * difference + high_share * tau;
+      if (one_way && is_above && is_below) error += high_share * difference;
+    }
+  }
+}
+
+double EditError::bound() const {
+  constexpr double kRounding = 0x1p-10;  // of edited heights, and of the arithmetic
+  double largest = before_;
+  for (int j = 1; j + 2 < window_.rows; ++j) {  // without the halo's cells
+    for (int i = 1; i + 2 < window_.columns; ++i) {
+      largest = std::max(largest, cells_[Area(window_.columns - 1, j) + static_cast<std::size_t>(i)]);
+    }
+  }
+  return largest + kRounding;
+}
+
+}  // namespace terrace::dem

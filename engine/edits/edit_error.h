@@ -1,0 +1,46 @@
+// The certified error of edited heights (docs/decisions/0022-edits.md).
+//
+// Let S be the surface that is bilinear between nodes of heights s, h a sample of the sources, and e a bound of |S - h|
+// in a cell. An edit with the share w and the target t makes s' = s + w (t - s) of nodes and of samples alike. With the
+// share between w0 and w1 in the cell, d the largest |t - s| at its nodes, and tau a bound of the distance between the
+// target and its bilinear surface,
+//   S' - h' = (1 - w)(S - h) + bilinear((w_node - w)(t - s)) + w (bilinear(t) - t)
+//   |S' - h'| <= (1 - w0) e + (w1 - w0) d + w1 tau.
+// An offset has t - s constant. Carving and raising have max(0, +-(s - t)) in the place of t - s: where it changes its
+// sign in the cell, w1 d is added, and e is not reduced.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/edits/edit.h"
+#include "engine/edits/edit_shape.h"
+
+namespace terrace::dem {
+
+// A node as an edit finds it.
+struct EditedNode {
+  EditPlace place;
+  double height = 0;  // before the edit
+  double target = 0;  // NaN: unknown, the share is 0
+};
+
+class EditError {
+ public:
+  // `window`: of a tile with a halo of one. `error_m`: the bound before the edits.
+  EditError(const NodeWindow& window, double error_m);
+
+  // `part`: the nodes, relative to the window. `diagonal_m`: of a cell. `tau_m`: of a replacement.
+  void Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
+           double tau_m);
+
+  double bound() const;
+
+ private:
+  NodeWindow window_;
+  double before_;
+  std::vector<double> cells_;  // by cell of the window; negative: before_
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,85 @@
+// All edits of a dataset, and their effect on heights.
+//
+// The edited height of a node depends on the node's position and on its unedited height alone, so neighbours that share
+// a node share its edited height. Edits apply in their order: later ones see what earlier ones have left.
+//
+// Immutable; thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <stop_token>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/common/box_index.h"
+#include "engine/common/dem_types.h"
+#include "engine/core/result.h"
+#include "engine/edits/edit.h"
+#include "engine/edits/edit_shape.h"
+#include "engine/geo/lattice.h"
+
+namespace terrace::dem {
+
+// Another source's heights at the nodes of a window; NaN where it has none.
+struct ReplacedHeights {
+  std::vector<float> heights;
+  double error_m = 0;  // of the surface between them, to that source's samples
+};
+// The result stays valid until Apply returns.
+using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
+
+// The last row of each edit, by its number: points on one parallel share it.
+using EditRows = std::unordered_map<std::size_t, EditRow>;
+
+class EditSet {
+ public:
+  // Complete edits.
+  explicit EditSet(std::vector<Edit> edits);
+
+  const std::vector<Edit>& edits() const { return edits_; }
+
+  // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order. Each thread remembers
+  // the last box without edits: a tile asks for its surroundings first, and then for many boxes within these.
+  std::vector<std::size_t> Find(const Box& degrees) const;
+  // Whether Find would find any; faster if it would find many.
+  bool Any(const Box& degrees) const;
+
+  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
+  // in, an upper bound of the distance between the surface through the tile's nodes and the samples of the sources;
+  // out, the same of the edited surface and the edited samples. The window then has a halo of one, which does not
+  // count. Errors: kCancelled.
+  template <typename NodeGrid>
+  Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
+                     std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
+                     double* error_m = nullptr) const;
+
+  // The same for one position. `height` and the result: NaN if there is none, as in holes. `replaced`: the height of a
+  // replacement at this position. `rows`: kept from one position to the next, empty at first.
+  double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
+                 const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
+
+  // A range of heights after the edits. `replaced`: the range of a replacement.
+  HeightRange Extended(HeightRange range, std::span<const std::size_t> which,
+                       const std::function<HeightRange(const Edit&)>& replaced) const;
+
+  // What the edits ask of the mesh of a window of nodes without a halo (engine/common/dem_types.h). Empty members if
+  // they ask nothing.
+  MeshDemands DemandsOf(const geo::Lattice& lattice, const NodeWindow& window,
+                        std::span<const std::size_t> which) const;
+
+ private:
+  std::vector<Edit> edits_;
+  BoxIndex index_;
+  std::uint64_t number_;  // no other set of this process has it
+};
+
+// Calls visit(column, row) for the nodes of the window along the line from `a` to `b`: the nearest node in each column,
+// or in each row if the line is steeper than a diagonal. Also calls it for a few nodes beside the window. Columns count
+// on beyond a turn around the Earth.
+void ForNodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const EditPlane& plane, PlanPoint a,
+                   PlanPoint b, const std::function<void(std::int64_t, std::int64_t)>& visit);
+
+}  // namespace terrace::dem

@@ -1,0 +1,44 @@
+// The geometry of an edit at nodes: distances, and heights of its target.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "engine/edits/edit.h"
+
+namespace terrace::dem {
+
+// The nearest point of an edit's outline or line.
+struct EditPlace {
+  double distance_m = 0;   // 0 inside a polygon; beyond the reach: some number above it
+  bool is_inside = false;  // of a polygon
+  std::uint32_t ring = 0, edge = 0;
+  double along = 0;  // 0 .. 1 on the edge
+};
+
+// The points of an edit's plane at one y: edges that are too far are left out once for the row.
+class EditRow {
+ public:
+  EditRow(const Edit& edit, double y);
+  EditPlace At(double x) const;
+  double y() const { return y_; }
+
+ private:
+  struct Edge {
+    PlanPoint a, b;
+    double inverse_length2;
+    std::uint32_t ring, edge;
+  };
+  const Edit& edit_;
+  double y_;
+  std::vector<double> crossings_;  // of rings, ascending
+  std::vector<Edge> edges_;        // within reach of the row
+};
+
+// The height that the edit aims at. Precondition: flatten, slope, carve or raise.
+double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place);
+
+// Divides a simple polygon into triangles by cutting off ears. Empty if it is not simple.
+std::vector<std::array<std::uint32_t, 3>> CutEars(const std::vector<PlanPoint>& ring);
+
+}  // namespace terrace::dem

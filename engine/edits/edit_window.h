@@ -1,0 +1,61 @@
+// The part of a window of nodes that an edit may reach.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <vector>
+
+#include "engine/common/box_index.h"
+#include "engine/common/dem_types.h"
+
+namespace terrace::dem {
+
+// Positions of a window's columns and rows.
+template <typename NodeGrid>
+class WindowAxes {
+ public:
+  WindowAxes(const NodeGrid& grid, const NodeWindow& window)
+      : west_(grid.Longitude(window.column)), step_(grid.StepDegrees()) {
+    for (int i = 0; i < window.columns; ++i) longitudes_.push_back(grid.Longitude(window.column + i));
+    for (int j = 0; j < window.rows; ++j) latitudes_.push_back(grid.Latitude(window.row + j));
+  }
+
+  double longitude(int i) const { return longitudes_[static_cast<std::size_t>(i)]; }
+  double latitude(int j) const { return latitudes_[static_cast<std::size_t>(j)]; }
+  double step() const { return step_; }
+
+  struct Part {
+    int first_column, last_column, first_row, last_row;
+  };
+  // The nodes of all cells that the box touches, for each turn around the Earth: at most three parts.
+  std::vector<Part> PartsOf(const Box& box) const {
+    const auto rows = static_cast<int>(latitudes_.size()), columns = static_cast<int>(longitudes_.size());
+    const bool ascends = rows < 2 || latitudes_.front() < latitudes_.back();
+    const auto below = std::ranges::partition_point(
+        latitudes_, [&](double latitude) { return ascends ? latitude < box.south : latitude > box.north; });
+    const auto above = std::ranges::partition_point(
+        latitudes_, [&](double latitude) { return ascends ? latitude <= box.north : latitude >= box.south; });
+    const int first_row = std::max(static_cast<int>(below - latitudes_.begin()) - 1, 0);
+    const int last_row = std::min(static_cast<int>(above - latitudes_.begin()), rows - 1);
+    std::vector<Part> parts;
+    int beyond = -1;  // columns of the last part
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+      const double first = std::floor((box.west + turn - west_) / step_),
+                   last = std::ceil((box.east + turn - west_) / step_);
+      if (last < 0 || first > columns - 1 || first_row > last_row) continue;
+      const Part part{std::max(std::max(static_cast<int>(std::max(first, 0.0)), 0), beyond + 1),
+                      static_cast<int>(std::min(last, columns - 1.0)), first_row, last_row};
+      if (part.first_column > part.last_column) continue;
+      beyond = part.last_column;
+      parts.push_back(part);
+    }
+    return parts;
+  }
+
+ private:
+  double west_, step_;
+  std::vector<double> longitudes_, latitudes_;
+};
+
+}  // namespace terrace::dem

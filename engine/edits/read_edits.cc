@@ -1,0 +1,108 @@
+#include "engine/edits/read_edits.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <exception>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <utility>
+
+#include "engine/edits/parse_edit.h"
+
+namespace terrace::dem {
+
+std::string EditFault::Text() const {
+  std::string text = file;
+  if (feature) text += fmt::format(": feature {}", *feature);
+  if (place) text += fmt::format(" at {:.6f}, {:.6f} (lat, lon)", place->latitude, place->longitude);
+  return text + ": " + message;
+}
+
+std::string TextOf(const std::vector<EditFault>& faults) {
+  constexpr std::size_t kMost = 20;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(faults.size(), kMost); ++i) text += (i > 0 ? "\n" : "") + faults[i].Text();
+  if (faults.size() > kMost) text += fmt::format("\nand {} more", faults.size() - kMost);
+  return text;
+}
+
+namespace {
+
+// The member "terrain" of a collection: {"vertical": ...} for all features that do not state their own.
+void ReadCommon(const nlohmann::json& common, const std::string& path, std::span<Edit> edits,
+                std::vector<EditFault>& faults) {
+  const auto fail = [&](std::string message) { faults.push_back({path, {}, {}, std::move(message)}); };
+  if (!common.is_object()) return fail(R"(its "terrain" must be an object, such as {"vertical": "orthometric"})");
+  for (const auto& [key, value] : common.items()) {
+    if (key != "vertical") {
+      fail(fmt::format("unknown member \"{}\" of its \"terrain\"; it may have \"vertical\"", key));
+      continue;
+    }
+    const auto datum = ParseDatum(value);
+    if (!datum) {
+      fail(datum.error());
+      continue;
+    }
+    for (Edit& edit : edits) {
+      if (edit.has_heights() && edit.datum == EditDatum::kNone) edit.datum = *datum;
+    }
+  }
+}
+
+}  // namespace
+
+void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<EditFault>& faults) {
+  using nlohmann::json;
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) {
+    faults.push_back({path, {}, {}, "cannot be read; name a GeoJSON file"});
+    return;
+  }
+  std::size_t features = 0;
+  const std::size_t first = edits.size();
+  bool in_features = false, has_features = false;
+  const auto take = [&](const json& feature) {
+    if (auto edit = ParseEdit(feature, path, features, faults)) edits.push_back(*std::move(edit));
+    ++features;
+  };
+  // The features of a collection are parsed one by one, and not kept.
+  const json::parser_callback_t each = [&](int depth, json::parse_event_t event, json& value) {
+    if (event == json::parse_event_t::key && depth == 1) {
+      in_features = value == "features";
+      has_features |= in_features;
+    }
+    if (event == json::parse_event_t::object_end && depth == 2 && in_features) {
+      take(value);
+      return false;
+    }
+    return true;
+  };
+  try {
+    const json root = json::parse(stream, each);
+    const bool is_object = root.is_object();
+    const std::string type = is_object && root.contains("type") && root["type"].is_string() ? root["type"] : "";
+    if (type == "Feature") {
+      take(root);
+    } else if (type != "FeatureCollection" || !has_features) {
+      faults.push_back({path, {}, {}, "is no GeoJSON FeatureCollection; edits are its features (RFC 7946)"});
+    }
+    if (is_object && root.contains("terrain"))
+      ReadCommon(root["terrain"], path, std::span(edits).subspan(first), faults);
+    if (is_object && root.contains("crs")) {
+      const std::string crs = root["crs"].dump();
+      if (crs.find("CRS84") == std::string::npos && crs.find("4326") == std::string::npos) {
+        faults.push_back({path,
+                          {},
+                          {},
+                          "names a reference system; GeoJSON has longitude and latitude of WGS 84: "
+                          "convert it with ogr2ogr -t_srs EPSG:4326"});
+      }
+    }
+  } catch (const std::exception& error) {
+    faults.push_back({path, {}, {}, fmt::format("is no JSON: {}", error.what())});
+  }
+}
+
+}  // namespace terrace::dem

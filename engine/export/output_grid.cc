@@ -1,0 +1,134 @@
+#include "engine/export/output_grid.h"
+
+#include <fmt/format.h>
+#include <ogr_spatialref.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "engine/core/plain_number.h"
+#include "engine/crs/projector.h"
+#include "engine/gdal/gdal_runtime.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr int kWgs84 = 4326;
+// Units of a projected CRS, or degrees by 10^-5: a position that comes back farther away has no inverse.
+constexpr double kReturn = 1;
+// Nodes between two that are transformed back.
+constexpr std::size_t kCheckPeriod = 61;
+
+tl::unexpected<Error> Invalid(std::string message) {
+  return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
+}
+
+Result<void> SetCrs(int epsg, OutputGrid& grid) {
+  grid.epsg = epsg;
+  grid.wkt = EpsgWkt(std::to_string(epsg));
+  if (grid.wkt.empty()) return Invalid(fmt::format("crs: PROJ knows no EPSG:{}", epsg));
+  OGRSpatialReference srs;
+  const bool is_read = srs.importFromWkt(grid.wkt.c_str()) == OGRERR_NONE;
+  if (!is_read || srs.IsCompound() || !(srs.IsProjected() || srs.IsGeographic()) || srs.GetAxesCount() != 2) {
+    return Invalid(fmt::format("crs: EPSG:{} has no easting and northing, nor longitude and latitude", epsg));
+  }
+  grid.is_geographic = srs.IsGeographic() != 0;
+  return {};
+}
+
+// The number of nodes along a side, and its end.
+Result<std::int64_t> NodesAlong(double length, const std::optional<std::int64_t>& given, double spacing,
+                                const char* name) {
+  const double nodes = given ? static_cast<double>(*given) : std::floor(length / spacing * (1 + 1e-12)) + 1;
+  if (nodes < 2) return Invalid(fmt::format("{}: a grid has at least 2 nodes on each side", name));
+  return static_cast<std::int64_t>(std::min(nodes, 1e15));
+}
+
+}  // namespace
+
+Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes) {
+  InitGdal();
+  OutputGrid grid;
+  if (const Result<void> set = SetCrs(request.epsg, grid); !set) return tl::unexpected(set.error());
+  grid.west = request.west, grid.south = request.south, grid.east = request.east, grid.north = request.north;
+  if (grid.is_geographic) {
+    for (const double longitude : {grid.west, grid.east}) {
+      if (std::abs(longitude) > 180) return Invalid("bbox: longitudes must be numbers from -180 to 180");
+    }
+    for (const double latitude : {grid.south, grid.north}) {
+      if (std::abs(latitude) > 90)
+        return Invalid("bbox: latitudes must be numbers from -90 to 90; longitudes come first");
+    }
+    if (grid.east < grid.west) grid.east += 360;
+  }
+  if (!(grid.west < grid.east) || !(grid.south < grid.north)) {
+    return Invalid("bbox is empty; it is west,south,east,north in the units of the crs");
+  }
+  const double spacing = request.spacing.value_or(1);
+  const auto columns =
+      NodesAlong(grid.east - grid.west, request.columns, spacing, request.spacing ? "spacing" : "width");
+  if (!columns) return tl::unexpected(columns.error());
+  const auto rows = NodesAlong(grid.north - grid.south, request.rows, spacing, request.spacing ? "spacing" : "height");
+  if (!rows) return tl::unexpected(rows.error());
+  grid.columns = *columns, grid.rows = *rows;
+  constexpr std::int64_t kLongestSide = 65536;
+  const double nodes = static_cast<double>(grid.columns) * static_cast<double>(grid.rows);
+  if (nodes > static_cast<double>(max_nodes) || std::max(grid.columns, grid.rows) > kLongestSide) {
+    return Invalid(fmt::format(
+        "the grid has {} x {} nodes, more than max_mesh_samples of this server ({}) or than {} on "
+        "a side; ask for fewer, ask for parts of the area, or start the server with a larger --max-mesh-samples",
+        grid.columns, grid.rows, max_nodes, kLongestSide));
+  }
+  if (request.spacing) {
+    grid.east = grid.west + spacing * static_cast<double>(grid.columns - 1);
+    grid.south = grid.north - spacing * static_cast<double>(grid.rows - 1);
+  }
+  return grid;
+}
+
+Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
+                                             const std::stop_token& stop) {
+  std::vector<Position> nodes;
+  nodes.reserve(Area(grid.columns, rows));
+  for (std::int64_t row = first_row; row < first_row + rows; ++row) {
+    const double y = row == grid.rows - 1 ? grid.south : grid.north - static_cast<double>(row) * grid.step_y();
+    for (std::int64_t column = 0; column < grid.columns; ++column) {
+      nodes.push_back(
+          {column == grid.columns - 1 ? grid.east : grid.west + static_cast<double>(column) * grid.step_x(), y});
+    }
+  }
+  if (grid.epsg != kWgs84) {
+    const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
+    if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
+    std::vector<Position> kept, back;
+    for (std::size_t i = 0; i < nodes.size(); i += kCheckPeriod) kept.push_back(nodes[i]);
+    constexpr std::size_t kBatch = 4096;
+    for (std::size_t done = 0; done < nodes.size(); done += kBatch) {
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "placing a grid was stopped");
+      (*projector)->Inverse(std::span(nodes).subspan(done, std::min(kBatch, nodes.size() - done)));
+    }
+    for (std::size_t i = 0; i < nodes.size(); i += kCheckPeriod) back.push_back(nodes[i]);
+    (*projector)->Forward(back);
+    const double farthest = grid.is_geographic ? kReturn * 1e-5 : kReturn;
+    const auto is_back = [&](std::size_t i) {
+      const double off_x = back[i].x - kept[i].x;
+      return std::hypot(grid.is_geographic ? std::remainder(off_x, 360) : off_x, back[i].y - kept[i].y) <= farthest;
+    };
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      const bool is_place =
+          !std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 && (i % kCheckPeriod != 0 || is_back(i / kCheckPeriod));
+      if (is_place) continue;
+      return Invalid(
+          fmt::format("bbox: EPSG:{} has no place on Earth for column {}, row {} of the grid; choose a bbox "
+                      "within the area that the CRS is made for",
+                      grid.epsg, static_cast<std::int64_t>(i) % grid.columns,
+                      first_row + static_cast<std::int64_t>(i) / grid.columns));
+    }
+  }
+  std::vector<GeoPosition> positions;
+  positions.reserve(nodes.size());
+  for (const Position& node : nodes) positions.push_back({std::remainder(node.x, 360), node.y});
+  return positions;
+}
+
+}  // namespace terrace::dem

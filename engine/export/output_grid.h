@@ -1,0 +1,53 @@
+// Grids of heights for other programs: their positions, and files of them.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/core/result.h"
+
+namespace terrace::dem {
+
+// Nodes in rows from the north, from the west; the outermost nodes lie on the box.
+struct OutputGrid {
+  int epsg = 4326;
+  std::string wkt;                                  // of the CRS
+  bool is_geographic = true;                        // x and y are degrees of longitude and latitude
+  double west = 0, south = 0, east = 0, north = 0;  // units of the CRS
+  std::int64_t columns = 0, rows = 0;
+
+  double step_x() const { return (east - west) / static_cast<double>(columns - 1); }
+  double step_y() const { return (north - south) / static_cast<double>(rows - 1); }
+};
+
+struct GridRequest {
+  int epsg = 4326;
+  // Units of the CRS. Of geographic ones degrees; west > east: across the antimeridian.
+  double west = 0, south = 0, east = 0, north = 0;
+  // Either both numbers of nodes, or the spacing, which makes the box smaller to the east and to the south.
+  std::optional<std::int64_t> columns = {}, rows = {};
+  std::optional<double> spacing = {};
+};
+
+// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has no easting and northing; the box
+// is empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
+Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes);
+
+// Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS
+// has no position on Earth at a node. kCancelled: stopped.
+Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
+                                             const std::stop_token& stop);
+
+// A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL
+// cannot write it.
+Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights);
+// A grey image of 16 bits. `values`: one per node. Errors: as above.
+Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values);
+
+}  // namespace terrace::dem

@@ -1,0 +1,24 @@
+// Hashes of the bytes of files that have no statistics: masks, images, PROJ grids.
+#pragma once
+
+#include <stop_token>
+#include <string>
+
+#include "engine/common/content_hash.h"
+#include "engine/core/result.h"
+#include "engine/gdal/file_stamp.h"
+
+namespace terrace::dem {
+
+struct FileContentOptions {
+  std::string cache_dir = {};  // folder that stores the hashes of large files; empty: none
+  std::stop_token stop = {};
+};
+
+// Hashes all files in order, but not their paths, inodes and times. Files with a GDAL path, which may be remote, are
+// not read: StampedFiles::other_fingerprints is used instead. The hash of a file is cached as long as its stamp is
+// unchanged: in memory, and for large files in `cache_dir` as well. kChanged: a file has changed since it was stamped.
+// kUnavailable: it cannot be read. kCancelled: stopped.
+Result<ContentHash> HashFiles(const StampedFiles& files, const FileContentOptions& options = {});
+
+}  // namespace terrace::dem

@@ -1,0 +1,131 @@
+#include "engine/gdal/gdal_runtime.h"
+
+#include <cpl_conv.h>
+#include <cpl_error.h>
+#include <cpl_string.h>
+#include <cpl_vsi_virtual.h>
+#include <fmt/format.h>
+#include <gdal.h>
+#include <ogr_srs_api.h>
+#include <proj.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "engine/common/dem_types.h"
+#include "engine/common/idle_pool.h"
+#include "engine/core/check.h"
+#include "engine/gdal/driver_list.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr GIntBig kBlockCacheBytes = GIntBig{256} << 20;  // unless SetGdalCache says otherwise
+
+std::atomic<std::uint64_t> errors{0}, warnings{0};
+
+thread_local std::string last_error;
+
+// GDAL's handler prints messages and stops after 1,000 of them; this one stores the last message for our Errors.
+void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message) {
+  if (severity == CE_Warning) ++warnings;
+  if (severity < CE_Failure) return;
+  ++errors;
+  last_error = message;
+}
+
+// File systems for memory and for files within files, which have no other access.
+constexpr std::array<std::string_view, 12> kLocal = {
+    "/vsimem/",     "/vsizip/",    "/vsigzip/",   "/vsitar/",   "/vsi7z/",     "/vsirar/",
+    "/vsisubfile/", "/vsisparse/", "/vsicached?", "/vsicrypt/", "/vsistdout/", "/vsistdout_redirect/"};
+
+class Closed : public VSIFilesystemHandler {
+ public:
+  using VSIFilesystemHandler::Open;
+  VSIVirtualHandle* Open(const char*, const char*, bool, CSLConstList) override {
+    errno = ENOENT;
+    return nullptr;
+  }
+  int Stat(const char*, VSIStatBufL*, int) override {
+    errno = ENOENT;
+    return -1;
+  }
+};
+
+void InitOnce() {
+  CPLSetErrorHandler(KeepLastError);
+  CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
+  CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
+  // Without this setting, GDAL ignores the vertical datum of GeoTIFFs before version 1.1.
+  CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
+  OSRSetPROJEnableNetwork(0);
+  GDALSetCacheMax64(kBlockCacheBytes);
+  // Settings come from terrace's configuration, not from GDAL's own files.
+  CPLSetConfigOption("GDAL_CONFIG_FILE", "/dev/null");
+  GDALAllRegister();
+  // The default; SetSourcePolicy may change it.
+  const Result<void> used = UseDrivers(DefaultDrivers());
+  TERRACE_CHECK(used.has_value());
+  GuardNetwork({});
+}
+
+}  // namespace
+
+void InitGdal() {
+  static std::once_flag once;
+  std::call_once(once, InitOnce);
+}
+
+std::string LibraryVersions() {
+  return fmt::format("GDAL {}, PROJ {}", GDALVersionInfo("RELEASE_NAME"), proj_info().version);
+}
+
+void GuardNetwork(const std::vector<std::string>& allowed_prefixes) {
+  // GDAL's original file systems and their replacements. GDAL frees the ones that are installed at the end.
+  static auto& doors = *new std::map<std::string, VSIFilesystemHandler*>;
+  static auto& closed = *new std::map<std::string, Closed*>;
+  char** prefixes = VSIFileManager::GetPrefixes();
+  for (char** name = prefixes; name != nullptr && *name != nullptr; ++name) {
+    const std::string prefix = *name;
+    if (std::ranges::find(kLocal, prefix) != kLocal.end()) continue;
+    doors.try_emplace(prefix, VSIFileManager::GetHandler((prefix + "x").c_str()));
+    const bool open =
+        std::ranges::any_of(allowed_prefixes, [&](const std::string& allowed) { return allowed.starts_with(prefix); });
+    VSIFilesystemHandler* handler = doors[prefix];
+    if (!open) {
+      Closed*& shut = closed.try_emplace(prefix, nullptr).first->second;
+      if (shut == nullptr) shut = new Closed;
+      handler = shut;
+    }
+    VSIFileManager::InstallHandler(prefix, handler);
+  }
+  CSLDestroy(prefixes);
+}
+
+void SetGdalCache(std::size_t bytes) {
+  InitGdal();
+  GDALSetCacheMax64(static_cast<GIntBig>(bytes));
+}
+
+void SetOpenSources(std::size_t idle, std::size_t vrt_parts) {
+  InitGdal();
+  SetMaxIdle(idle);
+  CPLSetConfigOption("GDAL_MAX_DATASET_POOL_SIZE", std::to_string(vrt_parts).c_str());
+}
+
+GdalCounts CountGdalErrors() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }
+
+std::string TakeGdalError() {
+  return last_error.empty() ? std::string("no further detail") : std::exchange(last_error, {});
+}
+
+void ForgetGdalError() { last_error.clear(); }
+
+}  // namespace terrace::dem

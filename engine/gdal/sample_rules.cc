@@ -1,0 +1,251 @@
+#include "engine/gdal/sample_rules.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
+
+namespace terrace::dem {
+namespace {
+
+// Raw samples converted at a time. Limits the scratch memory of a read (8 MiB) and the reaction time to a stop.
+constexpr int kSamplesPerRead = 1 << 20;
+
+std::optional<double> NodataOf(GDALRasterBand& band) {
+  int has = 0;
+  double value = 0;
+  switch (band.GetRasterDataType()) {
+    case GDT_Int64:
+      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
+      break;
+    case GDT_UInt64:
+      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
+      break;
+    default:
+      value = band.GetNoDataValue(&has);
+      break;
+  }
+  if (has != 0) return value;
+  // Many 16-bit elevation files contain SRTM's void value without declaring it; no place on Earth has this height.
+  if (band.GetRasterDataType() == GDT_Int16) return std::numeric_limits<std::int16_t>::min();
+  return std::nullopt;
+}
+
+// The band that says which samples are valid: GDAL's mask, or an alpha band of a type that GDAL does not use as a mask.
+// Null: all are valid.
+GDALRasterBand* MaskOf(GDALRasterBand& band) {
+  if (HasMaskBand(band)) return band.GetMaskBand();
+  GDALDataset* const dataset = band.GetDataset();
+  for (int i = 1; dataset != nullptr && i <= dataset->GetRasterCount(); ++i) {
+    GDALRasterBand* const other = dataset->GetRasterBand(i);
+    if (other != &band && other->GetColorInterpretation() == GCI_AlphaBand) return other;
+  }
+  return nullptr;
+}
+
+bool IsSignedByte(GDALRasterBand& band) {
+  const char* const type = band.GetMetadataItem("PIXELTYPE", "IMAGE_STRUCTURE");
+  return band.GetRasterDataType() == GDT_Byte && type != nullptr && EQUAL(type, "SIGNEDBYTE");
+}
+
+}  // namespace
+
+std::optional<double> MetresPerUnit(const std::string& unit) {
+  std::string name;
+  for (const char c : unit) {
+    if (std::isalpha(static_cast<unsigned char>(c)))
+      name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  constexpr double kFoot = 0.3048, kSurveyFoot = 1200.0 / 3937.0;
+  struct Unit {
+    double metres;
+    std::string_view names;
+  };
+  constexpr Unit kUnits[] = {
+      {1, "  m metre metres meter meters "},
+      {.01, " cm centimetre centimeter "},
+      {.001, " mm millimetre millimeter "},
+      {1000, " km kilometre kilometer "},
+      {.1, " decimetre dm decimeter "},
+      {kFoot, " ft foot feet internationalfoot "},
+      {kSurveyFoot, " ussurveyfoot footussurvey ftus usft ussurveyfeet footus surveyfoot feetus usfeet usfoot "},
+      {3 * kFoot, " yard yards "},
+      {6 * kFoot, " fathom fathoms "},
+  };
+  for (const Unit& unit_of : kUnits) {
+    if (unit_of.names.find(" " + name + " ") != std::string_view::npos) return unit_of.metres;
+  }
+  return std::nullopt;
+}
+
+SampleRules SampleRules::Of(GDALRasterBand& band, const std::string& crs_unit) {
+  SampleRules rules;
+  rules.nodata = NodataOf(band);
+  rules.compare_as_float = band.GetRasterDataType() == GDT_Float32;
+  rules.has_mask = MaskOf(band) != nullptr;
+  rules.is_signed_byte = IsSignedByte(band);
+  rules.scale = band.GetScale();
+  rules.offset = band.GetOffset();
+  rules.unit = band.GetUnitType();
+  if (rules.unit.empty()) rules.unit = crs_unit;
+  rules.metres_per_unit = MetresPerUnit(rules.unit).value_or(1);
+  return rules;
+}
+
+namespace {
+
+// Most bands have at most one nodata value and no other rules.
+bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.extra_nodata.empty(); }
+
+// Raw samples are heights in metres that a float represents exactly.
+bool IsInMetres(const SampleRules& rules) {
+  return rules.scale == 1 && rules.offset == 0 && rules.metres_per_unit == 1 && !rules.is_signed_byte;
+}
+
+// The type in which a band is read; double if more than a sample's value must be tested.
+GDALDataType RawTypeOf(GDALRasterBand& band, const SampleRules& rules) {
+  const GDALDataType type = band.GetRasterDataType();
+  const bool is_exact = type == GDT_Byte || type == GDT_Int16 || type == GDT_UInt16 || type == GDT_Float32;
+  return is_exact && IsPlain(rules) && IsInMetres(rules) ? type : GDT_Float64;
+}
+
+// The largest float that is at most a number; the smallest float that is at least a number.
+float FloatAtMost(double value) {
+  const auto rounded = static_cast<float>(value);
+  return rounded > value ? std::nextafter(rounded, -std::numeric_limits<float>::infinity()) : rounded;
+}
+float FloatAtLeast(double value) { return -FloatAtMost(-value); }
+
+// Equivalent to ToHeight for plain rules in metres and raw types that float represents exactly, without branches and
+// doubles.
+template <typename Raw>
+void ToHeights(const SampleRules& rules, const Raw* raw, std::size_t count, float* out) {
+  float nodata = std::numeric_limits<float>::quiet_NaN();  // equal to nothing
+  if (rules.nodata) {
+    const auto rounded = static_cast<float>(*rules.nodata);
+    // Samples of Float32 bands may equal a nodata value that is stated with more digits than they have.
+    if (rules.compare_as_float || static_cast<double>(rounded) == *rules.nodata) nodata = rounded;
+  }
+  const float lowest = FloatAtLeast(rules.lowest), highest = FloatAtMost(rules.highest);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float height = static_cast<float>(raw[i]) + 0.0f;  // turns -0 into 0, as raw * scale + offset does
+    const bool is_valid = (height != nodata) & (height >= lowest) & (height <= highest);
+    out[i] = is_valid ? height : SampleRules::kVoid;
+  }
+}
+
+// Equivalent to ToHeight for plain rules.
+template <>
+void ToHeights(const SampleRules& rules, const double* raw, std::size_t count, float* out) {
+  double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());
+  if (rules.compare_as_float) nodata = static_cast<float>(nodata);
+  const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
+  const double lowest = rules.lowest, highest = rules.highest;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double height = (raw[i] * scale + offset) * unit;
+    const bool is_valid = (raw[i] != nodata) & (height >= lowest) & (height <= highest);
+    out[i] = is_valid ? static_cast<float>(height) : SampleRules::kVoid;
+  }
+}
+
+void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* raw, std::size_t count, float* out) {
+  switch (type) {
+    case GDT_Byte:
+      return ToHeights(rules, reinterpret_cast<const std::uint8_t*>(raw), count, out);
+    case GDT_Int16:
+      return ToHeights(rules, reinterpret_cast<const std::int16_t*>(raw), count, out);
+    case GDT_UInt16:
+      return ToHeights(rules, reinterpret_cast<const std::uint16_t*>(raw), count, out);
+    case GDT_Float32:
+      return ToHeights(rules, reinterpret_cast<const float*>(raw), count, out);
+    default:
+      return ToHeights(rules, reinterpret_cast<const double*>(raw), count, out);
+  }
+}
+
+Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
+  const std::size_t most = Area(cols, rows_at_once);
+  const GDALDataType type = RawTypeOf(band, rules);
+  // Not initialized, because it is written before it is read, and filling it with zeros takes longer than the
+  // conversion.
+  const auto raw =
+      std::make_unique_for_overwrite<std::byte[]>(most * static_cast<std::size_t>(GDALGetDataTypeSizeBytes(type)));
+  std::vector<std::uint8_t> mask(rules.has_mask ? most : 0);
+  for (int done = 0; done < rows; done += rows_at_once) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
+    const int count = std::min(rows_at_once, rows - done);
+    ForgetGdalError();
+    CPLErr status = band.RasterIO(GF_Read, col, row + done, cols, count, raw.get(), cols, count, type, 0, 0, nullptr);
+    if (status == CE_None && rules.has_mask) {
+      GDALRasterBand* const valid = MaskOf(band);
+      status = valid == nullptr ? CE_Failure
+                                : valid->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count,
+                                                  GDT_Byte, 0, 0, nullptr);
+    }
+    if (status != CE_None) {
+      return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
+                       TakeGdalError());
+    }
+    const std::size_t samples = Area(cols, count);
+    auto* const doubles = reinterpret_cast<double*>(raw.get());  // for this type
+    if (rules.is_signed_byte) {
+      for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
+    }
+    if (IsPlain(rules)) {
+      ConvertPlain(rules, type, raw.get(), samples, out);
+    } else {
+      for (std::size_t i = 0; i < samples; ++i) {
+        const bool is_hidden = rules.has_mask && mask[i] == 0;
+        out[i] = !is_hidden ? rules.ToHeight(doubles[i]) : rules.is_indicator ? 0.0f : SampleRules::kVoid;
+      }
+    }
+    out += samples;
+  }
+  return {};
+}
+
+// Makes voids of the values within `reach` of a void, among `count` values that are `stride` apart.
+void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::vector<char>& near) {
+  near.assign(static_cast<std::size_t>(count), 0);
+  for (int i = 0; i < count; ++i) {
+    if (!std::isnan(first[i * stride])) continue;
+    std::fill(near.begin() + std::max(i - reach, 0), near.begin() + std::min(i + reach + 1, count), 1);
+  }
+  for (int i = 0; i < count; ++i) {
+    if (near[static_cast<std::size_t>(i)] != 0) first[i * stride] = SampleRules::kVoid;
+  }
+}
+
+}  // namespace
+
+Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                         float* out, const std::stop_token& stop) {
+  if (rules.rim == 0) return ReadSamples(band, rules, col, row, cols, rows, out, stop);
+  // Extends the window by the reach of voids, so that a void does not depend on the window.
+  const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
+  const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
+  const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
+  std::vector<float> around(Area(wide, high));
+  if (auto read = ReadSamples(band, rules, left, top, wide, high, around.data(), stop); !read) return read;
+  std::vector<char> near;
+  for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);
+  for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.rim, near);
+  for (int r = 0; r < rows; ++r) {
+    const auto first = around.begin() + std::ptrdiff_t{row - top + r} * wide + (col - left);
+    std::copy(first, first + cols, out + std::ptrdiff_t{r} * cols);
+  }
+  return {};
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,138 @@
+#include "engine/gdal/vrt_check.h"
+
+#include <cpl_minixml.h>
+#include <cpl_string.h>
+#include <fmt/format.h>
+#include <gdal.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <string_view>
+#include <system_error>
+
+#include "engine/gdal/source_policy.h"
+
+namespace terrace::dem {
+namespace {
+
+namespace fs = std::filesystem;
+
+// gdalbuildvrt writes about 700 bytes per tile: this is enough for a country.
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{64} << 20;
+constexpr int kDeepestNesting = 4;  // nesting of VRTs
+
+// The elements that gdalbuildvrt and `gdal_translate -of VRT` write. Only SourceFilename names a file.
+constexpr std::string_view kElements =
+    " VRTDataset SRS GeoTransform Metadata MDI OverviewList BlockXSize BlockYSize VRTRasterBand MaskBand"
+    " NoDataValue NodataValue HideNoDataValue ColorInterp ColorTable Entry CategoryNames Category Description"
+    " UnitType Offset Scale Histograms HistItem HistMin HistMax BucketCount IncludeOutOfRange Approximate"
+    " HistCounts SimpleSource ComplexSource AveragedSource SourceFilename SourceBand SourceProperties SrcRect"
+    " DstRect NODATA UseMaskBand ScaleOffset ScaleRatio LUT ColorTableComponent Exponent ";
+
+bool IsKnown(std::string_view name) { return kElements.find(fmt::format(" {} ", name)) != std::string_view::npos; }
+
+struct FreeXml {
+  void operator()(CPLXMLNode* node) const { CPLDestroyXMLNode(node); }
+};
+
+// Precondition: both paths have no links and dots.
+bool IsInside(const fs::path& file, const fs::path& folder) {
+  const auto [in_file, in_folder] = std::ranges::mismatch(file, folder);
+  return in_folder == folder.end();
+}
+
+// Made absolute first, because a bare file name has no folder.
+fs::path FolderOf(const std::string& path, std::error_code& error) {
+  return fs::canonical(fs::absolute(path, error).parent_path(), error);
+}
+
+class Checker {
+ public:
+  explicit Checker(fs::path top) : top_(std::move(top)) {}
+
+  Result<void> Check(const fs::path& vrt, int depth) {
+    std::error_code ignored;
+    if (depth > kDeepestNesting || fs::file_size(vrt, ignored) > kMaxBytes) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: is too large or nested too deeply for a VRT", vrt.string());
+    }
+    const std::unique_ptr<CPLXMLNode, FreeXml> tree(CPLParseXMLFile(vrt.c_str()));
+    if (tree == nullptr) return MakeError(ErrorCode::kInvalidArgument, "{}: is no valid VRT", vrt.string());
+    return CheckNodes(tree.get(), vrt, depth);
+  }
+
+  std::vector<std::string> TakeParts() { return std::move(parts_); }
+
+ private:
+  Result<void> CheckNodes(const CPLXMLNode* node, const fs::path& vrt, int depth) {
+    for (; node != nullptr; node = node->psNext) {
+      if (node->eType == CXT_Attribute && EQUAL(node->pszValue, "subClass")) return Refuse(vrt, "subClass");
+      if (node->eType != CXT_Element) continue;
+      const std::string_view name = node->pszValue;
+      if (name == "?xml") continue;
+      if (!IsKnown(name)) return Refuse(vrt, name);
+      if (name == "SourceFilename") {
+        if (auto checked = CheckPart(node, vrt, depth); !checked) return checked;
+      } else if (auto checked = CheckNodes(node->psChild, vrt, depth); !checked) {
+        return checked;
+      }
+    }
+    return {};
+  }
+
+  static Result<void> Refuse(const fs::path& vrt, std::string_view what) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: a VRT here is a plain mosaic of files, without \"{}\"; make a raster of it with "
+                     "gdal_translate",
+                     vrt.string(), what);
+  }
+
+  Result<void> CheckPart(const CPLXMLNode* node, const fs::path& vrt, int depth) {
+    fs::path part = CPLGetXMLValue(node, "", "");
+    if (CPLTestBool(CPLGetXMLValue(node, "relativeToVRT", "0"))) part = vrt.parent_path() / part;
+    const auto fail = [&](const std::string& why) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: a part of it: {}", vrt.string(), why);
+    };
+    parts_.push_back(part.string());
+    if (IsRemote(part.string())) return {};
+    std::error_code error;
+    const fs::path real = fs::canonical(part, error);
+    if (error) return fail(fmt::format("{}: is no file on this machine", part.string()));
+    if (!HasDataRoots() && !IsInside(real, top_)) {
+      return fail(fmt::format("{}: lies outside of the VRT's folder; name that folder in data_roots", part.string()));
+    }
+    if (auto plain = CheckPlainFile(part.string()); !plain) return fail(plain.error().message);
+    return LooksLikeVrt(real) ? Check(real, depth + 1) : Result<void>();
+  }
+
+  const fs::path top_;  // the folder of the outermost VRT, canonical
+  std::vector<std::string> parts_;
+};
+
+}  // namespace
+
+bool LooksLikeVrt(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head(1024, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+  return head.find("<VRTDataset") != std::string::npos || fs::path(path).extension() == ".vrt";
+}
+
+Result<void> CheckVrt(const std::string& path) {
+  std::error_code error;
+  const fs::path folder = FolderOf(path, error);
+  if (error) return MakeError(ErrorCode::kInvalidArgument, "{}: {}", path, error.message());
+  return Checker(folder).Check(path, 0);
+}
+
+std::vector<std::string> PartsOfVrt(const std::string& path) {
+  std::error_code error;
+  Checker checker(FolderOf(path, error));
+  static_cast<void>(checker.Check(path, 0));
+  return checker.TakeParts();
+}
+
+}  // namespace terrace::dem

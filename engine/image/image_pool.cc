@@ -1,0 +1,52 @@
+#include "engine/image/image_pool.h"
+
+#include <utility>
+
+#include "engine/gdal/raster_file.h"
+#include "engine/image/image_bins.h"
+#include "engine/raster/sample_grid.h"
+
+namespace terrace::dem {
+
+ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()), files_(std::move(files)) {
+  GDALRasterBand& band = *image.dataset().GetRasterBand(1);
+  sizes_.push_back(std::make_unique<Size>());
+  for (const int factor : OverviewFactors(band)) {
+    GDALRasterBand* const wanted = FindOverview(band, factor);
+    for (int i = 0; i < band.GetOverviewCount(); ++i) {
+      if (band.GetOverview(i) != wanted) continue;
+      Size& size = *sizes_.emplace_back(std::make_unique<Size>());
+      size.factor = factor;
+      size.overview = i;
+      size.across = PixelsPerSample(image.dataset(), factor, image.width(), wanted->GetXSize());
+      size.down = PixelsPerSample(image.dataset(), factor, image.height(), wanted->GetYSize());
+      break;
+    }
+  }
+  sizes_[0]->idle.Take().Set(std::make_shared<ImageFile>(std::move(image)));
+}
+
+int ImagePool::LargestFactor() const { return sizes_.back()->factor * ImageBins::kMaxPixels; }
+
+Result<ImagePool::Borrowed> ImagePool::Borrow(int factor) {
+  std::size_t i = 0;
+  while (i + 1 < sizes_.size() && sizes_[i + 1]->factor <= factor) ++i;
+  Size& size = *sizes_[i];
+  Borrowed borrowed{&size, size.idle.Take()};
+  if (borrowed.image) return borrowed;
+  auto opened = ImageFile::Open(path_, size.overview);
+  if (auto unchanged = CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!opened) return MakeError(ErrorCode::kUnavailable, "{}", opened.error().message);
+  borrowed.image.Set(std::make_shared<ImageFile>(*std::move(opened)));
+  return borrowed;
+}
+
+Result<void> ImagePool::CheckUnchanged() {
+  Result<void> unchanged = files_.CheckUnchanged(path_);
+  if (!unchanged) {
+    for (const auto& size : sizes_) size->idle.Clear();
+  }
+  return unchanged;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,85 @@
+// A georeferenced image of the ground, from which the textures of tiles are made. Immutable after Open and thread-safe.
+// No GDAL type appears in this header.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/core/result.h"
+#include "engine/gdal/file_content.h"
+#include "engine/gdal/file_stamp.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::dem {
+
+// Red, green, blue of every pixel, row by row from the NORTH-western one.
+struct TilePicture {
+  int side = 0;
+  std::vector<std::uint8_t> rgb;  // 3 * side * side
+};
+
+// The same with alpha: 0 where the image has no colour, which is then black.
+struct MapPicture {
+  int side = 0;
+  std::vector<std::uint8_t> rgba;  // 4 * side * side
+};
+
+// Where an image lies, and the first levels of its map tiles whose pixels are as fine as its own.
+struct ImageExtent {
+  GeoBounds bounds;
+  int max_mercator_depth = 1;  // of a geo::MercatorGrid
+  int max_geodetic_level = 0;  // of tiles of kMapSide pixels in the scheme of terrain tiles
+};
+
+class Imagery {
+ public:
+  static constexpr int kMinSide = 64, kMaxSide = 1024;
+  // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
+  static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
+
+  // Opens an image as described in raster_colors.h, with a georeference. kInvalidArgument, with the remedy: errors of
+  // OpenRaster and Georeference, bands that are no colours, or an image outside `around`.
+  static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
+                                               const FileContentOptions& content = {});
+  ~Imagery();
+
+  // Returns the number of pixels along the edge of a level's tiles: `most`, halved down to 256 while the pixels are
+  // still as fine as the image. Depends only on image, level and `most`. Precondition: `most` is a power of two from
+  // kMinSide to kMaxSide.
+  int SideOf(int level, int most) const;
+
+  // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
+  // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that
+  // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; a side
+  // as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
+  Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
+
+  // Pictures for maps, by the rules of Read: `side` x `side` pixels of a Web Mercator grid, the first in `column` and
+  // `row`, or of a tile in the scheme of terrain tiles. Transparent where the image has no colour. Preconditions: the
+  // pixels lie in the grid; a valid key; a side as above. Errors: those of Read.
+  Result<MapPicture> ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
+                                  std::stop_token stop = {}) const;
+  Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
+
+  static constexpr int kMapSide = 256;
+  ImageExtent extent() const;
+
+  // A hash of the bytes of its files and of their georeference. Copies have the same hash.
+  std::uint64_t fingerprint() const;
+
+  // The files of the image with their stamps at Open.
+  const StampedFiles& files() const;
+
+ private:
+  class Impl;
+  explicit Imagery(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::dem

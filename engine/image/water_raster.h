@@ -1,0 +1,49 @@
+// A water mask: a raster whose samples are not zero on water.
+// Immutable after Open and thread-safe. No GDAL type appears in this header.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/core/result.h"
+#include "engine/gdal/file_content.h"
+#include "engine/gdal/file_stamp.h"
+#include "engine/geo/tile_key.h"
+
+namespace terrace::dem {
+
+class WaterRaster {
+ public:
+  static constexpr int kSide = 256;  // pixels along a tile's edge
+
+  // Opens band 1 of a georeferenced raster. kInvalidArgument, with the remedy: errors of OpenRaster and Georeference,
+  // or a raster outside `around`.
+  static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
+                                                   const FileContentOptions& content = {});
+  ~WaterRaster();
+
+  // Returns kSide x kSide pixels of a tile, row by row from the NORTH-western one: 0 is land, 255 water, and values in
+  // between are the share of water in a pixel on the coast. Pixels outside the raster or without data are land. A pixel
+  // depends only on its level and global position. If the raster is finer than the pixels, its samples are averaged. If
+  // it is coarser, samples are interpolated, and the coast is the line where they are one half, as sharp as the pixels
+  // allow. Overviews are used. Make them with `gdaladdo -r nearest` or `-r mode`, because every nonzero sample counts
+  // as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
+  Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
+
+  // A hash of the bytes of its files and of their georeference. Copies have the same hash.
+  std::uint64_t fingerprint() const;
+
+  // The files of the raster with their stamps at Open.
+  const StampedFiles& files() const;
+
+ private:
+  class Impl;
+  explicit WaterRaster(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace terrace::dem

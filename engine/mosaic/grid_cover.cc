@@ -1,0 +1,118 @@
+#include "engine/mosaic/grid_cover.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "engine/geo/tile_cover.h"
+#include "engine/raster/node_rows.h"
+
+namespace terrace::dem {
+namespace {
+
+constexpr Box kNowhereBox{1e300, 1e300, -1e300, -1e300};
+
+Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, box.east + by, box.north + by}; }
+
+bool Holds(const Box& box, const Position& p) {
+  return (p.x >= box.west) & (p.x <= box.east) & (p.y >= box.south) & (p.y <= box.north);
+}
+
+}  // namespace
+
+Box BoxOf(const geo::TileRange& pixels) {
+  return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
+          static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
+}
+
+GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) {
+  std::vector<geo::TileRange> ranges;
+  for (const GridMember& member : members) {
+    const geo::TileRange pixels = member.pixels();
+    ranges.push_back(pixels);
+    if (turn > 0 && pixels.end_x >= turn) {
+      ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
+    }
+  }
+  boxes_ = geo::Disjoint(std::move(ranges));
+  std::vector<BoxIndex::Entry> entries;
+  for (std::size_t i = 0; i < boxes_.size(); ++i) entries.push_back({BoxOf(boxes_[i]), i});
+  index_ = BoxIndex(entries);
+}
+
+bool GridCover::Covers(const geo::TileRange& pixels) const {
+  std::int64_t covered = 0;
+  for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Common(boxes_[i], pixels));
+  return covered == geo::Cells(pixels);
+}
+
+std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) const {
+  return positions.is_separable() ? InsideOfAxes(positions) : Inside(positions.nodes());
+}
+
+// A box contains one rectangle of nodes, or two if the columns jump by one turn.
+std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions) const {
+  std::vector<std::uint8_t> inside(positions.columns() * positions.rows());
+  Box extent = kNowhereBox;
+  for (const double x : positions.x()) extent.west = std::min(extent.west, x), extent.east = std::max(extent.east, x);
+  for (const double y : positions.y())
+    extent.south = std::min(extent.south, y), extent.north = std::max(extent.north, y);
+  std::vector<std::uint8_t> columns(positions.columns());
+  for (const std::size_t i : index_.Find(Grown(extent, 2 * kEdgeTolerance))) {
+    const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
+    std::size_t first = columns.size(), end = 0;
+    for (std::size_t c = 0; c < columns.size(); ++c) {
+      const double x = positions.x()[c];
+      columns[c] = x >= box.west && x <= box.east ? 1 : 0;
+      if (columns[c] != 0) first = std::min(first, c), end = c + 1;
+    }
+    for (std::size_t j = 0; j < positions.rows() && first < end; ++j) {
+      if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
+      std::uint8_t* const row = inside.data() + j * columns.size();
+      for (std::size_t c = first; c < end; ++c) row[c] |= columns[c];
+    }
+  }
+  return inside;
+}
+
+std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions) const {
+  // Up to this number, boxes are checked one by one; for more, the index is used.
+  constexpr std::size_t kFewBoxes = 8;
+  std::vector<std::uint8_t> inside(positions.size());
+  const PositionExtent known = ExtentOf(positions);
+  const Box extent{known.min.x, known.min.y, known.max.x, known.max.y};
+  if (extent.west > extent.east) return inside;
+  const std::vector<std::size_t> near = index_.Find(Grown(extent, 2 * kEdgeTolerance));
+  if (near.size() == 1) {
+    const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);
+    if (known.are_all_known && Holds(box, known.min) && Holds(box, known.max)) {
+      std::ranges::fill(inside, std::uint8_t{1});
+      return inside;
+    }
+    std::ranges::transform(positions, inside.begin(), [&](const Position& p) { return std::uint8_t{Holds(box, p)}; });
+    return inside;
+  }
+  Box last = kNowhereBox;
+  const auto holds_any = [&](const std::vector<std::size_t>& boxes, const Position& p) {
+    for (const std::size_t i : boxes) {
+      const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
+      if (!Holds(box, p)) continue;
+      last = box;
+      return true;
+    }
+    return false;
+  };
+  for (std::size_t n = 0; n < positions.size(); ++n) {
+    const Position& p = positions[n];
+    if (std::isnan(p.x) || std::isnan(p.y)) continue;
+    const bool holds =
+        Holds(last, p) ||  // neighbours are usually in the same box
+        (near.size() <= kFewBoxes ? holds_any(near, p)
+                                  : holds_any(index_.Find(Grown({p.x, p.y, p.x, p.y}, 2 * kEdgeTolerance)), p));
+    inside[n] = holds ? 1 : 0;
+  }
+  return inside;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,43 @@
+// The set of pixels that the rasters of a raster grid cover.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "engine/common/box_index.h"
+#include "engine/crs/node_positions.h"
+#include "engine/geo/tile_key.h"
+#include "engine/mosaic/grid_members.h"
+
+namespace terrace::dem {
+
+// Converts a range of pixels to a box, ends included.
+Box BoxOf(const geo::TileRange& pixels);
+
+// Immutable and thread-safe. Positions within 10^-6 pixels of a raster count as inside it.
+class GridCover {
+ public:
+  GridCover() = default;
+  // `turn`: columns around the Earth if the raster grid wraps, else 0.
+  GridCover(const std::vector<GridMember>& members, std::int64_t turn);
+
+  static constexpr double kEdgeTolerance = 1e-6;  // pixels
+
+  // One entry per node, row by row: 1 where its position lies inside a raster, else 0.
+  std::vector<std::uint8_t> Inside(const NodePositions& positions) const;
+  // The same for single positions.
+  std::vector<std::uint8_t> Inside(std::span<const Position> positions) const;
+
+  // Whether the rasters cover all of these pixels. Precondition: the range is not empty and lies inside the raster
+  // grid.
+  bool Covers(const geo::TileRange& pixels) const;
+
+ private:
+  std::vector<std::uint8_t> InsideOfAxes(const NodePositions& positions) const;
+
+  std::vector<geo::TileRange> boxes_;  // without overlap
+  BoxIndex index_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,161 @@
+// Averages of blocks of samples, accumulated row by row. The order of summation is fixed, so results are bit-identical.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/gdal/sample_rules.h"
+#include "engine/raster/sample_grid.h"
+
+namespace terrace::dem {
+
+struct BlockSum {
+  double sum = 0, weight = 0;  // of valid samples
+
+  void Add(float sample, double times = 1) {
+    if (std::isnan(sample)) return;
+    sum += times * sample;
+    weight += times;
+  }
+  void Add(const BlockSum& other) {
+    sum += other.sum;
+    weight += other.weight;
+  }
+  float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
+};
+
+// Returns the fraction of a block of `step` samples that lies on an axis of `size` samples; below 1 for a partial last
+// block.
+inline double ShareOf(std::int64_t block, int step, std::int64_t size) {
+  return static_cast<double>(std::min<std::int64_t>(step, size - block * step)) / step;
+}
+
+// Copies averages of 1 x 1 blocks: the samples, `columns` per row, with -0 replaced by 0. `stride`: of `out`, in
+// samples.
+inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
+  for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {
+    for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[static_cast<std::size_t>(i)] + 0.0f;
+  }
+}
+
+// Averages of one row of blocks of block x block samples. Each block is summed row by row, independently of its
+// neighbours. Blocks of more than kLargestPlain samples a side are summed from blocks of that size, so averages
+// computed from parts of a raster that fit into memory (raster_statistics.h) have the same bits.
+class BlockAverages {
+ public:
+  static constexpr int kLargestPlain = 1024;
+
+  BlockAverages(std::int64_t blocks, int block)
+      : parts_(block > kLargestPlain ? block / kLargestPlain : 1),
+        plain_(block / parts_),
+        inner_(static_cast<std::size_t>(blocks * parts_)),
+        outer_(parts_ > 1 ? static_cast<std::size_t>(blocks) : 0) {}
+
+  // Adds a row of samples with weight `weight`. The last sample has `weight` * `last`: it may cover fewer pixels.
+  void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
+    // All but the block of the last sample.
+    const std::int64_t whole = (count - 1) / plain_;
+    AddWhole(samples, whole, weight);
+    BlockSum& end = inner_[static_cast<std::size_t>(whole)];
+    for (std::int64_t i = whole * plain_; i < count; ++i) end.Add(samples[i], i + 1 == count ? weight * last : weight);
+    if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
+  }
+
+  // Writes one average per block, NaN for a block without a valid sample, and starts the next row of blocks.
+  void Take(float* out) {
+    if (parts_ > 1 && rows_ > 0) Gather();
+    for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {
+      *out++ = sum.Mean();
+      sum = {};
+    }
+  }
+
+ private:
+  void AddWhole(const float* samples, std::int64_t blocks, double weight) {
+    if (plain_ == 2) return AddBlocks<2>(samples, blocks, weight);
+    if (plain_ == 4) return AddBlocks<4>(samples, blocks, weight);
+    if (plain_ == 8) return AddBlocks<8>(samples, blocks, weight);
+    for (std::int64_t i = 0; i < blocks; ++i, samples += plain_) {
+      BlockSum sum = inner_[static_cast<std::size_t>(i)];
+      for (int k = 0; k < plain_; ++k) sum.Add(samples[k], weight);
+      inner_[static_cast<std::size_t>(i)] = sum;
+    }
+  }
+
+  // The same without a branch: a void adds 0, which changes no bit of a sum.
+  template <int kBlock>
+  void AddBlocks(const float* samples, std::int64_t blocks, double weight) {
+    BlockSum* const sums = inner_.data();
+    for (std::int64_t i = 0; i < blocks; ++i) {
+      double sum = sums[i].sum, weights = sums[i].weight;
+      for (int k = 0; k < kBlock; ++k) {
+        const double sample = samples[i * kBlock + k];
+        const bool is_void = sample != sample;
+        sum += is_void ? 0.0 : weight * sample;
+        weights += is_void ? 0.0 : weight;
+      }
+      sums[i] = {sum, weights};
+    }
+  }
+
+  void Gather() {
+    for (std::size_t i = 0; i < inner_.size(); ++i) {
+      outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
+      inner_[i] = {};
+    }
+    rows_ = 0;
+  }
+
+  int parts_, plain_;
+  int rows_ = 0;                 // of samples in inner_ that are not gathered yet
+  std::vector<BlockSum> inner_;  // of blocks, or of parts of blocks
+  std::vector<BlockSum> outer_;
+};
+
+// Computes a window of averages of block x block values. Each value covers a block of `step` samples; `columns` and
+// `rows` are the axes of the values. Calls read(window, out) for windows of values that do not wrap.
+template <typename Read>
+Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis& rows, int step, int block,
+                                         const GridWindow& window, const Read& read) {
+  constexpr std::int64_t kValuesPerStrip = std::int64_t{1} << 20;
+  const std::int64_t turn = (columns.count() + block - 1) / block;
+  const std::int64_t top = window.row * block, height = std::min(rows.count() - top, window.rows * block);
+  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows));
+  for (std::int64_t column = 0; column < window.columns;) {
+    float* const out = heights.data() + column;
+    const std::int64_t first = FloorMod(window.column + column, turn) * block;
+    const std::int64_t blocks = std::min(window.columns - column, turn - first / block);
+    const std::int64_t width = std::min(columns.count() - first, blocks * block);
+    // A limited number of rows at a time, because a row of blocks can be the whole raster.
+    const std::int64_t strip = std::max<std::int64_t>(1, kValuesPerStrip / width);
+    const bool is_plain = block == 1 && width == blocks;
+    // Not initialized, because it is written before it is read.
+    const auto values =
+        std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(width * std::min(strip, height)));
+    BlockAverages averages(is_plain ? 0 : blocks, block);
+    for (std::int64_t done = 0; done < height; done += strip) {
+      const GridWindow here{first, top + done, width, std::min(strip, height - done)};
+      if (auto filled = read(here, values.get()); !filled) return tl::unexpected(filled.error());
+      if (is_plain) {
+        CopyRows({values.get(), static_cast<std::size_t>(width * here.rows)}, width, out + done * window.columns,
+                 window.columns);
+        continue;
+      }
+      for (std::int64_t r = 0; r < here.rows; ++r) {
+        averages.AddRow(values.get() + r * width, width, ShareOf(here.row + r, step, rows.samples()),
+                        ShareOf(first + width - 1, step, columns.samples()));
+        const std::int64_t at = done + r;
+        if ((at + 1) % block == 0 || at + 1 == height) averages.Take(out + at / block * window.columns);
+      }
+    }
+    column += blocks;
+  }
+  return heights;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,328 @@
+#include "engine/raster/node_rows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "engine/raster/node_rows.cc"
+#include <hwy/foreach_target.h>  // includes this file once for each set of instructions
+#include <hwy/highway.h>
+
+HWY_BEFORE_NAMESPACE();
+namespace terrace::dem {
+namespace HWY_NAMESPACE {
+namespace {
+
+namespace hn = hwy::HWY_NAMESPACE;
+
+// Calls step(tag, i) for whole vectors of nodes. The last vector begins earlier if need be: nodes may be computed
+// twice. Fewer nodes than lanes are computed one by one.
+template <typename Step>
+HWY_INLINE void ForVectors(std::size_t count, const Step& step) {
+  const hn::CappedTag<double, 8> wide;
+  const std::size_t lanes = hn::Lanes(wide);
+  if (count < lanes) {
+    for (std::size_t i = 0; i < count; ++i) step(hn::CappedTag<double, 1>(), i);
+    return;
+  }
+  for (std::size_t i = 0; i + lanes <= count; i += lanes) step(wide, i);
+  if (count % lanes != 0) step(wide, count - lanes);
+}
+
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE V Between(D, V first, V second, V weight) {
+  return hn::Add(first, hn::Mul(weight, hn::Sub(second, first)));
+}
+
+// GridAxis::Locate, away from the ends of an axis.
+template <class D, class V = hn::Vec<D>>
+struct Place {
+  V index, weight;
+  hn::Mask<D> is_known;
+};
+template <class D, class V = hn::Vec<D>>
+HWY_INLINE Place<D> Locate(D d, V position, const GridAxis& axis, int size) {
+  const V zero = hn::Zero(d), half = hn::Set(d, 0.5), per_factor = hn::Set(d, 1.0 / axis.factor());
+  const auto is_there = hn::Eq(position, position);
+  const V clamped = hn::Min(hn::Max(hn::IfThenElseZero(is_there, position), zero), hn::Set(d, size));
+  const V place = hn::Sub(hn::Mul(clamped, per_factor), half);
+  const V index = hn::Floor(place);
+  const V here = hn::Mul(hn::Add(index, half), hn::Set(d, axis.factor()));
+  const auto is_inner = hn::And(hn::Ge(place, zero), hn::Lt(place, hn::Set(d, static_cast<double>(axis.count() - 2))));
+  return {index, hn::Mul(hn::Sub(clamped, here), per_factor), hn::And(is_inner, is_there)};
+}
+
+template <class D>
+HWY_INLINE void LoadPositions(D d, const Position* nodes, hn::Vec<D>& x, hn::Vec<D>& y) {
+  static_assert(sizeof(Position) == 2 * sizeof(double));
+  hn::LoadInterleaved2(d, &nodes->x, x, y);
+}
+
+// Samples, as doubles, at places in the window. The places are whole numbers below 2^31.
+template <class D>
+HWY_INLINE hn::Vec<D> SamplesAt(D d, const float* samples, hn::Vec<D> places) {
+  const hn::Rebind<std::int32_t, D> integers;
+  const hn::Rebind<float, D> floats;
+  return hn::PromoteTo(d, hn::GatherIndex(floats, samples, hn::DemoteTo(integers, places)));
+}
+
+void InterpolateNodes(const Position* nodes, std::size_t count, const GridAxes& axes, const float* samples,
+                      const GridWindow& window, double* out) {
+  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
+    using V = hn::Vec<decltype(d)>;
+    V x, y;
+    LoadPositions(d, nodes + i, x, y);
+    const auto column = Locate(d, x, axes.columns, axes.width), row = Locate(d, y, axes.rows, axes.height);
+    const V zero = hn::Zero(d), one = hn::Set(d, 1), stride = hn::Set(d, static_cast<double>(window.columns));
+    const auto inside = [&](V index, std::int64_t first, std::int64_t size) HWY_ATTR {
+      const V at = hn::Sub(index, hn::Set(d, static_cast<double>(first)));
+      return hn::Min(hn::Max(at, zero), hn::Set(d, static_cast<double>(size - 1)));
+    };
+    // Samples without a weight may lie outside.
+    const auto next = [&](V weight) HWY_ATTR { return hn::IfThenElseZero(hn::Gt(weight, zero), one); };
+    const V west = inside(column.index, window.column, window.columns);
+    const V east = inside(hn::Add(column.index, next(column.weight)), window.column, window.columns);
+    const V north = hn::Mul(inside(row.index, window.row, window.rows), stride);
+    const V south = hn::Mul(inside(hn::Add(row.index, next(row.weight)), window.row, window.rows), stride);
+    const auto along = [&](V of_row) HWY_ATTR {
+      return Between(d, SamplesAt(d, samples, hn::Add(of_row, west)), SamplesAt(d, samples, hn::Add(of_row, east)),
+                     column.weight);
+    };
+    const V height = Between(d, along(north), along(south), row.weight);
+    const V unknown = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
+    hn::StoreU(hn::IfThenElse(hn::And(column.is_known, row.is_known), height, unknown), d, out + i);
+  });
+}
+
+void InterpolateLine(const float* samples, const std::int32_t* west, const std::int32_t* east, const double* weights,
+                     std::size_t count, double* out) {
+  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
+    const hn::Rebind<std::int32_t, decltype(d)> integers;
+    const hn::Rebind<float, decltype(d)> floats;
+    const auto at = [&](const std::int32_t* places) HWY_ATTR {
+      return hn::PromoteTo(d, hn::GatherIndex(floats, samples, hn::LoadU(integers, places + i)));
+    };
+    hn::StoreU(Between(d, at(west), at(east), hn::LoadU(d, weights + i)), d, out + i);
+  });
+}
+
+void InterpolateLines(const double* north, const double* south, double weight, std::size_t count, double* out) {
+  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
+    hn::StoreU(Between(d, hn::LoadU(d, north + i), hn::LoadU(d, south + i), hn::Set(d, weight)), d, out + i);
+  });
+}
+
+void Round(const double* heights, const double* added, std::size_t count, float* out) {
+  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
+    const hn::Rebind<float, decltype(d)> floats;
+    auto height = hn::LoadU(d, heights + i);
+    if (added != nullptr) height = hn::Add(height, hn::LoadU(d, added + i));
+    // As RoundHeight does it: Round loses the sign of zero on some sets of instructions.
+    const auto scaled = hn::Mul(height, hn::Set(d, 1024)), no_fraction = hn::Set(d, 0x1p52);
+    const auto steps = hn::CopySign(hn::Sub(hn::Add(hn::Abs(scaled), no_fraction), no_fraction), scaled);
+    hn::StoreU(hn::DemoteTo(floats, hn::Mul(steps, hn::Set(d, 1.0 / 1024))), floats, out + i);
+  });
+}
+
+bool Places(const Position* nodes, std::size_t count, const GridAxes& axes, const float* heights, Position limit,
+            double* to_x, double* to_y) {
+  bool are_all_known = true;
+  ForVectors(count, [&](auto d, std::size_t i) HWY_ATTR {
+    using V = hn::Vec<decltype(d)>;
+    V x, y;
+    LoadPositions(d, nodes + i, x, y);
+    const auto column = Locate(d, x, axes.columns, axes.width), row = Locate(d, y, axes.rows, axes.height);
+    x = hn::Add(column.index, column.weight);
+    y = hn::Add(row.index, row.weight);
+    const V zero = hn::Zero(d), unknown = hn::Set(d, std::numeric_limits<double>::quiet_NaN());
+    const V height = hn::PromoteTo(d, hn::LoadU(hn::Rebind<float, decltype(d)>(), heights + i));
+    const auto is_between = [&](V place, double most)
+                                HWY_ATTR { return hn::And(hn::Gt(place, zero), hn::Lt(place, hn::Set(d, most))); };
+    const auto has_height = hn::Eq(height, height);
+    const auto is_known = hn::And(hn::And(column.is_known, row.is_known),
+                                  hn::And(has_height, hn::And(is_between(x, limit.x), is_between(y, limit.y))));
+    hn::StoreU(hn::IfThenElse(is_known, x, unknown), d, to_x + i);
+    hn::StoreU(hn::IfThenElse(is_known, y, unknown), d, to_y + i);
+    are_all_known &= hn::AllFalse(d, hn::AndNot(is_known, has_height));
+  });
+  return are_all_known;
+}
+
+bool AreAllKnown(const float* heights, std::size_t count) {
+  const hn::CappedTag<float, 16> d;
+  const std::size_t lanes = hn::Lanes(d);
+  auto sum = hn::Zero(d);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) sum = hn::Add(sum, hn::LoadU(d, heights + i));  // NaN if one is
+  bool are_known = hn::AllTrue(d, hn::Eq(sum, sum));
+  for (; i < count; ++i) are_known &= heights[i] == heights[i];
+  return are_known;
+}
+
+std::size_t VoidsAmong(const float* heights, std::size_t count) {
+  const hn::CappedTag<float, 16> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t i = 0, voids = 0;
+  for (; i + lanes <= count; i += lanes) voids += hn::CountTrue(d, hn::IsNaN(hn::LoadU(d, heights + i)));
+  for (; i < count; ++i) voids += heights[i] != heights[i] ? 1 : 0;
+  return voids;
+}
+
+bool MarkVoids(const std::uint8_t* inside, const float* heights, std::size_t count, std::uint8_t* wanted) {
+  const hn::CappedTag<float, 16> d;
+  const hn::RebindToSigned<decltype(d)> words;
+  const hn::Rebind<std::int16_t, decltype(d)> halves;
+  const hn::Rebind<std::int8_t, decltype(d)> bytes;
+  const hn::RebindToUnsigned<decltype(bytes)> marks;
+  const std::size_t lanes = hn::Lanes(d);
+  auto all = hn::Zero(marks);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const auto is_void = hn::VecFromMask(words, hn::RebindMask(words, hn::IsNaN(hn::LoadU(d, heights + i))));
+    const auto here =
+        hn::And(hn::BitCast(marks, hn::DemoteTo(bytes, hn::DemoteTo(halves, is_void))), hn::LoadU(marks, inside + i));
+    hn::StoreU(here, marks, wanted + i);
+    all = hn::Or(all, here);
+  }
+  bool is_any = !hn::AllTrue(marks, hn::Eq(all, hn::Zero(marks)));
+  for (; i < count; ++i) {
+    wanted[i] = heights[i] != heights[i] ? inside[i] : 0;
+    is_any |= wanted[i] != 0;
+  }
+  return is_any;
+}
+
+// Coordinates in turn, x and y, in the lanes of one vector.
+PositionExtent Extent(const Position* positions, std::size_t count) {
+  const hn::CappedTag<double, 8> d;
+  const std::size_t lanes = hn::Lanes(d), numbers = 2 * count;
+  const double* const number = &positions->x;
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  auto least = hn::Set(d, kFar), most = hn::Neg(least), sum = hn::Zero(d);
+  std::size_t i = 0;
+  for (; lanes > 1 && i + lanes <= numbers; i += lanes) {
+    const auto here = hn::LoadU(d, number + i);
+    const auto is_known = hn::Eq(here, here);
+    least = hn::Min(least, hn::IfThenElse(is_known, here, least));
+    most = hn::Max(most, hn::IfThenElse(is_known, here, most));
+    sum = hn::Add(sum, here);  // NaN if one is
+  }
+  PositionExtent extent;
+  extent.are_all_known = hn::AllTrue(d, hn::Eq(sum, sum));
+  const auto add = [&](const double* low, const double* high) {
+    if (low[0] < extent.min.x) extent.min.x = low[0];
+    if (low[1] < extent.min.y) extent.min.y = low[1];
+    if (high[0] > extent.max.x) extent.max.x = high[0];
+    if (high[1] > extent.max.y) extent.max.y = high[1];
+  };
+  double low[8], high[8];
+  hn::StoreU(least, d, low);
+  hn::StoreU(most, d, high);
+  for (std::size_t lane = 0; lane + 1 < lanes; lane += 2) add(low + lane, high + lane);
+  for (; i < numbers; i += 2) {
+    add(number + i, number + i);
+    extent.are_all_known &= number[i] == number[i] && number[i + 1] == number[i + 1];
+  }
+  return extent;
+}
+
+}  // namespace
+}  // namespace HWY_NAMESPACE
+}  // namespace terrace::dem
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace terrace::dem {
+namespace {
+
+HWY_EXPORT(InterpolateNodes);
+HWY_EXPORT(InterpolateLine);
+HWY_EXPORT(InterpolateLines);
+HWY_EXPORT(Round);
+HWY_EXPORT(Places);
+HWY_EXPORT(AreAllKnown);
+HWY_EXPORT(VoidsAmong);
+HWY_EXPORT(MarkVoids);
+HWY_EXPORT(Extent);
+
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
+
+NodeRows::NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
+                   std::size_t first, std::size_t end)
+    : samples_(samples), window_(window), cells_(cells), first_(first), heights_(end - first, kUnknown) {
+  if (!cells.is_separable()) return;
+  for (const GridAxis::Location& place : cells.columns().subspan(first, end - first)) {
+    // Columns of nodes that are not requested may lie outside.
+    const std::int64_t last = window.columns - 1, west = std::clamp<std::int64_t>(place.index - window.column, 0, last);
+    west_.push_back(static_cast<std::int32_t>(west));
+    east_.push_back(static_cast<std::int32_t>(std::min(west + (place.weight > 0 ? 1 : 0), last)));
+    weights_.push_back(place.weight);
+  }
+  for (Line& line : lines_) line.heights.resize(heights_.size());
+}
+
+const NodeRows::Line& NodeRows::LineOf(std::int64_t row) {
+  Line& line = lines_[static_cast<std::size_t>(row % 2)];
+  if (line.row == row) return line;
+  line.row = row;
+  HWY_DYNAMIC_DISPATCH(InterpolateLine)
+  (samples_.data() + (row - window_.row) * window_.columns, west_.data(), east_.data(), weights_.data(),
+   weights_.size(), line.heights.data());
+  return line;
+}
+
+std::span<const double> NodeRows::Row(std::size_t j) {
+  if (!cells_.is_separable()) {
+    // Columns that wrap are moved, and indices of 32 bits must do.
+    constexpr std::size_t kMaxSamples = std::size_t{1} << 31;
+    if (cells_.axes().columns.wraps() || samples_.size() >= kMaxSamples) return heights_;
+    HWY_DYNAMIC_DISPATCH(InterpolateNodes)
+    (cells_.positions().Row(j).data() + first_, heights_.size(), cells_.axes(), samples_.data(), window_,
+     heights_.data());
+    return heights_;
+  }
+  const GridAxis::Location& place = cells_.rows()[j];
+  const Line& north = LineOf(place.index);
+  if (place.weight <= 0) return north.heights;
+  const Line& south = LineOf(place.index + 1);
+  HWY_DYNAMIC_DISPATCH(InterpolateLines)
+  (north.heights.data(), south.heights.data(), place.weight, heights_.size(), heights_.data());
+  return heights_;
+}
+
+void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded) {
+  HWY_DYNAMIC_DISPATCH(Round)
+  (heights.data(), added.empty() ? nullptr : added.data(), heights.size(), rounded.data());
+}
+
+bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
+                       Position limit, std::span<double> x, std::span<double> y) {
+  if (axes.columns.wraps()) {
+    std::ranges::fill(x, kUnknown);
+    std::ranges::fill(y, kUnknown);
+    return false;
+  }
+  return HWY_DYNAMIC_DISPATCH(Places)(nodes.data(), nodes.size(), axes, heights.data(), limit, x.data(), y.data());
+}
+
+bool HasVoids(std::span<const float> heights) {
+  return !HWY_DYNAMIC_DISPATCH(AreAllKnown)(heights.data(), heights.size());
+}
+
+std::size_t CountVoids(std::span<const float> heights) {
+  return HWY_DYNAMIC_DISPATCH(VoidsAmong)(heights.data(), heights.size());
+}
+
+bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted) {
+  return HWY_DYNAMIC_DISPATCH(MarkVoids)(inside.data(), heights.data(), heights.size(), wanted.data());
+}
+
+PositionExtent ExtentOf(std::span<const Position> positions) {
+  return positions.empty() ? PositionExtent{} : HWY_DYNAMIC_DISPATCH(Extent)(positions.data(), positions.size());
+}
+
+}  // namespace terrace::dem
+#endif

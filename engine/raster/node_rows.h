@@ -1,0 +1,73 @@
+// Rows of nodes: the places of their samples and the heights between them, with SIMD. Results are bit-equal on all
+// instruction sets, and to those of GridAxes::CellAt and Interpolate for each node.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "engine/raster/grid_cells.h"
+
+namespace terrace::dem {
+
+// Interpolates along rows of nodes.
+class NodeRows {
+ public:
+  // For nodes `first` to `end` of each row. The arguments must outlive this object.
+  NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
+           std::size_t end);
+
+  // Returns one height per node from `first` on; NaN if a sample with a nonzero weight is void, and where Interpolate
+  // must be asked; undefined if the node's cell lies outside the window. Valid until the next call. Precondition: if
+  // the cells are separable, those of the row lie in the window's rows.
+  std::span<const double> Row(std::size_t j);
+
+ private:
+  struct Line {
+    std::int64_t row = -1;  // of samples
+    std::vector<double> heights;
+  };
+
+  const Line& LineOf(std::int64_t row);
+
+  const std::vector<float>& samples_;
+  const GridWindow window_;
+  const NodeCells& cells_;
+  const std::size_t first_;
+  std::vector<std::int32_t> west_, east_;  // by node, the columns of its samples in the window
+  std::vector<double> weights_;            // of the eastern ones
+  std::array<Line, 2> lines_;
+  std::vector<double> heights_;
+};
+
+// RoundHeight of each height plus what is added to it. `added`: one per height, or empty. Precondition: `rounded` has
+// one entry per height.
+void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
+
+// Whether a height is NaN.
+bool HasVoids(std::span<const float> heights);
+
+std::size_t CountVoids(std::span<const float> heights);
+
+// Marks the nodes whose height is wanted: 1 where `inside` is 1 and the height is NaN, else 0. Returns whether there is
+// one. Precondition: all spans have one entry per node.
+bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted);
+
+// The places of nodes in samples, index plus weight on each axis, in the cells of GridAxes::CellAt. NaN where the
+// height is NaN, and where a place is not between 0 and `limit`. Returns false if CellAt must be asked for some of
+// them: near the ends of an axis, and if columns wrap. Precondition: all spans have one entry per node.
+bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
+                       Position limit, std::span<double> x, std::span<double> y);
+
+// The outermost coordinates of positions that are known; infinite, with `min` above `max`, if there is none.
+struct PositionExtent {
+  Position min{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+  Position max{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  bool are_all_known = true;
+};
+PositionExtent ExtentOf(std::span<const Position> positions);
+
+}  // namespace terrace::dem

@@ -1,0 +1,383 @@
+#include "engine/sight/grid_sight.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "engine/raster/grid_cells.h"
+
+namespace terrace::dem {
+namespace {
+
+// Samples: parts of a ray that cross at most this many are measured.
+constexpr double kMeasured = 2;
+// Metres: with undulations that are not in the blocks, parts are at most this long.
+constexpr double kUndulationPart = 500;
+// Samples between places that are measured first.
+constexpr double kProbes = 24;
+// Samples: parts of a ray that cross at most this many, none of them void, are walked along.
+constexpr double kWalked = 64;
+// Metres: over the rounding of heights.
+constexpr double kSlack = 1e-6;
+// Parts of a cell with voids: its heights are no polynomial.
+constexpr int kRimParts = 16;
+
+double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
+
+}  // namespace
+
+// One piece of a ray over the grid. `s`: 0 .. 1 along the piece.
+struct GridSight::Scan {
+  const TrackPiece& piece;
+  const PieceOnGrid& on_grid;
+  SightSurface surface;
+  SightSearch& search;
+  std::vector<RayPart>& open;
+  const std::stop_token& stop;
+
+  double ShareOf(double s) const { return Lerp(piece.start, piece.end, s); }
+  void Open(double first, double last) {
+    const double start = ShareOf(first), end = ShareOf(last);
+    if (!open.empty() && open.back().end >= start) {
+      open.back().end = std::max(open.back().end, end);
+    } else {
+      open.push_back({start, end});
+    }
+  }
+};
+
+SightAnswer SightSearch::Answer(bool has_gaps) const {
+  SightAnswer answer;
+  answer.has_gaps = has_gaps;
+  if (clearance_m_ == kNone) return answer;
+  answer.clearance_m = clearance_m_;
+  answer.clearance_at = clearance_at_;
+  answer.is_visible = blocked_at_ == kNone;
+  if (!answer.is_visible) answer.blocked_at = blocked_at_;
+  return answer;
+}
+
+Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
+                                               SightSurface surface, SightSearch& search, const std::stop_token& stop) {
+  const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());
+  std::vector<RayPart> open;
+  // No raster grid before this one has heights, so all of its own count.
+  const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
+  for (std::size_t i = 0; i < pieces.size() && is_first; ++i) {
+    Scan scan{pieces[i], on_grid[i], surface, search, open, stop};
+    if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+  }
+  auto part = parts.begin();
+  for (std::size_t i = 0; i < pieces.size(); ++i) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "looking along a ray was stopped");
+    const TrackPiece& piece = pieces[i];
+    Scan scan{piece, on_grid[i], surface, search, open, stop};
+    const double length = piece.end - piece.start;
+    while (part != parts.end() && part->end <= piece.start && part + 1 != parts.end()) ++part;
+    for (auto p = part; p != parts.end() && p->start <= piece.end; ++p) {
+      const double first = std::clamp((p->start - piece.start) / length, 0.0, 1.0);
+      const double last = std::clamp((p->end - piece.start) / length, 0.0, 1.0);
+      if (first > last || (first == last && p->start != p->end)) continue;
+      if (const Result<void> done = Halve(scan, first, last); !done) return tl::unexpected(done.error());
+    }
+  }
+  return open;
+}
+
+std::int64_t GridSight::WrappedColumn(std::int64_t column) const {
+  return grid_.wraps() ? FloorMod(column, grid_.columns()) : column;
+}
+
+// Of positions on the grid. Positions in the outer half of the outermost pixels belong to the outermost cells.
+GridSight::CellRange GridSight::CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const {
+  const auto cell = [](double position, std::int64_t cells) {
+    return std::clamp(static_cast<std::int64_t>(std::floor(position)), std::int64_t{0},
+                      std::max(cells - 1, std::int64_t{0}));
+  };
+  const std::int64_t rows = grid_.rows() - 1;
+  if (grid_.wraps()) {
+    return {static_cast<std::int64_t>(std::floor(x.min)), cell(y.min, rows),
+            static_cast<std::int64_t>(std::floor(x.max)), cell(y.max, rows)};
+  }
+  const std::int64_t columns = grid_.columns() - 1;
+  return {cell(x.min, columns), cell(y.min, rows), cell(x.max, columns), cell(y.max, rows)};
+}
+
+// Measures some places first: the lower the smallest clearance is, the more of a ray can be skipped.
+Result<void> GridSight::Probe(Scan& scan) {
+  const double samples = std::max(std::abs(scan.on_grid.x.At(1) - scan.on_grid.x.At(0)),
+                                  std::abs(scan.on_grid.y.At(1) - scan.on_grid.y.At(0)));
+  if (!(samples > kProbes) || grid_.wraps()) return {};
+  const int count = static_cast<int>(std::min(samples / kProbes, 1000.0));
+  for (int i = 0; i < count; ++i) {
+    const double s = (i + 0.5) / count, x = scan.on_grid.x.At(s), y = scan.on_grid.y.At(s);
+    const bool is_between = x >= 0 && y >= 0 && x < grid_.columns() - 1 && y < grid_.rows() - 1;
+    if (!is_between ||
+        scan.search.IsSettled(scan.piece.height_m.At(s) - grid_.heights().max - SightBlocks::kMaxUndulation, 0))
+      continue;
+    const auto column = static_cast<std::int64_t>(x), row = static_cast<std::int64_t>(y);
+    blocks_.Trim();
+    const Result<const SightBlock*> block = blocks_.At(column, row, scan.stop);
+    if (!block) return tl::unexpected(block.error());
+    const GridWindow& window = (*block)->window();
+    const auto at = static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
+    const auto south = static_cast<std::size_t>(window.columns);
+    const float* const heights = (*block)->heights().data() + at;
+    const float* const owned = (*block)->owned().data() + at;
+    const double east_of = x - static_cast<double>(column), south_of = y - static_cast<double>(row);
+    double ground =
+        Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
+    if (std::isnan(ground + owned[0] + owned[1] + owned[south] + owned[south + 1])) continue;
+    if (!blocks_.includes_undulations()) {
+      ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    }
+    const double clearance_m = scan.piece.height_m.At(s) - ground;
+    scan.search.Add(clearance_m, scan.ShareOf(s));
+    if (clearance_m < -kSightTolerance) scan.search.AddBlocked(scan.ShareOf(s));
+  }
+  return {};
+}
+
+// No pointer to a block outlives a call that measures: halves are looked at after the block of the whole.
+Result<void> GridSight::Halve(Scan& scan, double first, double last) {
+  blocks_.Trim();
+  const Quadratic::Range x = scan.on_grid.x.Over(first, last), y = scan.on_grid.y.Over(first, last);
+  constexpr double kRim = 0.5 + GridCover::kEdgeTolerance;
+  const bool is_beside = (!grid_.wraps() && (x.max < -kRim || x.min > grid_.columns() - 1 + kRim)) || y.max < -kRim ||
+                         y.min > grid_.rows() - 1 + kRim;
+  // A position that the CRS does not have is not on the grid either.
+  if (is_beside || !(x.min <= x.max) || !(y.min <= y.max)) {
+    scan.Open(first, last);
+    return {};
+  }
+  const double height_m = scan.piece.height_m.Over(first, last).min;
+  const double size = std::max(x.max - x.min, y.max - y.min);
+  const double slack_m = blocks_.includes_undulations() ? 0 : SightBlocks::kMaxUndulation;
+  const CellRange cells = CellsOf(x, y);
+  const std::int64_t west = WrappedColumn(cells.west), east = west + cells.east - cells.west;
+  const bool is_in_block = (west / kPointBlockCells == east / kPointBlockCells) && east < grid_.columns() &&
+                           cells.north / kPointBlockCells == cells.south / kPointBlockCells;
+  CellsBound bound{0, true};
+  const SightBlock* within = nullptr;
+  if (is_in_block) {
+    const Result<const SightBlock*> block = blocks_.At(west, cells.north, scan.stop);
+    if (!block) return tl::unexpected(block.error());
+    within = *block;
+    bound = within->Over(west, cells.north, east, cells.south);
+  } else if (east < grid_.columns() && size > kPointBlockCells / 8) {
+    // Without reading the samples.
+    const BlockRange range = grid_.Ranges({static_cast<double>(west), static_cast<double>(cells.north),
+                                           static_cast<double>(east + 2), static_cast<double>(cells.south + 2)});
+    const float geoid_m = grid_.vertical().geoid ? static_cast<float>(SightBlocks::kMaxUndulation) : 0;
+    bound = {range.max + geoid_m, range.has_voids};
+  }
+  // Beside the raster other raster grids may have heights.
+  bound.has_voids |=
+      (!grid_.wraps() && (x.min < -0.5 || x.max > grid_.columns() - 0.5)) || y.min < -0.5 || y.max > grid_.rows() - 0.5;
+  if (!bound.has_voids && scan.search.IsSettled(height_m - bound.max - slack_m, scan.ShareOf(first))) return {};
+  if (is_in_block && bound.max == -std::numeric_limits<float>::infinity()) {
+    scan.Open(first, last);
+    return {};
+  }
+  const bool is_between = x.min >= 0 && y.min >= 0 && x.max <= grid_.columns() - 1 && y.max <= grid_.rows() - 1;
+  if (within != nullptr && size <= kWalked && !bound.has_voids && is_between && blocks_.includes_undulations()) {
+    return Walk(scan, *within, static_cast<double>(cells.west - west), first, last, size);
+  }
+  const double length_m = (last - first) * scan.piece.length_m;
+  if (size <= kMeasured && (blocks_.includes_undulations() || length_m <= kUndulationPart)) {
+    return Measure(scan, first, last);
+  }
+  const double middle = (first + last) / 2;
+  if (const Result<void> done = Halve(scan, first, middle); !done) return done;
+  return Halve(scan, middle, last);
+}
+
+// Steps of less than a sample lie in 2 x 2 cells. A step is measured unless it is above their largest corner.
+// `turn`: columns of whole turns around the Earth.
+Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size) {
+  // With A = |curvature| (last - first)^2, a step is at most (size + A) / count long, and its polynomial at most
+  // A / (4 count^2) beside its chord.
+  const double curvature = std::max(std::abs(scan.on_grid.x.curvature()), std::abs(scan.on_grid.y.curvature()));
+  const int count = static_cast<int>((size + 4 * curvature * (last - first) * (last - first)) * 1.125) + 1;
+  const double step = (last - first) / count;
+  const auto bulge = [step](const Quadratic& q) { return std::abs(q.curvature()) * step * step / 4; };
+  const Quadratic &on_x = scan.on_grid.x, &on_y = scan.on_grid.y, &height_m = scan.piece.height_m;
+  const GridWindow& window = block.window();
+  const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
+  const double north = static_cast<double>(window.row) + bulge(on_y) + kSlack;
+  const double slack_m = bulge(height_m) + kSlack;
+  const float* const largest = block.largest().data();
+  const auto stride = static_cast<std::size_t>(window.columns);
+  double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
+  for (int i = 1; i <= count; ++i) {
+    const double next = i == count ? last : first + step * i;
+    const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
+    // Positions before the window's first sample are cut off by no more than the bulge.
+    const auto column = static_cast<std::size_t>(std::max(std::min(x, next_x), 0.0));
+    const auto row = static_cast<std::size_t>(std::max(std::min(y, next_y), 0.0));
+    const auto highest = static_cast<double>(largest[row * stride + column]);
+    if (!scan.search.IsSettled(std::min(h, next_h) - highest, scan.ShareOf(s))) {
+      if (const Result<void> done = Measure(scan, s, next); !done) return done;
+    }
+    s = next, x = next_x, y = next_y, h = next_h;
+  }
+  return {};
+}
+
+// Divides a part where it crosses the lines of the grid.
+Result<void> GridSight::Measure(Scan& scan, double first, double last) {
+  std::array<double, 16> at{};
+  std::size_t count = 0;
+  at[count++] = first;
+  const std::array<std::pair<const Quadratic*, std::int64_t>, 2> axes = {
+      std::pair(&scan.on_grid.x, std::int64_t{grid_.columns()}),
+      std::pair(&scan.on_grid.y, std::int64_t{grid_.rows()})};
+  for (const auto& [axis, samples] : axes) {
+    const Quadratic::Range range = axis->Over(first, last);
+    for (double line = std::ceil(range.min); line <= range.max && count + 1 < at.size(); ++line) {
+      at[count++] = axis->Solve(line, first, last);
+    }
+    // Beyond the outermost samples the heights are those of the rim.
+    for (const double rim : {-0.5, static_cast<double>(samples) - 0.5}) {
+      if (rim > range.min && rim < range.max && count + 1 < at.size()) at[count++] = axis->Solve(rim, first, last);
+    }
+  }
+  at[count++] = last;
+  std::sort(at.begin(), at.begin() + static_cast<std::ptrdiff_t>(count));
+  for (std::size_t i = 0; i + 1 < count; ++i) {
+    if (at[i] == at[i + 1] && count > 2) continue;
+    if (const Result<void> done = MeasureInCell(scan, at[i], at[i + 1]); !done) return done;
+  }
+  return {};
+}
+
+bool GridSight::IsInside(const Scan& scan, double s) const {
+  Position pixel{scan.on_grid.x.At(s) + 0.5, scan.on_grid.y.At(s) + 0.5};
+  if (grid_.wraps()) pixel.x -= std::floor(pixel.x / grid_.columns()) * grid_.columns();
+  return grid_.Covers(pixel);
+}
+
+Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
+  const double middle = (first + last) / 2;
+  const double x = scan.on_grid.x.At(middle), y = scan.on_grid.y.At(middle);
+  const CellRange cell = CellsOf({x, x}, {y, y});
+  const std::int64_t column = WrappedColumn(cell.west), row = cell.north;
+  const Result<const SightBlock*> found = blocks_.At(column, row, scan.stop);
+  if (!found) return tl::unexpected(found.error());
+  const SightBlock& block = **found;
+  const GridWindow& window = block.window();
+  const std::size_t at = static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
+  const std::size_t east = window.columns > 1 ? 1 : 0;
+  const std::size_t south = window.rows > 1 ? static_cast<std::size_t>(window.columns) : 0;
+  const float* const heights = block.heights().data() + at;
+  const double nw = heights[0], ne = heights[east], sw = heights[south], se = heights[south + east];
+  const float* const owned = block.owned().data() + at;
+  const double all =
+      nw + ne + sw + se +
+      (scan.surface == SightSurface::kNotHoles ? 0.0 * (owned[0] + owned[east] + owned[south] + owned[south + east])
+                                               : 0.0);
+  const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
+  if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
+    MeasureRim(scan, block, column, row, first, last);
+    return {};
+  }
+  // The lowest place of a ray in a cell may lie below both ends of its part.
+  const double length = last - first, sag_m = std::abs(scan.piece.height_m.curvature()) * length * length / 4;
+  const double slack_m = sag_m + (blocks_.includes_undulations() ? kSlack : SightBlocks::kMaxUndulation);
+  const double lowest_m = std::min(scan.piece.height_m.At(first), scan.piece.height_m.At(last));
+  if (scan.search.IsSettled(lowest_m - std::max(std::max(nw, ne), std::max(sw, se)) - slack_m, scan.ShareOf(first))) {
+    return {};
+  }
+  const auto clearance = [&](double s) {
+    const double east_of = std::clamp(scan.on_grid.x.At(s) - static_cast<double>(cell.west), 0.0, 1.0);
+    const double south_of = std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0);
+    double ground = Lerp(Lerp(nw, ne, east_of), Lerp(sw, se, east_of), south_of);
+    if (!blocks_.includes_undulations()) {
+      ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    }
+    return scan.piece.height_m.At(s) - ground;
+  };
+  const double at_first = clearance(first), at_middle = clearance(middle), at_last = clearance(last);
+  const Quadratic over(at_first, at_middle, at_last);
+  scan.search.Add(at_first, scan.ShareOf(first));
+  scan.search.Add(at_last, scan.ShareOf(last));
+  const Quadratic::Range range = over.Over(0, 1);
+  if (range.min < std::min(at_first, at_last)) {
+    const double vertex = -over.Slope(0) / (2 * over.curvature());
+    scan.search.Add(range.min, scan.ShareOf(Lerp(first, last, vertex)));
+  }
+  if (range.min >= -kSightTolerance || scan.search.IsBlockedBefore(scan.ShareOf(first))) return {};
+  // The first place below the tolerance.
+  double place = 0;
+  if (at_first >= -kSightTolerance) {
+    double above = 0, below = 1;
+    if (at_last >= -kSightTolerance) below = -over.Slope(0) / (2 * over.curvature());
+    for (int step = 0; step < 40; ++step) {
+      const double half = (above + below) / 2;
+      (over.At(half) < -kSightTolerance ? below : above) = half;
+    }
+    place = below;
+  }
+  scan.search.AddBlocked(scan.ShareOf(Lerp(first, last, place)));
+  return {};
+}
+
+// In a cell with voids the weights of the other samples count, as for heights at points (Interpolate).
+void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
+                           double last) {
+  const double x = scan.on_grid.x.At((first + last) / 2);
+  const double turn = std::floor(x) - static_cast<double>(column);  // whole turns, where columns wrap
+  const double shift = grid_.wraps() ? turn : 0;
+  const auto clearance = [&](double s) -> std::optional<double> {
+    const GridCell cell{column, row, std::clamp(scan.on_grid.x.At(s) - shift - static_cast<double>(column), 0.0, 1.0),
+                        std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0)};
+    const bool is_owned =
+        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.owned(), block.window(), cell));
+    const auto height = is_owned ? Interpolate(block.heights(), block.window(), cell) : std::nullopt;
+    if (!height) return std::nullopt;
+    const double undulation_m = blocks_.includes_undulations()
+                                    ? 0
+                                    : blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
+    return scan.piece.height_m.At(s) - *height - undulation_m;
+  };
+  const auto add = [&](double s, double clearance_m) {
+    scan.search.Add(clearance_m, scan.ShareOf(s));
+    if (clearance_m < -kSightTolerance) scan.search.AddBlocked(scan.ShareOf(s));
+  };
+  double before = first;
+  std::optional<double> known = clearance(first);
+  if (known) add(first, *known);
+  for (int i = 1; i <= kRimParts; ++i) {
+    const double s = Lerp(first, last, static_cast<double>(i) / kRimParts);
+    const std::optional<double> next = clearance(s);
+    double edge = known ? s : before;  // where the heights end or begin
+    if (known.has_value() != next.has_value()) {
+      double with = known ? before : s, without = known ? s : before;
+      for (int step = 0; step < 30; ++step) {
+        edge = (with + without) / 2;
+        const std::optional<double> there = clearance(edge);
+        if (there) add(edge, *there);
+        (there ? with : without) = edge;
+      }
+    }
+    if (!known) scan.Open(before, next ? edge : s);
+    if (known && !next) scan.Open(edge, s);
+    if (next) add(s, *next);
+    known = next;
+    before = s;
+  }
+}
+
+std::size_t GridSights::blocks() const {
+  std::size_t blocks = 0;
+  for (const auto& [number, sight] : sights_) blocks += sight.blocks();
+  return blocks;
+}
+
+GridSight& GridSights::Of(std::size_t number, const RasterGrid& grid) {
+  if (sights_.size() + blocks() > kMaxSightBlocks) sights_.clear();
+  return sights_.try_emplace(number, grid).first->second;
+}
+
+}  // namespace terrace::dem

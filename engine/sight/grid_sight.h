@@ -1,0 +1,98 @@
+// Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
+//
+// Branch and bound: a part of a ray that is higher above the largest height below it than the smallest clearance found
+// so far is skipped; others are halved until they are short. Then the cells along them are compared one by one, and
+// in those that may matter the clearance is a polynomial of the second
+// degree between the lines of the grid, and its minimum is exact.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <span>
+#include <stop_token>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "engine/sight/sight_block.h"
+#include "engine/sight/sight_ray.h"
+#include "engine/sight/sight_track.h"
+
+namespace terrace::dem {
+
+// A part of a ray, as shares of its length.
+struct RayPart {
+  double start = 0, end = 1;
+};
+
+// What is known of a ray so far.
+class SightSearch {
+ public:
+  // Whether a part of the ray that begins at `start` and has at least this clearance can be skipped.
+  bool IsSettled(double clearance_m, double start) const {
+    return clearance_m >= clearance_m_ && (clearance_m >= -kSightTolerance || start >= blocked_at_);
+  }
+  // A clearance of the ray at a share of its length.
+  void Add(double clearance_m, double at) {
+    if (clearance_m < clearance_m_) clearance_m_ = clearance_m, clearance_at_ = at;
+  }
+  void AddBlocked(double at) { blocked_at_ = std::min(blocked_at_, at); }
+  bool IsBlockedBefore(double at) const { return blocked_at_ <= at; }
+  SightAnswer Answer(bool has_gaps) const;
+
+ private:
+  static constexpr double kNone = std::numeric_limits<double>::infinity();
+  double clearance_m_ = kNone, clearance_at_ = 0, blocked_at_ = kNone;
+};
+
+// Which heights of a raster grid count.
+enum class SightSurface : std::uint8_t {
+  kAll,       // measured, filled, and smooth ones in holes
+  kNotHoles,  // where the cell has a measured height or one in a narrow void, as other raster grids go before holes
+};
+
+// One raster grid and the rays over it. For one thread.
+class GridSight {
+ public:
+  explicit GridSight(const RasterGrid& grid) : grid_(grid), blocks_(grid) {}
+
+  // Measures the parts of a ray, in order. Returns the parts above places where the raster grid has no height.
+  // `pieces`: of the ray. Errors: those of RasterGrid::FindPointBlock.
+  Result<std::vector<RayPart>> Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
+                                      SightSurface surface, SightSearch& search, const std::stop_token& stop);
+
+  std::size_t blocks() const { return blocks_.size(); }  // in memory
+
+ private:
+  struct Scan;
+  struct CellRange {
+    std::int64_t west, north, east, south;
+  };
+
+  Result<void> Probe(Scan& scan);
+  Result<void> Halve(Scan& scan, double first, double last);
+  Result<void> Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size);
+  Result<void> Measure(Scan& scan, double first, double last);
+  Result<void> MeasureInCell(Scan& scan, double first, double last);
+  void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
+                  double last);
+  bool IsInside(const Scan& scan, double s) const;
+  std::int64_t WrappedColumn(std::int64_t column) const;
+  CellRange CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const;
+
+  const RasterGrid& grid_;
+  SightBlocks blocks_;
+};
+
+// The raster grids below the rays of a request. Those of earlier rays together keep at most kMaxSightBlocks blocks, and
+// so does the one that is in use. For one thread.
+class GridSights {
+ public:
+  // `number`: of the grid. The reference is valid until the next call.
+  GridSight& Of(std::size_t number, const RasterGrid& grid);
+  std::size_t blocks() const;  // in memory
+
+ private:
+  std::map<std::size_t, GridSight> sights_;
+};
+
+}  // namespace terrace::dem

@@ -1,0 +1,223 @@
+#include "engine/sources/prepare.h"
+
+#include <fmt/format.h>
+#include <xxhash.h>
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "engine/common/source_log.h"
+#include "engine/core/bytes.h"
+
+namespace terrace::dem {
+namespace {
+
+// Incremented whenever blocks are read differently from the same overviews, because the statistics compare samples with
+// blocks.
+constexpr std::uint32_t kOverviewReading = 2;
+// Incremented whenever detection finds other voids in the same raster (undeclared_nodata.h).
+constexpr std::uint32_t kNodataDetection = 2;
+
+// A hash of everything that the statistics of a raster depend on and that is known in advance.
+std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
+  ByteWriter writer;
+  writer.PutBytes(path);
+  writer.Put(files.fingerprint());
+  for (const int part : {layout.width, layout.height, layout.columns, layout.wraps ? 1 : 0}) writer.Put(part);
+  const SampleRules& rules = layout.rules;
+  writer.Put(rules.nodata.value_or(0));
+  for (const bool rule :
+       {rules.nodata.has_value(), rules.compare_as_float, rules.has_mask, rules.is_indicator, find_voids}) {
+    writer.Put<std::uint8_t>(rule ? 1 : 0);
+  }
+  for (const double rule :
+       {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest, double(rules.rim)}) {
+    writer.Put(rule);
+  }
+  writer.Put(static_cast<std::uint32_t>(rules.extra_nodata.size()));
+  for (const double value : rules.extra_nodata) writer.Put(value);
+  for (const int factor : layout.overview_factors) writer.Put(factor);
+  if (!layout.overview_factors.empty()) writer.Put(kOverviewReading);
+  if (find_voids) writer.Put(kNodataDetection);
+  writer.Put(layout.coast_step_m);
+  const std::string bytes = writer.Take();
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+// Loads or computes the statistics of one raster. Without a cache file they stay only in memory.
+class Preparer {
+ public:
+  Preparer(GDALDataset& dataset, const RasterLayout& layout, const std::string& path, const StampedFiles& files,
+           const PrepareOptions& options)
+      : dataset_(dataset),
+        path_(path),
+        files_(files),
+        options_(options),
+        shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
+        chunks_(layout.width, layout.height) {
+    if (options.cache.folder) {
+      cache_file_ = StatisticsPath(options.cache.folder->path(), path, layout.rules.extra_nodata, options.find_voids,
+                                   !layout.overview_factors.empty());
+      prepared_.use = std::make_shared<const CacheFolder::Use>(options.cache.folder, cache_file_);
+    }
+    prepared_.preparation.chunks = chunks_.count();
+  }
+
+  Result<PreparedRaster> Run() {
+    if (!cache_file_.empty()) {
+      if (Load()) return std::move(prepared_);
+      if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
+      if (!writer_ && Load()) return std::move(prepared_);
+    }
+    auto statistics = ReadStatistics();
+    if (statistics && LacksChunks()) statistics = ReadStatistics();
+    if (statistics && options_.find_voids && !shape_.detected.any())
+      statistics = WithoutFoundVoids(*std::move(statistics));
+    if (!statistics) return Named(statistics.error());
+    prepared_.detected = shape_.detected;
+    prepared_.statistics = *std::move(statistics);
+    FinishCache();
+    return std::move(prepared_);
+  }
+
+ private:
+  tl::unexpected<Error> Named(const Error& error) const {
+    return MakeError(error.code, "{}: {}", path_, error.message);
+  }
+
+  bool Load() {
+    auto known = LoadStatistics(cache_file_, shape_);
+    if (!known) return false;
+    prepared_.detected = std::move(known->detected);
+    prepared_.statistics = std::move(known->statistics);
+    prepared_.averages = std::move(known->averages);
+    prepared_.cache_file = cache_file_;
+    prepared_.shape = shape_;
+    prepared_.preparation.from_cache = true;
+    prepared_.use->Succeed();
+    return true;
+  }
+
+  // The folder logs the first failure.
+  void GiveUpCache(const Error& error) {
+    LogSource(SourceLog::Level::kDebug, path_, "what is learnt of it is not kept: {}", error.message);
+    const std::size_t at = error.message.starts_with(cache_file_) ? error.message.find(": ", cache_file_.size()) : 0;
+    prepared_.use->Fail(at == 0 || at == std::string::npos ? error.message : error.message.substr(at + 2));
+    writer_.reset();
+  }
+
+  // The averages of chunks that an interrupted run has read are in its file alone, and that is gone now.
+  bool LacksChunks() const { return !writer_ && averages_ != nullptr && !averages_are_whole_; }
+
+  // kCancelled: stopped.
+  Result<void> OpenWriter() {
+    auto writer = StatisticsCacheWriter::Open(options_.cache.folder, cache_file_, shape_, options_.stop);
+    if (writer) {
+      writer_ = *std::move(writer);
+      if (writer_) shape_ = writer_->shape();
+      return {};
+    }
+    if (writer.error().code == ErrorCode::kCancelled) return tl::unexpected(writer.error());
+    GiveUpCache(writer.error());
+    return {};
+  }
+
+  // One pass through the raster, continued after the chunks of an earlier run.
+  Result<RasterStatistics> ReadStatistics() {
+    const RasterLayout layout = shape_.EffectiveLayout();
+    StatisticsAssembler assembler(layout);
+    averages_.reset();  // before others take their place
+    if (options_.cache.memory) averages_ = MemoryAverages::Make(layout, options_.cache.memory);
+    int done = 0;
+    if (writer_) {
+      auto resumed = writer_->Resume([&](const ChunkStatistics& part) { assembler.Add(chunks_.At(done++), part); });
+      if (!resumed) GiveUpCache(resumed.error());
+      prepared_.preparation.chunks_kept += done;
+      if (done > 0)
+        LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
+    }
+    averages_are_whole_ = done == 0;
+    for (; done < chunks_.count(); ++done) {
+      const auto part =
+          ReadChunkStatistics(dataset_, layout, chunks_.At(done), prepared_.preparation.chunks_read, options_.stop);
+      if (!part) return tl::unexpected(part.error());
+      assembler.Add(chunks_.At(done), *part);
+      if (averages_) averages_->Add(chunks_.At(done), *part);
+      if (writer_) {
+        if (auto added = writer_->Add(*part); !added) GiveUpCache(added.error());
+      }
+      if (options_.progress) options_.progress((done + 1.0) / chunks_.count());
+    }
+    return assembler.Finish(dataset_, options_.stop);
+  }
+
+  // The statistics, or those of another pass if nodata was detected.
+  Result<RasterStatistics> WithoutFoundVoids(RasterStatistics statistics) {
+    const SampleRules& rules = shape_.layout.rules;
+    const bool has_collar = statistics.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
+    if (!MayHideVoids(rules, statistics.lowest, statistics.highest, statistics.voids > 0, has_collar))
+      return statistics;
+    auto detected = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, shape_.layout.coast_step_m, options_.stop);
+    if (!detected) return tl::unexpected(detected.error());
+    if (!detected->any()) return statistics;
+    shape_.detected = *std::move(detected);
+    if (writer_) {
+      if (auto restarted = writer_->Restart(shape_.detected); !restarted) GiveUpCache(restarted.error());
+    }
+    return ReadStatistics();
+  }
+
+  // In the folder, or where that fails in memory.
+  void FinishCache() {
+    // If a file changed meanwhile, the statistics are a mixture; the caller will refuse them.
+    if (files_.FirstChanged()) return;
+    if (writer_) {
+      if (auto finished = writer_->Finish(prepared_.statistics); !finished) GiveUpCache(finished.error());
+    }
+    if (auto known = writer_ ? LoadStatistics(cache_file_, shape_) : std::nullopt) {
+      prepared_.averages = std::move(known->averages);
+      prepared_.cache_file = cache_file_;
+      prepared_.shape = shape_;
+      prepared_.use->Succeed();
+    } else if (averages_are_whole_) {
+      prepared_.memory_averages = std::move(averages_);
+    }
+  }
+
+  GDALDataset& dataset_;
+  const std::string& path_;
+  const StampedFiles& files_;
+  const PrepareOptions& options_;
+  StatisticsShape shape_;
+  const ChunkGrid chunks_;
+  std::string cache_file_;  // its path; empty: none
+  std::optional<StatisticsCacheWriter> writer_;
+  std::unique_ptr<MemoryAverages> averages_;  // for the case that the file cannot be kept; null: they do not fit
+  bool averages_are_whole_ = true;            // have all chunks
+  PreparedRaster prepared_;
+};
+
+}  // namespace
+
+std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
+                           const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews) {
+  const std::filesystem::path whole = AbsolutePath(path);
+  ByteWriter writer;
+  writer.PutBytes(whole.string());
+  for (const double value : extra_nodata) writer.Put(value);
+  if (!find_voids) writer.Put<std::uint8_t>(0);
+  if (has_overviews) writer.Put<std::uint8_t>(1);
+  const std::string bytes = writer.Take();
+  return (std::filesystem::path(cache_dir) /
+          fmt::format("{}-{:016x}.statistics", whole.filename().string(), XXH3_64bits(bytes.data(), bytes.size())))
+      .string();
+}
+
+Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
+                                     const StampedFiles& files, const PrepareOptions& options) {
+  return Preparer(dataset, layout, path, files, options).Run();
+}
+
+}  // namespace terrace::dem

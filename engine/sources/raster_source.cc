@@ -1,0 +1,412 @@
+#include "engine/sources/raster_source.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iterator>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "engine/common/source_log.h"
+#include "engine/core/plain_number.h"
+#include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
+
+namespace terrace::dem {
+namespace {
+
+// Why overviews are not averages of valid heights alone, as many have averaged nodata values in them: by what the file
+// and its owner state.
+std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
+  GDALRasterBand& band = HeightBand(dataset);
+  const auto is_declared = [&](double value) { return rules.nodata && rules.IsSame(value, *rules.nodata); };
+  if (!std::ranges::all_of(rules.extra_nodata, is_declared)) {
+    return "they were made of samples too that `nodata` of the configuration calls voids; declare them in a copy with "
+           "`gdal_translate -a_nodata VALUE in out` and make its overviews";
+  }
+  if (!rules.has_mask) return {};
+  constexpr const char* kOwnMask =
+      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  if (!HasMaskBand(band)) {
+    return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
+           "bytes, and the overviews anew";
+  }
+  if (HasFileEndingWith(dataset, ".msk")) {
+    return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+  }
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr) continue;
+    GDALRasterBand* const mask = overview->GetMaskBand();
+    const bool has_mask = HasMaskBand(*overview) && mask != nullptr && mask->GetXSize() == overview->GetXSize() &&
+                          mask->GetYSize() == overview->GetYSize();
+    if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
+  }
+  return {};
+}
+
+// Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
+// file and the configuration, and those whose size is not that of a grid of averages. Returns the reason, with the
+// remedy, for people; empty if nothing was removed.
+std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) {
+  if (HeightBand(dataset).GetOverviewCount() == 0) return {};
+  if (layout.overview_factors.empty()) {
+    return "their sides are not those of the raster by 2, 4, 8 .., rounded up or down; `gdal_translate in out` without "
+           "them and `gdaladdo -r average out` make such ones";
+  }
+  std::string why = WhyMisleading(dataset, layout.rules);
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
+}
+
+// The same, based on the statistics of the raster and its overviews.
+std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
+  if (layout.overview_factors.empty()) return {};
+  int is_declared = 0;
+  HeightBand(dataset).GetNoDataValue(&is_declared);
+  const BlockRange all = statistics.table.Whole();
+  // Cubic and Lanczos kernels overshoot their input by less than this.
+  const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
+  std::string why;
+  if (layout.rules.has_mask) {
+    if (all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot) {
+      why =
+          "they have heights that the raster has not, as if they were made without its mask; copy it with "
+          "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+    }
+  } else if (layout.rules.nodata && is_declared == 0 && statistics.voids > 0) {
+    why =
+        "they were made of voids too, which are not declared; declare them in a copy with "
+        "`gdal_translate -a_nodata -32768 in out` and make its overviews";
+  }
+  if (!why.empty()) layout.overview_factors.clear();
+  return why;
+}
+
+RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  RasterInfo info;
+  info.path = path;
+  info.driver = dataset.GetDriverName();
+  info.width = layout.width;
+  info.height = layout.height;
+  info.data_type = GDALGetDataTypeName(HeightBand(dataset).GetRasterDataType());
+  info.crs = georeference.crs();
+  info.vertical_datum = georeference.vertical_datum();
+  info.height_unit = layout.rules.unit;
+  info.knows_height_unit = MetresPerUnit(layout.rules.unit).has_value();
+  info.picture_part = PicturePartOf(HeightBand(dataset));
+  info.pixel_width = georeference.pixel_width();
+  info.pixel_height = georeference.pixel_height();
+  info.pixel_unit = georeference.pixel_unit();
+  info.nodata = layout.rules.nodata;
+  info.overview_factors = layout.overview_factors;
+  info.transform = georeference.transform();
+  return info;
+}
+
+// Doubts about heights in metres that no land or sea floor has, for example if they are in centimetres without a stated
+// unit.
+std::string DoubtsOf(const HeightRange& heights) {
+  constexpr double kHighest = 9000, kDeepest = -11500;
+  if (heights.max <= kHighest && heights.min >= kDeepest) return "";
+  return fmt::format(
+      "heights from {} to {} m are hardly metres (Earth has -10,935 to 8,849), and those beyond {} count as "
+      "voids: state the metres a unit has with `gdal_translate -a_scale FACTOR in out`, 0.01 for centimetres",
+      PlainNumber(heights.min), PlainNumber(heights.max), PlainNumber(kMaxAbsHeight));
+}
+
+void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georeference& georeference,
+                    const RasterLayout& layout) {
+  if (dataset.GetRasterCount() > 1) {
+    LogSource(SourceLog::Level::kInfo, info.path, "has {} bands, heights are read from band 1",
+              dataset.GetRasterCount());
+  }
+  if (!info.knows_height_unit) {
+    LogSource(SourceLog::Level::kWarn, info.path, "height unit \"{}\" is not known, heights are taken as metres",
+              layout.rules.unit);
+  }
+  if (!info.heights_doubted.empty()) LogSource(SourceLog::Level::kWarn, info.path, "{}", info.heights_doubted);
+  if (!info.overviews_unused.empty()) {
+    LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
+  }
+  // One more column is allowed, for grids with nodes at -180 and at 180 degrees.
+  if (const int beyond = layout.width - layout.columns; beyond > 1) {
+    LogSource(
+        SourceLog::Level::kWarn, info.path,
+        "reaches more than once around the Earth: its last {} columns are taken for duplicates of its first and are "
+        "not read",
+        beyond);
+  }
+  if (!info.picture_part.empty()) {
+    LogSource(SourceLog::Level::kWarn, info.path,
+              "is a picture (its band 1 is \"{}\"), whose values are taken for heights; serve the elevation model "
+              "that belongs to it",
+              info.picture_part);
+  }
+  if (!info.transform.empty()) {
+    LogSource(SourceLog::Level::kDebug, info.path, "placed by PROJ operation \"{}\": {}", info.transform,
+              georeference.pipeline());
+  }
+}
+
+void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
+  if (!vertical.is_known()) {
+    LogSource(
+        SourceLog::Level::kWarn, path,
+        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
+        "sea level, set `vertical`, as in --vertical egm96");
+  } else if (vertical.geoid) {
+    LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
+              vertical.name, vertical.geoid->description());
+    LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
+    // Some programs write feet in places that GDAL does not read.
+    const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
+    if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
+      LogSource(SourceLog::Level::kWarn, path,
+                "the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
+                "they "
+                "are, say so with `gdal_edit.py -units \"{}\" file`",
+                unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
+    }
+  }
+}
+
+constexpr const char* kGone = "a file is gone or cannot be read";
+
+Position CentreOf(const Georeference& georeference) {
+  Position centre{georeference.width() / 2.0, georeference.height() / 2.0};
+  georeference.ToDegrees({&centre, 1});
+  return centre;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path, const SourceOptions& options,
+                                                         const RasterCache& cache,
+                                                         const std::function<void(double)>& progress,
+                                                         const std::stop_token& stop,
+                                                         std::shared_ptr<StatisticsPages> pages) {
+  const auto start = std::chrono::steady_clock::now();
+  if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
+  ForgetRemote(path);
+  const auto before = StampOf(path);
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
+  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
+  auto georeference = Georeference::Of(**dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+
+  std::unique_ptr<RasterSource> source(new RasterSource(path, *std::move(files), *std::move(georeference)));
+  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
+  source->vertical_ = *std::move(vertical);
+  // If the file names no unit, the configured vertical reference system does.
+  const std::string& stated = source->georeference_.vertical_unit();
+  const auto& geoid = source->vertical_.geoid;
+  source->layout_ =
+      RasterLayout::Of(**dataset, source->georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
+  if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: states a scale of {}, by which no sample has a height; correct it with `gdal_translate -a_scale "
+        "1 -a_offset 0 in out`",
+        path, scale);
+  }
+  source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
+  source->layout_.rules.extra_nodata = options.nodata;
+  std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
+  const PrepareOptions prepare{cache, options.find_voids, progress, stop};
+  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+  if (prepared && !prepared->detected.any()) {
+    const std::string why = DropMisleadingOverviews(**dataset, prepared->statistics, source->layout_);
+    if (!why.empty()) {
+      overviews_unused = why;
+      prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+    }
+  }
+  if (!prepared) return tl::unexpected(prepared.error());
+  source->layout_ = WithDetectedNodata(std::move(source->layout_), prepared->detected);
+  source->averages_ = prepared->averages;
+  source->memory_averages_ = prepared->memory_averages;
+  source->use_ = prepared->use;
+  source->preparation_ = prepared->preparation;
+  const RasterStatistics& statistics = prepared->statistics;
+  const std::string& found_voids = prepared->detected.text;
+
+  source->footprint_ = Footprint::Of(source->georeference_);
+  source->spacing_ = *spacing;
+  source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
+  source->info_.overviews_unused = std::move(overviews_unused);
+  source->info_.needs_averages = NeedsAverages(source->layout_);
+  source->info_.is_in_folder = source->averages_ != nullptr;
+  if (source->averages_) source->info_.least_kept_factor = source->averages_->least_factor();
+  if (source->memory_averages_) source->info_.least_kept_factor = source->memory_averages_->least_factor();
+  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  source->info_.found_voids = found_voids;
+  source->info_.datum_in_use = source->vertical_.name;
+  if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
+  source->info_.spacing_m = spacing->finer;
+  source->info_.bounds = source->footprint_.Bounds();
+  source->info_.heights = {statistics.lowest, statistics.highest};
+  source->info_.heights_doubted = DoubtsOf(source->info_.heights);
+  source->info_.valid_samples = statistics.valid;
+  source->info_.void_samples = statistics.voids;
+  source->info_.hole_samples = statistics.hole_samples;
+  LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
+  LogVertical(path, source->vertical_, source->layout_.rules.unit);
+  if (!found_voids.empty()) {
+    LogSource(SourceLog::Level::kWarn, path,
+              "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
+  }
+  if (statistics.rim_voids.is_everything()) {
+    spdlog::warn(
+        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
+  }
+  if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
+  return source;
+}
+
+bool StatisticsPages::Admit(std::size_t bytes) {
+  const std::lock_guard lock(mutex_);
+  if (bytes > kept_left_) return false;
+  kept_left_ -= bytes;
+  return true;
+}
+
+StatisticsPages::Statistics StatisticsPages::Find(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  const auto found = by_raster_.find(raster);
+  if (found == by_raster_.end()) return nullptr;
+  pages_.splice(pages_.begin(), pages_, found->second);
+  return found->second->statistics;
+}
+
+void StatisticsPages::Add(const void* raster, Statistics statistics) {
+  const std::size_t bytes = statistics->bytes();
+  const std::lock_guard lock(mutex_);
+  if (by_raster_.contains(raster)) return;  // by another thread meanwhile
+  pages_.push_front({raster, std::move(statistics), bytes});
+  by_raster_.emplace(raster, pages_.begin());
+  paged_ += bytes;
+  while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
+}
+
+void StatisticsPages::Forget(const void* raster) {
+  const std::lock_guard lock(mutex_);
+  if (const auto found = by_raster_.find(raster); found != by_raster_.end()) Remove(found->second);
+}
+
+std::size_t StatisticsPages::paged_bytes() const {
+  const std::lock_guard lock(mutex_);
+  return paged_;
+}
+
+void StatisticsPages::Remove(std::list<Page>::iterator page) {
+  paged_ -= page->bytes;
+  by_raster_.erase(page->raster);
+  pages_.erase(page);
+}
+
+RasterSource::~RasterSource() {
+  if (paging_) paging_->pages->Forget(this);
+}
+
+// In a dataset of thousands of rasters, the statistics take most of the memory.
+void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare,
+                                  std::shared_ptr<StatisticsPages> pages) {
+  constexpr std::size_t kMaxCoarse = 64;  // blocks of a level
+  RasterStatistics& statistics = prepared.statistics;
+  content_ = statistics.content;
+  edge_row_means_ = statistics.edge_row_means;
+  rim_voids_ = std::move(statistics.rim_voids);
+  if (pages == nullptr || prepared.cache_file.empty() || pages->Admit(statistics.bytes())) {
+    kept_ = std::make_shared<const RasterStatistics>(std::move(statistics));
+    return;
+  }
+  paging_ = std::make_unique<const Paging>(Paging{std::move(pages),
+                                                  statistics.table.Coarse(kMaxCoarse),
+                                                  !statistics.coarse.grids.empty(),
+                                                  std::move(prepared.cache_file),
+                                                  std::move(prepared.shape),
+                                                  {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
+}
+
+StatisticsPages::Statistics RasterSource::statistics() const {
+  if (kept_) return kept_;
+  if (auto known = paging_->pages->Find(this)) return known;
+  auto statistics = ReadStatistics();
+  if (!statistics) throw std::runtime_error(statistics.error().message);
+  auto shared = std::make_shared<const RasterStatistics>(*std::move(statistics));
+  paging_->pages->Add(this, shared);
+  return shared;
+}
+
+Result<RasterStatistics> RasterSource::ReadStatistics() const {
+  if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
+  LogSource(SourceLog::Level::kWarn, info_.path, "{} is gone or damaged; the source is prepared anew",
+            paging_->cache_file);
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!prepared) return tl::unexpected(prepared.error());
+  // The next time would cost as much.
+  if (prepared->cache_file.empty() && !has_lost_cache_.exchange(true)) use_->Fail(kGone);
+  return std::move(prepared->statistics);
+}
+
+BlockRange RasterSource::RangeIn(double west, double north, double east, double south) const {
+  if (kept_) return kept_->table.Query(west, north, east, south);
+  if (const auto known = paging_->ranges.TryQuery(west, north, east, south)) return *known;
+  return statistics()->table.Query(west, north, east, south);
+}
+
+// Until the raster is reopened, it is read at full resolution.
+void RasterSource::LoseCache(const Error& error) const {
+  if (has_lost_cache_.exchange(true)) return;
+  if (error.code == ErrorCode::kNotFound) {
+    use_->Fail(kGone);
+    return;
+  }
+  averages_->Discard();
+  LogSource(SourceLog::Level::kWarn, info_.path, "{}; it is prepared anew when it is next opened", error.message);
+}
+
+Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
+                                                    const std::stop_token& stop) const {
+  // Uses memory and the cache file only if the files have not changed since they were prepared.
+  if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    if (const StatisticsPages::Statistics known = statistics(); known->coarse.Has(factor))
+      return known->coarse.Read(factor, window);
+  }
+  if (memory_averages_ && memory_averages_->Has(factor)) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    return memory_averages_->Read(factor, window);
+  }
+  if (averages_ && averages_->Has(factor) && !has_lost_cache_) {
+    if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+    auto averages = averages_->Read(factor, window);
+    if (averages || averages.error().code == ErrorCode::kUnavailable) return averages;
+    LoseCache(averages.error());
+  }
+  auto handle = handles_.Borrow();
+  if (!handle) return tl::unexpected(handle.error());
+  auto heights = ReadGrid(**handle, layout_, factor, window, stop);
+  // Files may be overwritten during a read: then both its result and its error are discarded.
+  if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);
+  return heights;
+}
+
+}  // namespace terrace::dem

@@ -1,0 +1,153 @@
+// One raster file of a dataset: its georeference, layout, height statistics and samples. Independent of levels, floors
+// and other rasters. Immutable after Open, thread-safe.
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+#include "engine/core/result.h"
+#include "engine/crs/footprint.h"
+#include "engine/crs/georeference.h"
+#include "engine/crs/level_plan.h"
+#include "engine/crs/vertical_datum.h"
+#include "engine/gdal/gdal_handle.h"
+#include "engine/raster/sample_grid.h"
+#include "engine/sources/prepare.h"
+#include "engine/statistics/raster_statistics.h"
+
+namespace terrace::dem {
+
+// Memory budget for the statistics of a dataset's rasters. Statistics beyond it are read from the statistics cache on
+// demand.
+//
+// Two budgets of bytes: for statistics that stay in memory with their raster, and for statistics that are paged,
+// evicted least recently used first. Thread-safe.
+class StatisticsPages {
+ public:
+  using Statistics = std::shared_ptr<const RasterStatistics>;
+
+  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), most_paged_(paged_bytes) {}
+
+  // Whether statistics of this size fit the first budget. If so, they are charged to it.
+  bool Admit(std::size_t bytes);
+
+  // Null: not in memory.
+  Statistics Find(const void* raster);
+  void Add(const void* raster, Statistics statistics);
+  void Forget(const void* raster);
+
+  std::size_t paged_bytes() const;
+
+ private:
+  struct Page {
+    const void* raster;
+    Statistics statistics;
+    std::size_t bytes;
+  };
+  void Remove(std::list<Page>::iterator page);
+
+  mutable std::mutex mutex_;
+  std::size_t kept_left_;  // guarded by mutex_, as are these
+  const std::size_t most_paged_;
+  std::size_t paged_ = 0;
+  std::list<Page> pages_;  // most recently used first
+  std::unordered_map<const void*, std::list<Page>::iterator> by_raster_;
+};
+
+class RasterSource {
+ public:
+  // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
+  // Statistics are stored in `cache`, or loaded from it. `pages`: limits the memory of the statistics of this and other
+  // rasters; null: no limit. kCancelled: stopped.
+  static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
+                                                    const RasterCache& cache = {},
+                                                    const std::function<void(double)>& progress = {},
+                                                    const std::stop_token& stop = {},
+                                                    std::shared_ptr<StatisticsPages> pages = nullptr);
+  ~RasterSource();
+
+  const RasterInfo& info() const { return info_; }
+  const Georeference& georeference() const { return georeference_; }
+  // The vertical datum of the samples. They are not converted here.
+  const VerticalDatum& vertical() const { return vertical_; }
+  const RasterLayout& layout() const { return layout_; }
+  const Footprint& footprint() const { return footprint_; }
+  const SourceSpacing& spacing() const { return spacing_; }
+  const RimVoids& rim_voids() const { return rim_voids_; }
+  // A hash of the heights in metres. Copies of the file have the same hash.
+  const ContentHash& content() const { return content_; }
+  // Means of the valid samples of the first and the last row.
+  const std::array<std::optional<double>, 2>& edge_row_means() const { return edge_row_means_; }
+
+  // The raster's statistics. May read them from the cache file; keep the result for repeated use. Throws
+  // std::runtime_error if they can be neither read nor computed again, for example because the raster was removed.
+  StatisticsPages::Statistics statistics() const;
+  // The range of a box of pixels (RangeTable::Query). Large boxes need no read of the cache file.
+  BlockRange RangeIn(double west, double north, double east, double south) const;
+  const StampedFiles& files() const { return handles_.files(); }
+
+  // The averages in the cache file; null: none.
+  const CachedAverages* averages() const { return averages_.get(); }
+  // Null: none.
+  const MemoryAverages* memory_averages() const { return memory_averages_.get(); }
+  // Whether the cache file can no longer be read. Reopening the raster restores it, or keeps averages in memory.
+  bool has_lost_cache() const { return has_lost_cache_; }
+
+  // How the statistics were made.
+  const Preparation& preparation() const { return preparation_; }
+
+  // ReadGrid of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or removed.
+  // kUnavailable: a file cannot be read. kCancelled: stopped. Errors name the file.
+  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+
+  // kChanged: a file was changed, replaced or removed since it was opened.
+  Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
+
+ private:
+  void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
+  Result<RasterStatistics> ReadStatistics() const;
+  void LoseCache(const Error& error) const;
+
+  RasterSource(std::string path, StampedFiles files, Georeference where)
+      : handles_(std::move(path), std::move(files)), georeference_(std::move(where)) {}
+
+  mutable HandlePool handles_;  // thread-safe
+  const Georeference georeference_;
+  VerticalDatum vertical_;
+  RasterLayout layout_;
+  Footprint footprint_;
+  SourceSpacing spacing_;
+  ContentHash content_;
+  std::array<std::optional<double>, 2> edge_row_means_;
+  RimVoids rim_voids_;
+  StatisticsPages::Statistics kept_;  // null: the statistics are paged
+  // Set if the statistics are paged.
+  struct Paging {
+    std::shared_ptr<StatisticsPages> pages;
+    RangeTable ranges;  // of coarse blocks
+    bool has_coarse_averages;
+    std::string cache_file;
+    StatisticsShape shape;
+    PrepareOptions prepare;
+  };
+  std::unique_ptr<const Paging> paging_;
+  std::shared_ptr<const CachedAverages> averages_;         // null: none
+  std::shared_ptr<const MemoryAverages> memory_averages_;  // null: none
+  std::shared_ptr<const CacheFolder::Use> use_;            // of the cache file; null: no cache folder
+  mutable std::atomic<bool> has_lost_cache_{false};
+  Preparation preparation_;
+  RasterInfo info_;
+};
+
+}  // namespace terrace::dem

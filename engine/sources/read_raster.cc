@@ -1,0 +1,95 @@
+#include "engine/sources/read_raster.h"
+
+#include <ogr_spatialref.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "engine/common/dem_types.h"
+#include "engine/crs/georeference.h"
+#include "engine/crs/level_plan.h"
+#include "engine/gdal/raster_file.h"
+#include "engine/gdal/sample_rules.h"
+#include "engine/statistics/raster_chunk.h"
+#include "engine/statistics/undeclared_nodata.h"
+
+namespace terrace::dem {
+namespace {
+
+// Reads into a vector with enough capacity.
+Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::function<void(double)>& progress,
+                     RasterHeights& raster) {
+  constexpr int kRowsAtOnce = 256;
+  for (int row = 0; row < raster.height; row += kRowsAtOnce) {
+    const int rows = std::min(kRowsAtOnce, raster.height - row);
+    float* out = raster.heights.data() + Area(row, raster.width);
+    if (auto read = ReadHeights(band, rules, 0, row, raster.width, rows, out, {}); !read) return read;
+    if (progress) progress(static_cast<double>(row + rows) / raster.height);
+  }
+  return {};
+}
+
+// Detects undeclared voids of a raster in memory, by the same rules as for served rasters (raster_statistics.h).
+Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& band, const SampleRules& rules,
+                                   double spacing_m) {
+  float lowest = std::numeric_limits<float>::infinity(), highest = -lowest;
+  bool has_voids = false;
+  for (const float height : raster.heights) {
+    lowest = std::min(lowest, height);  // ignores NaN, the second argument
+    highest = std::max(highest, height);
+    has_voids |= std::isnan(height);
+  }
+  ZeroEdges zeros;
+  const double coast_step_m = ZeroEdges::CoastStep(spacing_m);
+  zeros.Add(raster.heights.data(), raster.width, {0, 0, raster.width, raster.height}, raster.width, raster.height,
+            coast_step_m);
+  const bool has_collar = zeros.IsCollar(raster.width, raster.height);
+  const bool is_empty = !(lowest <= highest);
+  if (is_empty || !MayHideVoids(rules, lowest, highest, has_voids, has_collar)) return DetectedNodata{};
+  return FindVoids(band, rules, has_collar, coast_step_m);
+}
+
+}  // namespace
+
+Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& options) {
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  RasterHeights raster;
+  raster.width = (*dataset)->GetRasterXSize();
+  raster.height = (*dataset)->GetRasterYSize();
+  if (auto fits = CheckSizeToMesh(path, raster.width, raster.height); !fits) return tl::unexpected(fits.error());
+  raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
+  GDALRasterBand& band = HeightBand(**dataset);
+  raster.picture_part = PicturePartOf(band);
+  // Rasters that are only meshed need no georeference; if they have none, no CRS states the unit of heights.
+  const auto georeference = Georeference::Of(**dataset, path);
+  const auto spacing = georeference ? SourceSpacing::Of(*georeference, path) : SourceSpacing{};
+  if (georeference && MetresPerUnit(georeference->pixel_unit()).value_or(1) != 1) {
+    raster.coordinate_unit = georeference->pixel_unit();
+  }
+  const OGRSpatialReference* const crs = (*dataset)->GetSpatialRef();
+  raster.in_angles = raster.georeferenced && crs != nullptr && crs->IsGeographic() != 0;
+  SampleRules rules = SampleRules::Of(band, georeference ? georeference->vertical_unit() : "");
+  rules.extra_nodata = options.nodata;
+  // With spare capacity, so that tin::HeightField can increase the stride without a copy.
+  constexpr std::size_t kRoomOfRow = 32;
+  raster.heights.reserve((static_cast<std::size_t>(raster.width) + kRoomOfRow) *
+                         static_cast<std::size_t>(raster.height));
+  raster.heights.resize(Area(raster.width, raster.height));
+  const auto damaged = [&](const Error& error) {
+    return MakeError(error.code, "{}: {}; the file may be damaged: check it with gdalinfo -checksum", path,
+                     error.message);
+  };
+  if (auto read = ReadAll(band, rules, options.progress, raster); !read) return damaged(read.error());
+  if (!options.find_voids) return raster;
+  const auto detected = FindVoidsOf(raster, band, rules, spacing ? spacing->finer : 0);
+  if (!detected) return damaged(detected.error());
+  if (!detected->any()) return raster;
+  raster.found_voids = detected->text;
+  detected->AddTo(rules);
+  if (auto read = ReadAll(band, rules, {}, raster); !read) return damaged(read.error());
+  return raster;
+}
+
+}  // namespace terrace::dem

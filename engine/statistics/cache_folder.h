@@ -1,0 +1,88 @@
+// A folder of statistics files (statistics_cache.h) with a limited total size.
+// Several processes may share it. Before a file grows, the least recently used files are removed until it fits. Loading
+// a file counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's
+// modification time. Files in use by this process are not removed. Files that terrace did not write are neither counted
+// nor removed: a file is recognized by its name and its first bytes.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "engine/common/open_file.h"
+#include "engine/core/result.h"
+
+namespace terrace::dem {
+
+// Thread-safe.
+class CacheFolder {
+ public:
+  static constexpr std::uint64_t kUnbounded = ~std::uint64_t{0};
+  // The extension of finished files, and the suffix of files that are being written.
+  static constexpr std::string_view kEnding = ".statistics", kPartial = ".partial";
+  static constexpr std::uint64_t kMagic = 0x31'53'54'41'54'53'52'54;  // "TRSTATS1", the first bytes of each file
+
+  explicit CacheFolder(std::string path, std::uint64_t max_bytes = kUnbounded);
+  ~CacheFolder();
+  CacheFolder(const CacheFolder&) = delete;
+  CacheFolder& operator=(const CacheFolder&) = delete;
+
+  const std::string& path() const { return path_; }
+  std::uint64_t max_bytes() const { return max_bytes_; }
+
+  // Marks one raster's file as in use until the object is destroyed. The file need not exist.
+  class Use {
+   public:
+    Use(std::shared_ptr<CacheFolder> folder, const std::string& file);
+    ~Use();
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+    CacheFolder& folder() const { return *folder_; }
+    // Reports that the file can be neither stored nor read. `reason`: "cannot be written: No space left on device".
+    void Fail(const std::string& reason) const;
+    void Succeed() const;
+
+   private:
+    const std::shared_ptr<CacheFolder> folder_;
+    const std::string name_;
+  };
+
+  // Reserves bytes by which a file is about to grow. kUnavailable: files in use occupy the budget.
+  Result<void> Reserve(std::uint64_t bytes);
+  // Releases bytes that were reserved.
+  void Release(std::uint64_t bytes);
+  // Removes files until the budget is met. Logs a warning if files in use exceed it.
+  void Trim();
+
+  // The reason why a file in use is not stored, without its path. Empty: all are stored.
+  std::string problem() const;
+
+ private:
+  struct File {
+    std::string name;  // in the folder
+    FileIdentity identity;
+    std::uint64_t bytes = 0;
+    std::int64_t modified_ns = 0;
+  };
+  void Scan();
+  void Evict(std::uint64_t bytes);
+  bool IsInUse(const std::string& name) const;
+
+  const std::string path_;
+  const std::uint64_t max_bytes_;
+  mutable std::mutex mutex_;
+  std::multiset<std::string> in_use_;           // names; guarded by mutex_, as are these
+  std::map<const Use*, std::string> problems_;  // reasons
+  std::uint64_t bytes_ = 0, since_scan_ = 0;    // known size of all files; bytes reserved since the last scan
+  std::optional<std::chrono::steady_clock::time_point> scanned_at_;
+  std::multimap<std::int64_t, File> oldest_first_;  // files that were not in use at the last scan, by modification time
+};
+
+}  // namespace terrace::dem

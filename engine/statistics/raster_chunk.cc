@@ -1,0 +1,368 @@
+#include "engine/statistics/raster_chunk.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "engine/common/dem_types.h"
+#include "engine/raster/grid_cells.h"
+#include "engine/statistics/averaging_errors.h"
+#include "engine/statistics/kept_factors.h"
+
+namespace terrace::dem {
+namespace {
+
+// How far averages of the largest directly compared factor extend beyond a chunk.
+constexpr int kHalo = kLargestDirect;
+
+// The raster's factors from `least` to `most`.
+template <typename Visit>
+void ForEachFactor(const RasterLayout& layout, int least, int most, const Visit& visit) {
+  for (int factor = 2; factor <= most; factor *= 2) {
+    if (factor >= least) visit(factor);
+    if (factor >= std::max(layout.width, layout.height)) return;
+  }
+}
+
+// Samples of a box of the raster.
+struct Samples {
+  Chunk box;
+  std::vector<float> heights;
+
+  const float* Row(int row) const { return heights.data() + Area(row - box.row, box.cols); }
+};
+
+// Returns false if the file stores nothing there and GDAL's replacement value is a void.
+bool MayHaveSamples(GDALRasterBand& band, const RasterLayout& layout, const Chunk& chunk) {
+  const int status = band.GetDataCoverageStatus(chunk.col, chunk.row, chunk.cols, chunk.rows, 0, nullptr);
+  if (status != GDAL_DATA_COVERAGE_STATUS_EMPTY || layout.rules.has_mask) return true;
+  int has = 0;
+  const double nodata = band.GetNoDataValue(&has);
+  return !std::isnan(layout.rules.ToHeight(has != 0 ? nodata : 0));
+}
+
+Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
+  const int west = std::max(0, chunk.col - kHalo), north = std::max(0, chunk.row - kHalo);
+  return {west, north, std::min(layout.width, chunk.col + chunk.cols + kHalo) - west,
+          std::min(layout.height, chunk.row + chunk.rows + kHalo) - north};
+}
+
+// Statistics of one row, of its first `used` samples.
+void AddVoidRuns(const float* row, int r, int used, std::vector<VoidRun>& runs) {
+  for (int c = 0; c < used; ++c) {
+    if (!std::isnan(row[c])) continue;
+    const int first = c;
+    while (c + 1 < used && std::isnan(row[c + 1])) ++c;
+    runs.push_back({static_cast<std::uint16_t>(r), static_cast<std::uint16_t>(first), static_cast<std::uint16_t>(c)});
+  }
+}
+
+void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout& layout, ChunkStatistics& statistics) {
+  statistics.zeros.Add(samples.Row(chunk.row) + (chunk.col - samples.box.col), samples.box.cols, chunk, layout.width,
+                       layout.height, layout.coast_step_m);
+  const int columns = DivideUp(chunk.cols, RangeTable::kBlock);
+  for (int r = 0; r < chunk.rows; ++r) {
+    const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
+    BlockRange* ranges = statistics.ranges.data() + std::ptrdiff_t{r / RangeTable::kBlock} * columns;
+    const std::int64_t before = statistics.valid;
+    for (int c = 0; c < chunk.cols; ++c) {
+      ranges[c / RangeTable::kBlock].Add(row[c]);
+      statistics.valid += std::isnan(row[c]) ? 0 : 1;
+    }
+    const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
+    if (statistics.valid - before < chunk.cols) AddVoidRuns(row, r, used, statistics.voids);
+    const auto add = [&](BlockSum& sum) {
+      for (int c = 0; c < used; ++c) sum.Add(row[c]);
+    };
+    if (chunk.row + r == 0) add(statistics.first_row);
+    if (chunk.row + r == layout.height - 1) add(statistics.last_row);
+  }
+}
+
+ContentHash HashOf(const Samples& samples, const Chunk& chunk) {
+  ContentHasher hasher;
+  for (int r = 0; r < chunk.rows; ++r) {
+    const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
+    hasher.AddBytes(row, static_cast<std::size_t>(chunk.cols) * sizeof(float));
+  }
+  return hasher.Hash();
+}
+
+// Sums of the blocks of a box of samples. The box begins at a block and ends with a block or the raster.
+std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int factor) {
+  const int columns = DivideUp(box.cols, factor);
+  std::vector<BlockSum> sums(Area(columns, DivideUp(box.rows, factor)));
+  for (int r = 0; r < box.rows; ++r) {
+    const float* row = samples.Row(box.row + r) + (box.col - samples.box.col);
+    BlockSum* to = sums.data() + std::ptrdiff_t{r / factor} * columns;
+    for (int first = 0; first < box.cols; first += factor, ++to) {
+      BlockSum sum = *to;
+      const int end = std::min(first + factor, box.cols);
+      for (int c = first; c < end; ++c) sum.Add(row[c]);
+      *to = sum;
+    }
+  }
+  return sums;
+}
+
+// All averages that the surface over a chunk's samples is interpolated from.
+struct Averages {
+  GridWindow window;
+  std::vector<float> heights;
+
+  const float* Row(std::int64_t row) const { return heights.data() + (row - window.row) * window.columns; }
+};
+
+GridWindow AveragesAround(const Chunk& chunk, const RasterLayout& layout, int factor) {
+  const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
+  const int used = std::min(chunk.cols, layout.columns - chunk.col);
+  std::int64_t west = chunk.col / factor - 1, east = (chunk.col + used - 1) / factor + 1;
+  if (!layout.wraps) west = std::max<std::int64_t>(west, 0), east = std::min(east, columns.count() - 1);
+  const std::int64_t north = std::max(chunk.row / factor - 1, 0);
+  const std::int64_t south = std::min<std::int64_t>((chunk.row + chunk.rows - 1) / factor + 1, rows.count() - 1);
+  return {west, north, east - west + 1, south - north + 1};
+}
+
+// Computed from the samples, or read by ReadGrid if there is an overview.
+Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
+                               const Chunk& chunk, int factor, const std::stop_token& stop) {
+  Averages averages{AveragesAround(chunk, layout, factor), {}};
+  const GridWindow& window = averages.window;
+  if (StartingFactor(layout, factor) > 1) {
+    auto read = ReadGrid(dataset, layout, factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    averages.heights = *std::move(read);
+    return averages;
+  }
+  averages.heights.resize(static_cast<std::size_t>(window.columns * window.rows));
+  Chunk box = samples.box;
+  box.cols = std::min(box.cols, layout.columns - box.col);
+  const std::vector<BlockSum> sums = SumsOf(samples, box, factor);
+  const std::int64_t first = box.col / factor, columns = DivideUp(box.cols, factor), top = box.row / factor;
+  for (std::int64_t c = 0; c < window.columns; ++c) {
+    const std::int64_t column = window.column + c;
+    if (column >= first && column < first + columns) {
+      for (std::int64_t r = 0; r < window.rows; ++r) {
+        averages.heights[static_cast<std::size_t>(r * window.columns + c)] =
+            sums[static_cast<std::size_t>((window.row + r - top) * columns + column - first)].Mean();
+      }
+      continue;
+    }
+    // Around the Earth.
+    auto read = ReadGrid(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
+    if (!read) return tl::unexpected(read.error());
+    for (std::int64_t r = 0; r < window.rows; ++r) {
+      averages.heights[static_cast<std::size_t>(r * window.columns + c)] = (*read)[static_cast<std::size_t>(r)];
+    }
+  }
+  return averages;
+}
+
+// Adds the differences between one row of samples and the surface between averages to its blocks.
+class RowErrors {
+ public:
+  RowErrors(const Averages& averages, const Chunk& chunk, const RasterLayout& layout, int factor)
+      : averages_(averages),
+        rows_(layout.height, factor, false),
+        line_(static_cast<std::size_t>(averages.window.columns)) {
+    const GridAxis columns(layout.columns, factor, layout.wraps);
+    const int used = std::min(chunk.cols, layout.columns - chunk.col);
+    for (int c = 0; c < used; ++c) {
+      GridAxis::Location place = columns.Locate(chunk.col + c + 0.5);
+      place.index -= averages.window.column;
+      // An index past the end with weight 0 is replaced by its neighbour.
+      if (place.index + 1 >= averages.window.columns) place = {averages.window.columns - 2, 1};
+      if (averages.window.columns == 1) place = {0, 0};
+      places_.push_back(place);
+    }
+  }
+
+  void Add(const float* samples, int row, int block, float* errors) {
+    const GridAxis::Location place = rows_.Locate(row + 0.5);
+    const float* upper = averages_.Row(place.index);
+    const float* lower = place.weight > 0 ? averages_.Row(place.index + 1) : upper;
+    bool has_voids = false;
+    for (std::size_t i = 0; i < line_.size(); ++i) {
+      line_[i] = upper[i] * (1 - place.weight) + lower[i] * place.weight;
+      has_voids |= std::isnan(line_[i]);
+    }
+    const auto count = static_cast<int>(places_.size());
+    for (int first = 0; first < count; first += block, ++errors) {
+      const int end = std::min(first + block, count);
+      *errors = std::max(
+          *errors, has_voids ? WithVoids(samples, upper, lower, place.weight, first, end) : Plain(samples, first, end));
+    }
+  }
+
+ private:
+  float Plain(const float* samples, int first, int end) const {
+    double worst = 0;
+    const bool single = line_.size() == 1;
+    for (int c = first; c < end; ++c) {
+      const auto& [index, weight] = places_[static_cast<std::size_t>(c)];
+      const double* at = line_.data() + index;
+      const double height = single ? at[0] : at[0] + weight * (at[1] - at[0]);
+      const double error = std::abs(height - double{samples[c]});
+      if (error > worst) worst = error;  // never for a void
+    }
+    return Up(worst);
+  }
+
+  float WithVoids(const float* samples, const float* upper, const float* lower, double weight, int first,
+                  int end) const {
+    double worst = 0;
+    for (int c = first; c < end; ++c) {
+      if (std::isnan(samples[c])) continue;
+      const auto& [index, x] = places_[static_cast<std::size_t>(c)];
+      const std::int64_t next = std::min<std::int64_t>(index + 1, averages_.window.columns - 1);
+      double sum = 0, weights = 0;
+      const auto add = [&](float height, double share) {
+        if (share <= 0 || std::isnan(height)) return;
+        sum += share * height;
+        weights += share;
+      };
+      add(upper[index], (1 - x) * (1 - weight));
+      add(upper[next], x * (1 - weight));
+      add(lower[index], (1 - x) * weight);
+      add(lower[next], x * weight);
+      worst = std::max(
+          worst, weights > 0 ? std::abs(sum / weights - double{samples[c]}) : std::numeric_limits<double>::infinity());
+    }
+    return Up(worst);
+  }
+
+  // Infinity, where no bound is known, stays infinity.
+  static float Up(double error) {
+    return std::nextafter(static_cast<float>(error), std::numeric_limits<float>::infinity());
+  }
+
+  const Averages& averages_;
+  const GridAxis rows_;
+  std::vector<GridAxis::Location> places_;  // by column of the chunk, within the window
+  std::vector<double> line_;
+};
+
+Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
+                             const Chunk& chunk, const std::stop_token& stop, ChunkStatistics& statistics) {
+  if (chunk.col >= layout.columns) return {};
+  statistics.averages.clear();
+  const unsigned kept = KeptFactors(layout);
+  Result<void> result;
+  ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
+    if (!result) return;
+    const auto averages = AverageAround(dataset, layout, samples, chunk, factor, stop);
+    if (!averages) {
+      result = tl::unexpected(averages.error());
+      return;
+    }
+    const int pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
+    std::vector<float>& errors = statistics.errors[statistics.averages.size()];
+    RowErrors rows(*averages, chunk, layout, factor);
+    for (int r = 0; r < chunk.rows; ++r) {
+      rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r, pixels,
+               errors.data() + std::ptrdiff_t{r / pixels} * columns);
+    }
+    statistics.averages.emplace_back();
+    if (StartingFactor(layout, factor) > 1 && (kept & static_cast<unsigned>(factor)) == 0) return;
+    const int used = std::min(chunk.cols, layout.columns - chunk.col);
+    const std::int64_t first = chunk.col / factor, top = chunk.row / factor;
+    for (std::int64_t r = 0; r < DivideUp(chunk.rows, factor); ++r) {
+      const float* row = averages->Row(top + r) + (first - averages->window.column);
+      statistics.averages.back().insert(statistics.averages.back().end(), row, row + DivideUp(used, factor));
+    }
+  });
+  return result;
+}
+
+// A chunk without a valid sample. Overviews are interpolated, so that their averages may have heights there.
+Result<ChunkStatistics> VoidOrOverviews(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
+                                        const std::stop_token& stop) {
+  ChunkStatistics statistics = VoidStatistics(chunk, layout);
+  const unsigned kept = KeptFactors(layout);
+  const int used = std::min(chunk.cols, layout.columns - chunk.col);
+  bool has_heights = false;
+  for (std::size_t k = 0; (kept >> k) > 1 && used > 0; ++k) {
+    const int factor = 2 << k;
+    if ((kept & static_cast<unsigned>(factor)) == 0) continue;
+    std::vector<float>& averages = statistics.averages[k];
+    const GridWindow window{chunk.col / factor, chunk.row / factor, DivideUp(used, factor),
+                            DivideUp(chunk.rows, factor)};
+    if (StartingFactor(layout, factor) == 1) {
+      averages.assign(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
+      continue;
+    }
+    auto read = ReadGrid(dataset, layout, factor, window, stop);
+    if (!read) return tl::unexpected(read.error());
+    averages = *std::move(read);
+    has_heights |= !std::ranges::all_of(averages, [](float height) { return std::isnan(height); });
+  }
+  return has_heights ? statistics : VoidStatistics(chunk, layout);
+}
+
+}  // namespace
+
+bool ChunkStatistics::has_averages(unsigned factors) const {
+  for (std::size_t k = 0; k < averages.size(); ++k) {
+    if ((factors & (2U << k)) != 0 && !averages[k].empty()) return true;
+  }
+  return false;
+}
+
+Chunk ChunkGrid::At(int index) const {
+  const int col = index % columns_ * kSide, row = index / columns_ * kSide;
+  return {col, row, std::min(kSide, width_ - col), std::min(kSide, height_ - row)};
+}
+
+ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
+  ChunkStatistics statistics;
+  const auto blocks = [&](int pixels) { return Area(DivideUp(chunk.cols, pixels), DivideUp(chunk.rows, pixels)); };
+  BlockRange voids;
+  voids.has_voids = true;
+  statistics.ranges.assign(blocks(RangeTable::kBlock), voids);
+  ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
+    statistics.errors.emplace_back(blocks(AveragingErrors::BlockPixels(factor)));
+    statistics.averages.emplace_back();
+  });
+  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
+  return statistics;
+}
+
+std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor) {
+  const int used = layout.columns - chunk.col;
+  if (used <= 0 || StartingFactor(layout, factor) > 1) return 0;
+  return static_cast<std::size_t>(DivideUp(std::min(used, chunk.cols), factor)) *
+         static_cast<std::size_t>(DivideUp(chunk.rows, factor));
+}
+
+Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
+                                            std::int64_t& read, const std::stop_token& stop) {
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  ChunkStatistics statistics = VoidStatistics(chunk, layout);
+  if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);
+  ++read;
+  Samples samples{WithHalo(chunk, layout), {}};
+  const Chunk& box = samples.box;
+  samples.heights.resize(Area(box.cols, box.rows));
+  if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.data(), stop);
+      !done) {
+    return tl::unexpected(done.error());
+  }
+  for (BlockRange& range : statistics.ranges) range = {};
+  CountSamples(samples, chunk, layout, statistics);
+  if (statistics.is_void()) return VoidOrOverviews(dataset, layout, chunk, stop);
+  statistics.content = HashOf(samples, chunk);
+  if (auto compared = CompareAverages(dataset, layout, samples, chunk, stop, statistics); !compared) {
+    return tl::unexpected(compared.error());
+  }
+  Chunk used = chunk;
+  used.cols = std::min(chunk.cols, layout.columns - chunk.col);
+  statistics.sums.clear();
+  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int factor) {
+    statistics.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
+                                                                                   : std::vector<BlockSum>());
+  });
+  return statistics;
+}
+
+}  // namespace terrace::dem
