@@ -21,7 +21,7 @@ struct DrawnTriangles {
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
   std::vector<std::uint8_t> in_hole;  // whether clients do not draw a triangle, for each triangle; empty: they draw all
-  bool lacks_holes = false;  // triangles in holes are not among them: where there are none inside the tile, is a hole
+  bool lacks_holes = false;  // triangles in holes were left out: a place in the tile without a triangle is a hole
 };
 
 struct DrawnPoint {
