@@ -36,7 +36,7 @@ class Socket {
 
   // Whether the peer has closed the connection, or has sent something without being asked. Does not wait.
   bool HasEnded();
-  // From any thread: what waits for the peer, or will, fails.
+  // From any thread: current and later waits for the peer fail.
   void Interrupt() const;
 
  private:
