@@ -22,7 +22,7 @@ class ZipWriter {
   // `start`: where the first entry begins, after a hole; readers of zip files allow it. For tests of large files.
   static Result<ZipWriter> Create(const std::string& path, std::uint64_t start = 0);
 
-  // An entry as it is. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
+  // Adds an uncompressed entry. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
   Result<void> Add(std::string_view name, std::string_view bytes);
   // Adds a deflated entry. `gzip`: its content, compressed by proto::Gzip. kInvalidArgument: it is no gzip stream.
   Result<void> AddGzip(std::string_view name, std::string_view gzip);

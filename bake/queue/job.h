@@ -48,7 +48,7 @@ Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connecti
 // The value of a field; empty: it has none.
 std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fields, const std::string& name);
 
-// Forgets a job, with all that it knows. The files of the bake stay.
+// Removes a job with all its keys from Redis. The files of the bake stay.
 Result<void> RemoveJob(redis::Connection& connection, const JobPlace& place);
 
 }  // namespace terrace::bake

@@ -34,7 +34,7 @@ class UnitQueue {
   virtual bool Fail(std::size_t unit, const Error& why) = 0;
 };
 
-// A unit is given up after it was handed out this often.
+// A unit that was handed out this often without success is given up.
 inline constexpr int kMaxAttempts = 3;
 
 }  // namespace terrace::bake
