@@ -36,7 +36,7 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_problem;  // the problem kCacheTrouble; "": there is none; may be empty
+  std::function<std::string()> cache_problem;  // text of the problem kCacheTrouble, "" if there is none; may be null
 };
 
 class TerrainApplication final : public Application, public ProcessState {
@@ -54,7 +54,7 @@ class TerrainApplication final : public Application, public ProcessState {
   void SetProblems(std::map<std::string, std::string> problems);
 
   const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request
-  // Never null; empty before the first.
+  // Never null; without datasets until the first catalog has come.
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
   std::map<std::string, std::string> problems() const override;

@@ -2,8 +2,7 @@
 // Threads: a few for the network, and a bounded pool for building tiles. A stop has these steps: /readyz reports
 // "draining", and every connection closes after its next reply. After drain_delay, and then drain_grace or when no
 // connection is left, idle connections are closed and no new ones are accepted. Requests that have begun are answered,
-// within drain_timeout.
-// Builds are cancelled. Threads are joined.
+// within drain_timeout. Builds are cancelled. Threads are joined.
 #pragma once
 
 #include <chrono>

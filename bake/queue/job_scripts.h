@@ -55,8 +55,8 @@ redis.call('DEL', dead, errors)
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, worker, lease in ms. Hands out new units first, then units whose worker was silent for a lease;
-// then replies how the job ended. Idle times are Redis's, so that the clocks of the workers do not matter.
+// ARGV: incarnation, worker, lease in ms. Hands out new units first, then units whose worker was silent for a lease,
+// last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter.
 inline constexpr const char* kTake = R"lua(
 local worker, lease = ARGV[2], ARGV[3]
 local function hand_out(message, deliveries)

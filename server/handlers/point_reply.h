@@ -19,7 +19,7 @@ struct MadeReply {
 
 using PointHandler = asio::awaitable<Response> (*)(const Handlers& from, const RequestContext& context,
                                                    std::uint32_t dataset);
-// Calls `handler` with the index of the dataset. 415: the type of the body is not one of points. 404: no such dataset.
+// Calls `handler` with the index of the dataset. 415: the body's type is not supported. 404: no such dataset.
 Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHandler handler);
 
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
