@@ -53,10 +53,10 @@ class DemSource::Impl {
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
   std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
 
-  // Of dem_edits.cc. ApplyEdits: to heights above the ellipsoid. `error_m`: EditSet::Apply.
+  // Defined in dem_edits.cc. ApplyEdits takes heights above the ellipsoid; `error_m`: as for EditSet::Apply.
   Result<void> OpenEdits(const DemOptions& options);
   void AddDeeperLevels(double error_fraction);
-  // Of an edit with orthometric heights. Returns what is wrong with it; empty: nothing.
+  // Precondition: the edit has orthometric heights. Returns what is wrong with it; empty: nothing.
   Result<std::string> AddUndulations(Edit& edit) const;
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
@@ -93,7 +93,7 @@ class DemSource::Impl {
   HeightRange unedited_heights;  // of `info`
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  // Level, column, row; then columns and rows of Mercator windows, 0 of edits, -1 of deeper tiles.
+  // Level, column, row; then for Mercator windows their columns and rows, for edits 0, 0, for deeper tiles -1, -1.
   using HashKey = std::array<std::int64_t, 5>;
   struct HashOfKey {
     std::size_t operator()(const HashKey& key) const {

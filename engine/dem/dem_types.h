@@ -201,7 +201,7 @@ struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
   std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes all are, or are forced, are left out
+  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes are all in a hole or forced are left out
 
   bool any() const { return !weights.empty() || !forced.empty() || !hole.empty(); }
 };

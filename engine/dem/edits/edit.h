@@ -84,7 +84,7 @@ struct Edit {
   FlatHeight flat = FlatHeight::kGiven;
   double height_m = 0;                 // of flatten
   EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
-  // If the heights are orthometric: is added to them. Null until the sources are known, and for the ellipsoid.
+  // Added to orthometric heights. Null until the sources are known, and for heights above the ellipsoid.
   std::shared_ptr<const EditUndulations> undulations;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision

@@ -24,7 +24,7 @@ struct TilePicture {
   std::vector<std::uint8_t> rgb;  // 3 * side * side
 };
 
-// The same with alpha: 0 where the image has no colour, which is then black.
+// The same with alpha: 0, with black, where the image has no colour; else 255.
 struct MapPicture {
   int side = 0;
   std::vector<std::uint8_t> rgba;  // 4 * side * side

@@ -31,7 +31,7 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  const std::vector<float>& owned() const { return owned_; }      // NaN: a void that is not narrow, also in holes
+  const std::vector<float>& owned() const { return owned_; }      // NaN: voids that are not narrow, and holes
 
   // Of the cells between two of the block, inclusive; possibly of more.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
