@@ -35,7 +35,7 @@ class FlatTriangle {
   FlatTriangle(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) : a_(a), b_(b), c_(c), plane_(geo::Cross(b - a, c - a)) {}
 
   // The distance of a point from the plane along `up`. At a pole, a triangle can shrink to a line that no vertical
-  // meets; then the distance from the line.
+  // meets; then returns the distance from the line.
   double Off(geo::Vec3 point, geo::Vec3 up) const {
     const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
     if (std::isfinite(off)) return off;
@@ -109,7 +109,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                         mesh.vertices[triangle[2]]};
     std::optional<tin::SamplePosition> miss;
-    double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: times its bound
+    double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: as a multiple of the sample's bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
         const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));
