@@ -18,7 +18,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
 // One 3TZ file: a zip file with the files of the folder of GLB tiles and an index. URLs have no versions. Compressed
-// tiles are deflated entries. kInvalidArgument: these are no GLB tiles.
+// tiles are deflated entries. kInvalidArgument: the archive does not hold GLB tiles.
 Result<void> Write3tz(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
 }  // namespace terrace::archive

@@ -44,7 +44,7 @@ class Connection {
   // kUnavailable: the connection broke, the deadline passed, or a reply was malformed. The commands may have been
   // carried out or not, and every later call fails: open another connection.
   Result<std::vector<Reply>> CallAll(std::span<const Command> commands);
-  // A reply that is no error. Errors: as CallAll, and Refusal of the error.
+  // Returns the reply if it is not an error. Errors: as CallAll; an error reply is converted by Refusal.
   Result<Reply> Call(const Command& command);
   // An error reply to a command as an Error. kInvalidArgument: the password or the user's rights. kOverloaded: Redis is
   // full. kUnavailable: it is loading, a read-only replica, or anything else.

@@ -22,8 +22,8 @@ using Deadline = std::chrono::steady_clock::time_point;
 class Socket {
  public:
   // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The deadline includes the
-  // look-up of the host's name (Resolver). kUnavailable: nobody listens, the deadline passed, or the certificate does
-  // not fit; kInvalidArgument: the file.
+  // look-up of the host's name (Resolver). kUnavailable: no server listens, the deadline passed, or the certificate
+  // does not fit; kInvalidArgument: the file.
   static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline);
   Socket(Socket&& other) noexcept;
   Socket& operator=(Socket&&) = delete;

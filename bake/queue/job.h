@@ -17,7 +17,7 @@ struct JobPlace {
   redis::Address address;
   std::string ca_file = {};  // as in redis::ConnectionOptions
   std::string name;
-  // Of connecting, and of each call. A Redis that replies a second late is slow but works.
+  // For connecting, and for each call. A Redis that replies a second late is slow but works.
   std::chrono::milliseconds timeout{10'000};
 
   std::string Key(const std::string& what) const;

@@ -52,9 +52,9 @@ class RedisQueue : public UnitQueue {
   void Return(std::size_t unit) override;
   bool Fail(std::size_t unit, const Error& why) override;
 
-  // Why Take said that it is over.
+  // Why Take returned kOver.
   enum class End {
-    kNone,        // it did not
+    kNone,        // it has not
     kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
     kFinished,    // another worker has done that
     kIncomplete,  // units were given up: Dead

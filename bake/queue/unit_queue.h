@@ -15,7 +15,7 @@ class UnitQueue {
     enum class State {
       kUnit,
       kWait,  // none now: others are being baked, and may be handed out again
-      kOver,  // none any more
+      kOver,  // none is left
     };
     State state = State::kOver;
     std::size_t unit = 0;

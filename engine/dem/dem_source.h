@@ -95,7 +95,7 @@ class DemSource {
 
   // Edits (docs/edits.md). All of these are 0 or empty without any.
   //
-  // What the edits ask of the mesh of a tile.
+  // The requirements of edits for the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;

@@ -37,7 +37,7 @@ class TileErrorMeter {
   TileError Measure(const QuantizedTile& tile);
 
   // Measures only the flat triangles of `mesh`, with its vertices near lattice nodes, at `positions` in ECEF. A
-  // triangle with corners that coincide counts as the line that is left of it.
+  // triangle with coinciding corners counts as a line.
   TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
 
  private:

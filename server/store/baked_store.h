@@ -45,7 +45,7 @@ class BakedStore final : public tiler::TileStore {
     std::shared_ptr<const dem::DemSource> source;  // whose edits the tiles have; null: without sources
   };
   std::multimap<std::uint64_t, Archive> baked_;  // by Dataset::cache_generation; guarded by mutex_
-  std::set<std::string> reported_;               // likewise
+  std::set<std::string> reported_;               // guarded by mutex_
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0};
 };
 

@@ -1,4 +1,4 @@
-// What edits ask of a tile's mesh: precision by place, vertices that must be there, and holes (docs/edits.md).
+// What edits require of a tile's mesh: precision by place, vertices that must be there, and holes (docs/edits.md).
 #pragma once
 
 #include <cstdint>

@@ -36,7 +36,7 @@ class DrawnMesh {
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
   // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
-  // is rare except near the tile's edge. Of several triangles, the one that it meets farthest inside counts.
+  // is rare except near the tile's edge. If it meets several triangles, uses the one that it meets farthest inside.
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
   // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
   // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles

@@ -15,7 +15,7 @@ struct EncoderInput;  // tile_pipeline.h
 Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
 Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);  // encoders/glb.cc
 
-// Those of the bytes of a quantized-mesh tile. kUnavailable: the bytes are not such a tile.
+// The triangles of a finished quantized-mesh tile. kUnavailable: the bytes are not such a tile.
 Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key);
 
 }  // namespace terrace::tiler

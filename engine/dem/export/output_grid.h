@@ -28,7 +28,7 @@ struct OutputGrid {
 
 struct GridRequest {
   int epsg = 4326;
-  // Units of the CRS. Of geographic ones degrees; west > east: across the antimeridian.
+  // Units of the CRS; degrees for geographic ones, where west > east is a box across the antimeridian.
   double west = 0, south = 0, east = 0, north = 0;
   // Either both numbers of nodes, or the spacing. With a spacing the box ends at the last node to the east and south.
   std::optional<std::int64_t> columns = {}, rows = {};

@@ -44,7 +44,7 @@ class Imagery {
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
   // Opens an image as described in raster_colors.h, with a georeference. kInvalidArgument, with the remedy: errors of
-  // OpenRaster and Georeference, bands that are no colours, or an image outside `around`.
+  // OpenRaster and Georeference, bands that are not colours, or an image outside `around`.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();

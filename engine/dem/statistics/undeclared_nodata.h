@@ -38,7 +38,7 @@ struct ZeroEdges {
   // Whether the zeros are a collar of a raster of this size. All of these must hold: zeros reach the border; nearly all
   // differences to neighbouring ground exceed the step, which excludes a sea; zeros form areas or lie along the border,
   // and are not scattered; the ground has more than one height, and reaches all four sides or nearly, because a raster
-  // is no larger than its data. A block or an island with cliffs on flat ground at 0 m is thus no collar.
+  // is no larger than its data. A block or an island with cliffs on flat ground at 0 m is not a collar.
   bool IsCollar(int raster_width, int raster_height) const;
 
  private:

@@ -17,7 +17,7 @@ std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
-// The same of a dataset; without sources its archive.
+// The same for a dataset; if it has no sources, the name of its archive.
 std::string NameOf(const config::DatasetConfig& dataset);
 
 // Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
