@@ -1,5 +1,5 @@
-// The state of a job in Redis, and the scripts that change it. Redis runs a script as a whole, so that a worker that is
-// killed leaves no half of a change.
+// The state of a job in Redis, and the scripts that change it. Redis runs a script as a whole, so that a killed worker
+// never leaves half of a change.
 //
 //   terrace:{JOB}:job     hash: what is baked (fields of JobIdentity), incarnation, state, lease_ms, units
 //   terrace:{JOB}:units   stream with the consumer group "bakers": the units that are not done, field "unit"

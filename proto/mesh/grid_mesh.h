@@ -27,10 +27,10 @@ enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 // below half a millimetre. With the default error of its level a tile spans less than 2^16 steps; with the finest, less
 // than 2^23.
 //
-// Floats allow finer steps. With floats the step is also at most 2^-7 m, so that no vertex of a tile's edge is a
-// centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by their
-// positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits: 2^-6 m
-// at level 8, 1 m at level 2.
+// Floats allow finer steps. With floats the step is also at most 2^-7 m, so that all vertices of a tile's edge are less
+// than a centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by
+// their positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits:
+// 2^-6 m at level 8, 1 m at level 2.
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width);
 
 // Whole steps along the axes of ECEF.

@@ -25,9 +25,8 @@ Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHa
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
 
-// Starts a reply with JSON, in a coding that the client accepts, or with binary values. Binary values are not
-// compressed: they hardly shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies
-// to POST.
+// Starts a reply with JSON, in a coding that the client accepts, or with binary values, uncompressed: they hardly
+// shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies to POST.
 struct PointReply {
   tiler::Coding coding;
   Response response;

@@ -40,8 +40,8 @@ class DrawnMesh {
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
   // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
   // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles
-  // end at chords of them: in the northern hemisphere they exceed the northern edge, and leave out a strip at the
-  // southern one.
+  // end at chords of them. In the northern hemisphere chords lie beyond the northern edge, and leave out a strip at the
+  // southern edge.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.
