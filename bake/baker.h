@@ -37,7 +37,7 @@ struct Target {
 struct Shard {
   std::uint32_t index = 0, count = 1;
 
-  // By a hash of the name, so that the units of a region are dealt out evenly.
+  // Decided by a hash of the name, so that the units of a region are distributed evenly.
   bool Has(const std::string& unit) const;
 };
 

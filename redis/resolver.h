@@ -28,8 +28,8 @@ class Resolver {
   // The resolver of the system, shared by the process with the addresses that it has found.
   static Resolver& OfSystem();
 
-  // Numbers are converted at once. If addresses were found before, waits for newer ones at most half of the time. At
-  // most one look-up of a host is under way. kUnavailable: the message says why.
+  // Numbers are converted at once. If addresses were found before, waits for newer ones only half of the time until the
+  // deadline. At most one look-up of a host is under way. kUnavailable: the message says why.
   Result<std::vector<HostAddress>> Resolve(const std::string& host, std::uint16_t port,
                                            std::chrono::steady_clock::time_point deadline);
 

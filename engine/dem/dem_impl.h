@@ -17,7 +17,7 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::Fill for a window, or for `part` of it; then it has no positions.
+// The trace of RasterGrid::Fill for a window. If `part` is set, the trace covers that part only and has no positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};
@@ -78,7 +78,7 @@ class DemSource::Impl {
   std::vector<std::vector<geo::TileRange>> available;
   std::vector<std::vector<geo::TileRange>> above_added;  // the tiles above those that edits added; empty: none
   float floor = 0;                                       // above the ellipsoid
-  // For the whole Earth, of the last raster grid that refers to a geoid; or null.
+  // Undulations of the last raster grid that refers to a geoid, for the whole Earth. Null: no raster grid does.
   std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;
   DemInfo info;

@@ -33,8 +33,8 @@ std::vector<geo::TileKey> ImplicitRoots(Availability available);
 // fine sources have more levels than others. Precondition: the root is available.
 int LevelsUnder(Availability available, const geo::TileKey& root);
 
-// More levels would cost CesiumJS frames: it creates an object for each of the 5,461 tiles of a full subtree when the
-// file arrives.
+// With more levels CesiumJS would miss frames: it creates an object for each of the 5,461 tiles of a full subtree when
+// the file arrives.
 inline constexpr int kMaxServedSubtreeLevels = 7;
 
 // The number of levels of each .subtree in a tree of `levels` levels. A path to the deepest tile crosses as few

@@ -72,7 +72,7 @@ const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder =
 
 // The first row of a format in a folder; null if there is none. TileJSON documents use its suffix by default.
 const TileFormatRow* FirstFormatIn(std::string_view folder);
-// The row of a format with these pictures; null if there is none.
+// The row of a format for pictures in this picture format; null if there is none.
 const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
 
 // Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies

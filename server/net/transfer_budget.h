@@ -87,7 +87,7 @@ class TransferBudget {
   struct Share {  // of a client
     std::size_t bytes = 0;
     std::size_t holds = 0;
-    // Byte-seconds until `as_of`, of which half are forgotten every ten seconds.
+    // Byte-seconds up to `as_of`, with a half-life of ten seconds.
     double used = 0;
     Clock::time_point as_of;
   };

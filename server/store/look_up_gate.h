@@ -22,7 +22,7 @@ class LookUpGate {
     return shares_[of].load(std::memory_order_relaxed) >= kMinShare || number % kSample == 0;
   }
 
-  // The result of a look-up that was made. Two threads may lose one of two results.
+  // Records the result of a look-up that was made. If two threads call it at once, one result may be lost.
   void Note(std::size_t of, bool found) {
     const std::uint32_t share = shares_[of].load(std::memory_order_relaxed);
     shares_[of].store(share - share / kMemory + (found ? kOne / kMemory : 0), std::memory_order_relaxed);

@@ -80,7 +80,7 @@ bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 // dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
-// Whether two boxes share a point, be it on an edge. `tile` does not cross the antimeridian.
+// Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.
 bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile);
 
 // Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the

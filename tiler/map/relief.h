@@ -15,8 +15,8 @@ namespace terrace::tiler {
 // Pixels around a tile that its gradients depend on.
 inline constexpr int kReliefMargin = 1;
 
-// Metres of height per metre to the east and to the north; NaN where there is no height. In the place of a neighbour
-// without a height, the pixel's own height is used.
+// Metres of height per metre to the east and to the north; NaN where there is no height. A neighbour without a height
+// counts with the pixel's own height.
 struct Gradient {
   double east = 0, north = 0;
 };

@@ -28,8 +28,8 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 // corners.
 proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m);
 
-// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if all of its samples are,
-// or are vertices of the hole's outline.
+// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its samples is
+// in the hole or is a vertex of the hole's outline.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
 // The same for a field of `width` nodes a row.

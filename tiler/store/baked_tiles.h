@@ -45,7 +45,7 @@ class BakedTiles {
   // damaged or cannot be read; the message names it.
   virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
 
-  // DemSource::RangeBound of a tile that was baked; of others the range of the dataset.
+  // DemSource::RangeBound of a baked tile; for other tiles the range of the dataset.
   virtual dem::HeightRange RangeBound(const geo::TileKey& key) const = 0;
 
   // Why Find finds nothing for a request: kNotFound.

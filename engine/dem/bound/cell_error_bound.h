@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may lie one turn further on.
+// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may exceed it by one turn.
 struct SampleBox {
   std::int64_t west = 0, north = 0, east = -1, south = -1;
 

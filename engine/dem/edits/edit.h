@@ -32,7 +32,7 @@ inline const char* NameOf(EditOp op) { return kEditOpNames[static_cast<std::size
 // The height of a flatten.
 enum class FlatHeight : std::uint8_t { kGiven, kMean, kMedian };
 
-// What the heights of an edit count from.
+// The reference of an edit's heights.
 enum class EditDatum : std::uint8_t {
   kNone,        // not stated: the ellipsoid
   kEllipsoid,   // of WGS 84
@@ -75,7 +75,7 @@ struct Edit {
   // encloses it. `heights`: of the points, for slope, carve and raise; else empty.
   std::vector<std::vector<PlanPoint>> rings;
   std::vector<std::vector<double>> heights;
-  // Of slope: corners of the first ring; empty: the plane h = gradient . (x, y) + level.
+  // For slope: triangles between corners of the first ring. Empty: the plane h = gradient . (x, y) + level.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::array<double, 3> slope{};  // gradient along x and y, height at the origin
 

@@ -16,7 +16,7 @@ struct EditPlace {
   double along = 0;  // 0 .. 1 on the edge
 };
 
-// The points of an edit's plane at one y: edges that are too far are left out once for the row.
+// The points of an edit's plane at one y. Edges beyond the reach of this row are excluded once.
 class EditRow {
  public:
   EditRow(const Edit& edit, double y);

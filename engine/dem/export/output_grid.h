@@ -14,7 +14,7 @@
 
 namespace terrace::dem {
 
-// Nodes in rows from the north, from the west; the outermost nodes lie on the box.
+// Rows run from the north, nodes in a row from the west; the outermost nodes lie on the box.
 struct OutputGrid {
   int epsg = 4326;
   std::string wkt;                                  // of the CRS

@@ -113,7 +113,7 @@ class RasterGrid {
   Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells of the window's nodes that Fill uses, their columns near those of a trace's window.
+  // Returns the cells of the window's nodes that Fill uses, with columns moved near those of a trace's window.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for

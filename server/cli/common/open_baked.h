@@ -14,7 +14,7 @@ namespace terrace::cli {
 // is not used; the log says why. Precondition: all other members of `dataset` are set.
 void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset);
 
-// A dataset without sources: of its archive alone. Errors name the place and the remedy.
+// Makes a dataset without sources, from its archive alone. Errors name the place and the remedy.
 Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted);
 
 // Whether `path` is an archive: a folder with a manifest, or a .pmtiles file.

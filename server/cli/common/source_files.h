@@ -10,7 +10,7 @@
 
 namespace terrace::cli {
 
-// The name of the dataset of a file or folder that the command line names. A folder keeps what looks like an extension.
+// The name of a dataset, from the file or folder on the command line. Folder names keep what looks like an extension.
 std::string DatasetNameOf(const std::string& dem);
 
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
