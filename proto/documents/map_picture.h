@@ -20,9 +20,8 @@ const char* ToString(PictureFormat format);
 // colours of transparent pixels may change. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
 
-// A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has the
-// colours at `quality`, and `background` instead of transparent pixels. Errors as above. Preconditions: those of
-// EncodePng, kRgba.
+// A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has colours
+// at `quality`, `background` for transparent pixels. Errors as above. Preconditions: those of EncodePng, kRgba.
 Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, int quality,
                                 const std::array<std::uint8_t, 3>& background);
 
