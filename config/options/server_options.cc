@@ -366,7 +366,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "limits",
        .help = "Time for which a stopping server still serves, with /readyz 503, so that balancers stop using it",
        .details = "It precedes `drain_timeout_s`. Behind a balancer that asks `/readyz`: the period of its probe times "
-                  "its failure threshold, and the time that the news takes to spread. Replies have `Connection: close` "
+                  "its failure threshold, plus the time until all balancers know. Replies have `Connection: close` "
                   "meanwhile. [More](operations.md#restarts)",
        .codec = Seconds(&Config::drain_delay, 0, 3600),
        .other_words = "lameduck shutdown_delay"},
