@@ -21,7 +21,7 @@
 namespace terrace::dem {
 namespace {
 
-// File extensions of rasters: a file with one of these that is no raster is probably damaged.
+// File extensions of rasters: a file with one of them that is not a raster is probably damaged.
 bool LooksLikeRaster(const std::string& path) {
   constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
                                            ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};
@@ -60,7 +60,7 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
               names.size() > kMaxNamed ? fmt::format(" and {} more", names.size() - kMaxNamed) : "");
 }
 
-// Removes files of folders that are no rasters. Returns those that look like rasters, with reasons.
+// Removes files of folders that are not rasters. Returns those that look like rasters, with reasons.
 std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::optional<LeftOut>> verdicts(files.size());
   ParallelFor(files.size(), [&](std::size_t i) {
