@@ -15,7 +15,7 @@ class LookUpGate {
     for (auto& share : shares_) share.store(kOne, std::memory_order_relaxed);
   }
 
-  // `of`: the class of the key, below kClasses. Of a class with few hits, only every kSample-th look-up is made, which
+  // `of`: the class of the key, below kClasses. In a class with few hits, only every kSample-th look-up is made: it
   // shows whether others have filled the store meanwhile.
   bool ShouldAsk(std::size_t of) {
     const std::uint32_t number = asked_[of].fetch_add(1, std::memory_order_relaxed);

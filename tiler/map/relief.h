@@ -1,6 +1,6 @@
 // Slopes and shades of a map tile, from gradients by Horn's formula (Horn, Hill Shading and the Reflectance Map, 1981)
 // over 3 x 3 pixels, as `gdaldem` computes them. Distances are those on the ellipsoid at each row, not those of the
-// map. No function of the C library's that rounds differently between processors is used.
+// map. Uses no function of the C library whose rounding differs between processors.
 #pragma once
 
 #include <array>
