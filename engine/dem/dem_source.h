@@ -35,7 +35,7 @@ class DemSource {
   // The deepest level served: the first whose default error is at most a tenth of the finest source's spacing, or at
   // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
-  // The deepest level without edits. Levels below it have tiles around edits alone.
+  // The deepest level without edits. Levels below it have tiles only around edits.
   int finest_level() const;
   geo::Lattice LatticeOf(int level) const;
 
@@ -93,7 +93,7 @@ class DemSource {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
-  // Edits (docs/edits.md). All of these are 0 or empty without any.
+  // Edits (docs/edits.md). All of these are 0 or empty if there are no edits.
   //
   // The requirements of edits for the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;

@@ -61,7 +61,7 @@ struct EditUndulations {
   std::size_t columns = 0, rows = 0;
   std::vector<double> values;  // row by row from the south-western one
 
-  double At(PlanPoint point) const;  // of points beyond the patch: of the nearest one on it
+  double At(PlanPoint point) const;  // beyond the patch: that of its nearest point
 };
 
 struct Edit {
@@ -91,7 +91,7 @@ struct Edit {
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
   int min_level = 0;                                         // of precision
   std::string source;                                        // of replace: a path
-  std::size_t replacement = 0;                               // of replace: by edit set, the opened source
+  std::size_t replacement = 0;                               // of replace: index of the opened source, set by DemSource
 
   // Derived by Complete.
   Box reach;                     // degrees, with the blend; west in -180 .. 180
