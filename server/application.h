@@ -36,7 +36,7 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_problem;  // text of the problem kCacheTrouble, "" if there is none; may be null
+  std::function<std::string()> cache_problem;  // the problem kCacheTrouble; "": there is none; may be empty
 };
 
 class TerrainApplication final : public Application, public ProcessState {

@@ -56,7 +56,7 @@ class DemSource::Impl {
   // Defined in dem_edits.cc. ApplyEdits takes heights above the ellipsoid; `error_m`: as for EditSet::Apply.
   Result<void> OpenEdits(const DemOptions& options);
   void AddDeeperLevels(double error_fraction);
-  // Precondition: the edit has orthometric heights. Returns what is wrong with it; empty: nothing.
+  // Of an edit with orthometric heights. Returns what is wrong with it; empty: nothing.
   Result<std::string> AddUndulations(Edit& edit) const;
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,

@@ -39,7 +39,7 @@ class Connection {
 
 class ConnectionSet {
  public:
-  // `most_of_one`: limit on the connections of one client; 0: only the limit on all connections.
+  // `most_of_one`: limit on the connections of one client; 0: none but the limit on all connections.
   explicit ConnectionSet(std::size_t capacity, std::size_t most_of_one = 0)
       : capacity_(capacity), most_of_one_(most_of_one) {}
 

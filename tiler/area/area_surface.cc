@@ -35,7 +35,7 @@ class FlatTriangle {
   FlatTriangle(geo::Vec3 a, geo::Vec3 b, geo::Vec3 c) : a_(a), b_(b), c_(c), plane_(geo::Cross(b - a, c - a)) {}
 
   // The distance of a point from the plane along `up`. At a pole, a triangle can shrink to a line that no vertical
-  // meets; then returns the distance from the line.
+  // meets; then the distance from the line.
   double Off(geo::Vec3 point, geo::Vec3 up) const {
     const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
     if (std::isfinite(off)) return off;

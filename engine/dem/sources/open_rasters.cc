@@ -60,7 +60,7 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
               names.size() > kMaxNamed ? fmt::format(" and {} more", names.size() - kMaxNamed) : "");
 }
 
-// Removes files of folders that are not rasters. Returns those that look like rasters, with reasons.
+// Removes files of folders that are no rasters. Returns those that look like rasters, with reasons.
 std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::optional<LeftOut>> verdicts(files.size());
   ParallelFor(files.size(), [&](std::size_t i) {

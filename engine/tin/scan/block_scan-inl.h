@@ -136,7 +136,7 @@ struct StarPlanes {
   }
 
   HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
-  // At the first sample of the block, or of the bounding box for triangles that are not blocks: barycentric coordinates
+  // At the first sample of the block, or of the bounding box for triangles that are no blocks: barycentric coordinates
   // of u and v, plus 1/2, and A x + B y. `sum`: of all three coordinates, plus 3/2. Each edge on the border
   // subtracts 1.
   HWY_ALIGN float u[kMost], v[kMost], sum[kMost], plane[kMost];
