@@ -34,8 +34,8 @@ proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, const geo::Ti
               proto::CarriesMetadata(key, dataset.metadata_levels, dataset.finest_level, manifest.available)};
 }
 
-// Whether the archive's tiles, but for their coding and for extensions that can be removed, are what the request asks
-// for.
+// Whether the archive's tiles are what the request asks for, except for their coding and for extensions that can be
+// removed.
 bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   const TileRequest& kind = manifest.kind;
   const int level = request.key.level;
@@ -52,8 +52,8 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
          request.metadata <= extensions.metadata;
 }
 
-// The bytes of the archive's tile as the request asks for them: without extensions that it does not name, and in its
-// coding. Nothing: they are not what the manifest says.
+// The bytes of the archive's tile in the coding that the request asks for, without extensions that it does not name.
+// Nothing: the bytes are not what the manifest says.
 std::optional<std::string> AsRequested(std::string bytes, const Manifest& manifest, const TileRequest& request) {
   constexpr std::size_t kMaxTileBytes = std::size_t{1} << 30;
   const bool is_smaller =
@@ -76,7 +76,7 @@ class Baked final : public tiler::BakedTiles {
  public:
   explicit Baked(std::vector<std::shared_ptr<const Archive>> archives) : archives_(std::move(archives)) {
     for (const auto& archive : archives_) Describe(archive->manifest());
-    // Documents need the roots, also if there are height tiles alone.
+    // Documents need the roots, also if there are only height tiles.
     if (extent_.available.empty()) extent_.available = {{{0, 0, 1, 0}}};
   }
 

@@ -62,9 +62,9 @@ class PartialFolder {
   PartialFolder& operator=(const PartialFolder&) = delete;
 
   const std::string& partial() const { return partial_; }
-  // The files were written without fsync, which takes as long for all of them as the bake. Here the files reach the
-  // disk before the folder gets its name, and the name reaches it before the caller removes what the folder was made
-  // from.
+  // The files were written without fsync, because fsync of each file would take as long as the bake. Here the files
+  // reach the disk before the folder gets its name. The name reaches the disk before the caller removes the files that
+  // the folder was made from.
   Result<void> Finish() {
     if (Result<void> synced = Sync(partial_, ::syncfs); !synced) return synced;
     std::error_code error;

@@ -17,8 +17,8 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
 // subtrees and GLB tiles in 3dtiles/. kInvalidArgument: `out` exists and is not empty.
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
-// One 3TZ file: a zip file with the same files as the folder of GLB tiles, but URLs without versions, and an index.
-// Compressed tiles are deflated entries. kInvalidArgument: these are no GLB tiles.
+// One 3TZ file: a zip file with the files of the folder of GLB tiles and an index. URLs have no versions. Compressed
+// tiles are deflated entries. kInvalidArgument: the archive does not hold GLB tiles.
 Result<void> Write3tz(const Archive& archive, const std::string& out, const std::stop_token& stop = {});
 
 }  // namespace terrace::archive

@@ -92,9 +92,8 @@ std::string ToJson(const Manifest& manifest);
 // kInvalidArgument: not a manifest, or one of a newer format; the message names what is wrong.
 Result<Manifest> ParseManifest(std::string_view json);
 
-// Writes manifest.json by rename, so that it is complete or absent; leaves it if it says the same already, so that
-// servers do not open the archive anew. Call it last. kUnavailable: the place cannot be
-// written.
+// Writes manifest.json by rename, so that it is complete or absent. Does not touch a manifest with the same content, so
+// that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written.
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
 // kNotFound: there is no manifest: the place holds an unfinished bake, or something else. kInvalidArgument: see
 // ParseManifest. Also reads the manifest in the metadata of a single file.

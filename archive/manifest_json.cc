@@ -36,7 +36,7 @@ const Names<proto::TextureFormat> kTextures = {{proto::TextureFormat::kNone, "no
 const Names<proto::HeightEncoding> kEncodings = {{proto::HeightEncoding::kMapbox, "mapbox"},
                                                  {proto::HeightEncoding::kTerrarium, "terrarium"}};
 
-// Thrown inside ParseManifest alone.
+// Thrown only inside ParseManifest.
 struct Wrong : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -11,7 +11,7 @@ namespace terrace::archive {
 
 // JSON with the manifest as its member kManifestMember: metadata of a single file.
 inline constexpr const char* kManifestMember = "terrace";
-// kInvalidArgument: the text is no JSON object or has no such member.
+// kInvalidArgument: the text is not a JSON object or has no such member.
 Result<std::string> ManifestIn(std::string_view metadata);
 
 }  // namespace terrace::archive

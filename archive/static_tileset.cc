@@ -19,7 +19,7 @@ namespace {
 
 using proto::TreeRoot;
 
-// The same tree that a server makes of a dataset that has this archive and no sources.
+// The tree that a server makes if the dataset has this archive and no sources.
 tiler::TileTree TreeOf(const Archive& archive) {
   const Manifest& manifest = archive.manifest();
   const BakedDataset& dataset = manifest.dataset;

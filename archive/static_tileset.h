@@ -15,9 +15,9 @@ namespace terrace::archive {
 using TakeFile = std::function<Result<void>(const std::string& path, std::string_view bytes, bool is_gzip)>;
 
 // Calls `take` for each file, in an order that depends on the archive alone. Paths are relative to the tileset.
-// `has_versions`: URLs have the version as a parameter, for caches; readers of file systems take it for a part of the
-// name. Tiles above the tileset's roots are left out: no client asks for them. Precondition: an archive of GLB tiles.
-// kCancelled: stopped. Errors: those of `take` and of Archive::ForEach.
+// `has_versions`: URLs have the version as a parameter, for caches; programs that read files would take it for a part
+// of the file name. Tiles above the tileset's roots are left out: no client asks for them. Precondition: an archive of
+// GLB tiles. kCancelled: stopped. Errors: those of `take` and of Archive::ForEach.
 Result<void> ForEachFileOfTileset(const Archive& archive, bool has_versions, const TakeFile& take,
                                   const std::stop_token& stop);
 

@@ -21,7 +21,7 @@ struct BakeRequest {
   std::optional<std::pair<int, int>> levels = {};  // first and last; nothing: all
   std::optional<dem::GeoBounds> bbox = {};         // tiles that overlap it, and their siblings; nothing: all
   tiler::RequestedError requested = {};
-  // Of quantized-mesh. Nothing: normals, and the water mask where the dataset has one.
+  // Extensions of quantized-mesh. Nothing: normals, and the water mask where the dataset has one.
   std::optional<proto::TileExtensions> extensions = {};
   bool compress = true;  // with gzip, where that makes tiles smaller
 };

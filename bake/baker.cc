@@ -182,7 +182,7 @@ class Run {
     std::condition_variable_any().wait_for(lock, options_.stop, kPause * attempt, [] { return false; });
   }
 
-  // A file that is there with this key, or a copy from the old archive.
+  // Takes a file that exists with this key, or copies one from the old archive. False: there is none.
   bool TakeFinished(std::size_t index, std::size_t target, std::uint64_t key) {
     const Clock::time_point start = Clock::now();
     const Target& to = targets_[target];

@@ -24,11 +24,11 @@ namespace terrace::bake {
 struct Target {
   std::string place;
   archive::Manifest manifest;  // without units
-  // The archive that units with equal keys are taken from; its folder and its units by name.
+  // The older archive whose units with equal keys are copied: its folder, and its units by name.
   std::string old_place = {};
   std::map<std::string, archive::UnitEntry> old_units = {};
-  // Instead of a place: where the tiles go. `create` makes the writer of a unit, which is called by one thread at a
-  // time; tiles that `has` names are there already and are not built. Both empty: files in `place`.
+  // Where the tiles go instead of to files in `place`. `create` makes the writer of a unit, which is called by one
+  // thread at a time. Tiles for which `has` returns true exist already and are not built. Both empty: files in `place`.
   std::function<Result<std::unique_ptr<archive::TileWriter>>()> create = {};
   std::function<bool(const tiler::TileRequest&)> has = {};
 };
@@ -37,7 +37,7 @@ struct Target {
 struct Shard {
   std::uint32_t index = 0, count = 1;
 
-  // By a hash of the name, so that the units of a region are dealt out evenly.
+  // Decided by a hash of the name, so that the units of a region are distributed evenly.
   bool Has(const std::string& unit) const;
 };
 
@@ -60,11 +60,10 @@ struct UnitReport {
 
 // The progress over all archives, for displays.
 struct Counters {
-  std::atomic<std::uint64_t> tiles{0};  // built by this process
-  std::atomic<std::uint64_t> bytes{0};  // of these tiles
-  std::atomic<std::uint64_t> passed{
-      0};  // not built: of units that were kept or copied, or because `Target::has` has them
-  std::atomic<std::uint64_t> units{0};  // done or given up
+  std::atomic<std::uint64_t> tiles{0};   // built by this process
+  std::atomic<std::uint64_t> bytes{0};   // of these tiles
+  std::atomic<std::uint64_t> passed{0};  // not built: in kept or copied units, or `Target::has` is true
+  std::atomic<std::uint64_t> units{0};   // done or given up
   // Microseconds of all threads, by stage.
   std::atomic<std::uint64_t> read{0}, refine{0}, encode{0}, compress{0};
 };

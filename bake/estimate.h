@@ -23,12 +23,13 @@ struct LevelEstimate {
 struct Estimate {
   std::vector<LevelEstimate> levels;
   std::uint64_t tiles = 0, files = 0;
-  std::uint64_t subtrees = 0;  // files without those of a single tile
+  std::uint64_t subtrees = 0;  // files with more than one tile
   std::uint64_t sampled = 0;   // tiles that were built for the estimate
   double bytes = 0, core_hours = 0;
 };
 
-// Builds some tiles of each level, in groups of neighbours as the bake does. kCancelled: stopped. Errors of tiles.
+// Builds some tiles of each level, in groups of neighbours as the bake does. kCancelled: stopped. Other errors: those
+// of TilePipeline::Build.
 Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,
                               const UnitPlan& plan, const std::stop_token& stop);
 

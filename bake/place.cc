@@ -306,8 +306,8 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 
 namespace {
 
-// What processes that were killed have left: unfinished files, and the locks of those that have surely ended. A lock of
-// another host stays, since nobody here knows of its owner.
+// Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock
+// of another host stays, because it is not known here whether its owner still runs.
 void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
   std::error_code ignored;
   std::vector<fs::path> leftovers;

@@ -42,13 +42,13 @@ struct BakeIdentity {
 // The text of Manifest::identity.
 std::string ToJson(const BakeIdentity& identity);
 
-// Whether the place can take this bake: it is empty, or holds a bake of the same identity, unfinished or, if it is of
-// this `generation`, finished. Writes the identity there. kInvalidArgument: it holds something else, or another bake;
-// the message says what differs and what to do. kUnavailable: it cannot be read or written.
+// Checks that the place can take this bake, and writes the identity there. The place is empty, or holds a bake of the
+// same identity: an unfinished one, or a finished one of this `generation`. kInvalidArgument: it holds something else,
+// or another bake; the message says what differs and what to do. kUnavailable: it cannot be read or written.
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
 
-// Removes what only an unfinished bake needs: the identity, and what killed processes have left: unfinished files, and
-// locks of processes of this host that have ended.
+// Removes what only an unfinished bake needs: the identity, unfinished files of killed processes, and locks of
+// processes of this host that have ended.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.
@@ -56,10 +56,10 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 // A random number that is kept in the place until the bake is finished: workers that have the same one write into the
 // same place, wherever it is mounted. kUnavailable: the place cannot be written.
 Result<std::string> PlaceId(const std::string& place);
-// Whether the archives there are finished. If so, removes what ClaimPlace and PlaceId have noted, and what killed
+// Returns whether the archives there are finished. If so, removes the notes of ClaimPlace and PlaceId, and what killed
 // processes have left, as TidyPlace does.
 bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
-// Removes what ClaimPlace and PlaceId have noted if nothing else is there but the lock `own_lock`: the bake was
+// Removes the notes of ClaimPlace and PlaceId if the place holds nothing else but the lock `own_lock`: the bake was
 // refused.
 void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock);
 // The name of a worker's lock for PlaceLock::Take. Locks of one job exclude other bakes, but not one another.

@@ -64,7 +64,7 @@ struct SourceConfig {
 
   std::string written;             // path or pattern, absolute
   std::vector<std::string> files;  // the files that it stands for
-  bool is_folder = false;          // files that are no rasters are left out
+  bool is_folder = false;          // files that are not rasters are left out
   // Default: the option of the dataset.
   std::optional<std::string> vertical = {};
   std::optional<NodataConfig> nodata = {};

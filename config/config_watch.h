@@ -26,9 +26,9 @@ class ConfigWatch {
 
   ConfigResult Load();
 
-  // Returns false if the file has had the same device, inode, size and times since before the last Load and was not
-  // written to shortly before it, and folders and globs among the sources contain the same files. Returns true after a
-  // failed Load.
+  // Returns false if nothing can have changed: the file has the device, inode, size and times that it had before the
+  // last Load, it was not written to shortly before that, and folders and globs among the sources contain the same
+  // files. Returns true after a failed Load.
   bool MayHaveChanged() const;
 
  private:

@@ -146,8 +146,8 @@ Result<Reply> Connection::Call(const Command& command) {
 }
 
 Error Connection::Refusal(const std::string& command, const ReplyView& error) const {
-  // The first word is the kind. The rest may repeat arguments of the command, which messages must not contain: known
-  // kinds are explained, of others the message has the first word alone.
+  // The first word is the kind. The rest may repeat arguments of the command, which messages must not contain. Known
+  // kinds are explained; for others the message has only the first word.
   const std::string_view text = error.text();
   const std::string_view kind = text.substr(0, text.find(' '));
   const auto starts = [&](std::string_view prefix) { return text.starts_with(prefix); };

@@ -30,7 +30,7 @@ struct ConnectionOptions {
 // The name and the arguments; bytes, not text.
 using Command = std::vector<std::string>;
 
-// Used by one thread at a time, but for Interrupt. No message contains user, password or an argument of a command.
+// Used by one thread at a time, except Interrupt. No message contains user, password or an argument of a command.
 class Connection {
  public:
   // Connects, authenticates, selects the database. kUnavailable: there is no server, or it is not a Redis.
@@ -41,20 +41,20 @@ class Connection {
   ~Connection();
 
   // One reply for each command, in one round trip; a command that Redis refuses has a reply of kind kError.
-  // kUnavailable: the connection broke, the deadline passed, or a reply was no reply of Redis. Whether the commands
-  // were carried out is unknown then, and every later call fails: open another connection.
+  // kUnavailable: the connection broke, the deadline passed, or a reply was malformed. The commands may have been
+  // carried out or not, and every later call fails: open another connection.
   Result<std::vector<Reply>> CallAll(std::span<const Command> commands);
-  // A reply that is no error. Errors: as CallAll, and Refusal of the error.
+  // Returns the reply if it is not an error. Errors: as CallAll; an error reply is converted by Refusal.
   Result<Reply> Call(const Command& command);
   // An error reply to a command as an Error. kInvalidArgument: the password or the user's rights. kOverloaded: Redis is
   // full. kUnavailable: it is loading, a read-only replica, or anything else.
   Error Refusal(const std::string& command, const ReplyView& error) const;
 
   bool is_open() const { return is_open_; }
-  // Whether the server has closed the connection meanwhile. Of a connection that is silently gone nobody knows. Does
-  // not wait.
+  // Whether the server is known to have closed the connection. A peer that vanished without closing it is not noticed.
+  // Does not wait.
   bool HasEnded() { return !is_open_ || socket_.HasEnded(); }
-  // From any thread: the call that is under way, and all later ones, fail at once with kUnavailable.
+  // From any thread: the current call and all later ones fail at once with kUnavailable.
   void Interrupt() const { socket_.Interrupt(); }
 
  private:

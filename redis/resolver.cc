@@ -16,7 +16,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using Addresses = std::vector<HostAddress>;
 
-// `flags`: AI_NUMERICHOST asks nobody.
+// `flags`: with AI_NUMERICHOST no name server is asked.
 Result<Addresses> AskSystem(const std::string& host, std::uint16_t port, int flags) {
   addrinfo hints{};
   hints.ai_socktype = SOCK_STREAM;

@@ -1,7 +1,7 @@
 // The addresses of a host, looked up within a deadline.
 //
-// The system's resolver has time-outs of its own, of half a minute and more. So it is asked by a thread of which the
-// caller waits only for so long, and the addresses that it found last stand in for those that it does not find in time.
+// The system's resolver has time-outs of its own, of half a minute and more. Therefore a separate thread calls it, and
+// the caller waits only until its deadline. Then it gets the addresses that an earlier look-up found.
 #pragma once
 
 #include <chrono>
@@ -17,19 +17,19 @@ namespace terrace::redis {
 
 using HostAddress = std::string;  // the bytes of a sockaddr
 
-// Thread-safe. A look-up that is not over when the object is destroyed goes on by itself.
+// Thread-safe. A look-up that still runs when the object is destroyed continues in the background.
 class Resolver {
  public:
-  // kNotFound: there is no such host. Other errors: nobody knows at the moment.
+  // kNotFound: there is no such host. Other errors: the look-up failed, and a later one may succeed.
   using LookUp = std::function<Result<std::vector<HostAddress>>(const std::string& host, std::uint16_t port)>;
 
   explicit Resolver(LookUp look_up);
 
-  // That of the system. Shared by the process, so that all know what one has found.
+  // The resolver of the system, shared by the process with the addresses that it has found.
   static Resolver& OfSystem();
 
-  // Numbers are converted at once. If addresses were found before, waits for newer ones at most half of the time. At
-  // most one look-up of a host is under way. kUnavailable: the message says why.
+  // Numbers are converted at once. If addresses were found before, waits for newer ones only half of the time until the
+  // deadline. At most one look-up of a host is under way. kUnavailable: the message says why.
   Result<std::vector<HostAddress>> Resolve(const std::string& host, std::uint16_t port,
                                            std::chrono::steady_clock::time_point deadline);
 

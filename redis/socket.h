@@ -22,8 +22,8 @@ using Deadline = std::chrono::steady_clock::time_point;
 class Socket {
  public:
   // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The deadline includes the
-  // look-up of the host's name (Resolver). kUnavailable: nobody listens, the deadline passed, or the certificate does
-  // not fit; kInvalidArgument: the file.
+  // look-up of the host's name (Resolver). kUnavailable: no server listens, the deadline passed, or the certificate
+  // does not fit; kInvalidArgument: the file.
   static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline);
   Socket(Socket&& other) noexcept;
   Socket& operator=(Socket&&) = delete;
@@ -36,7 +36,7 @@ class Socket {
 
   // Whether the peer has closed the connection, or has sent something without being asked. Does not wait.
   bool HasEnded();
-  // From any thread: what waits for the peer, or will, fails.
+  // From any thread: current and later waits for the peer fail.
   void Interrupt() const;
 
  private:

@@ -36,7 +36,7 @@ struct Purged {
   tiler::RefinementCache::Erased refinements;
 };
 
-// Refinements first: tiles that are made of them meanwhile are erased, too.
+// Refinements first: tiles that are made from them meanwhile are erased, too.
 Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection, const std::stop_token& stop) {
   Result<tiler::RefinementCache::Erased> refinements;
   if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection, stop);

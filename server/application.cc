@@ -154,7 +154,7 @@ TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalo
   handlers_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
 
-// Bodies are admitted by the number of locations at the start: it stays.
+// Bodies are admitted by the limit of locations at the start, so it does not change.
 TerrainApplication::HandlersPtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
   config.max_locations = max_locations_;
   return std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
@@ -211,7 +211,7 @@ bool TerrainApplication::HasLastingTrouble(const std::string& dataset) const {
   return since != problem_since_.end() && Clock::now() - since->second >= kPassingTrouble;
 }
 
-// Returns false if there was none in time, or if there will be none.
+// Returns false if there is none in time, or if the server stops.
 asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
   const auto give_up = Clock::now() + deadline_.load(std::memory_order_relaxed);
   while (opening()) {

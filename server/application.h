@@ -54,7 +54,7 @@ class TerrainApplication final : public Application, public ProcessState {
   void SetProblems(std::map<std::string, std::string> problems);
 
   const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request
-  // Never null; empty before the first.
+  // Never null; without datasets until the first catalog has come.
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
   std::map<std::string, std::string> problems() const override;

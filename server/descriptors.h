@@ -31,7 +31,7 @@ struct DescriptorDemand {
 struct DescriptorBudget {
   std::size_t store_files = 0;   // of each store: RecordDbOptions::open_files
   std::size_t open_sources = 0;  // dem::SetOpenSources
-  std::size_t vrt_parts = 0;     // likewise
+  std::size_t vrt_parts = 0;     // dem::SetOpenSources
   std::size_t connections = 0;
 };
 

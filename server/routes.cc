@@ -142,8 +142,8 @@ std::string_view LiteralOf(std::string_view segment) {
   return segment.find('{') == std::string_view::npos ? segment : std::string_view();
 }
 
-// Limit of a body with a list of locations: a fixed number of bytes, and this number per location: two numbers with all
-// digits, and three bytes per separator in a form.
+// Limit of a body with a list of locations: a fixed number of bytes, and 64 for each location. These are enough for two
+// numbers with all digits and three bytes per separator in a form.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
 // The same for rays of six numbers.

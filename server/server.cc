@@ -167,7 +167,7 @@ class RunningServer final : public Server {
 
   bool Stop() {
     frontend_->connections.Drain();
-    // In full, also while no connection is open: balancers send requests until they have seen /readyz.
+    // Waits in full, also while no connection is open: balancers send requests until they have seen /readyz.
     std::this_thread::sleep_for(DrainDelay());
     const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
     frontend_->connections.WaitUntilEmpty(DrainGrace());
@@ -208,7 +208,7 @@ class RunningServer final : public Server {
     admin_connections_.WaitUntilEmpty(kLastWords);
   }
 
-  // A server that was never ready is in no balancer.
+  // No balancer uses a server that was never ready.
   std::chrono::milliseconds DrainDelay() const {
     return application_.opening() ? std::chrono::milliseconds(0) : options_.config.drain_delay;
   }
@@ -280,7 +280,7 @@ class RunningServer final : public Server {
     return context;
   }
 
-  // Without TLS, and for no page of another origin.
+  // Without TLS, and not for pages of other origins.
   std::shared_ptr<const SessionContext> AdminContext() {
     auto context = std::make_shared<SessionContext>(*Context());
     context->options.drain_grace = std::chrono::milliseconds(0);

@@ -1,9 +1,8 @@
 // The server as one object: start it, request a stop, wait for the end.
 // Threads: a few for the network, and a bounded pool for building tiles. A stop has these steps: /readyz reports
-// "draining", and every connection closes after its next reply. After drain_delay, and then drain_grace or when no
+// "draining", and every connection closes after its next reply. drain_delay passes. After drain_grace, or as soon as no
 // connection is left, idle connections are closed and no new ones are accepted. Requests that have begun are answered,
-// within drain_timeout.
-// Builds are cancelled. Threads are joined.
+// within drain_timeout. Builds are cancelled. Threads are joined.
 #pragma once
 
 #include <chrono>

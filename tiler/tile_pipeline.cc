@@ -25,7 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// Of a dataset without sources.
+// A tile of a dataset without sources, from its archive.
 Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request) {
   Result<std::optional<EncodedTile>> found = dataset.baked->Find(request);
   if (!found) return tl::unexpected(std::move(found.error()));
@@ -61,7 +61,7 @@ HasTile TilesOf(const Dataset& dataset) {
   return [&available = AvailableIn(dataset)](const geo::TileKey& key) { return geo::IsAvailable(available, key); };
 }
 
-// Of two hashes; 0 if both are.
+// Combines two hashes; 0 if both are 0.
 std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
   if (edits == 0 || deeper == 0) return edits | deeper;
   dem::ContentHasher hasher;

@@ -26,8 +26,8 @@ struct TileTree {
 // The implicit trees, and the named tiles above them. `available` has tiles on level 0.
 std::vector<proto::TreeRoot> TreesOf(const TileTree& tree);
 
-// tileset.json. The queries are appended to the URLs of contents and subtrees; may be empty. `has_versions`: after the
-// version, as `v`.
+// tileset.json. The queries, which may be empty, are appended to the URLs of contents and subtrees. `has_versions`: the
+// version, as parameter `v`, precedes them.
 std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>& roots,
                         const std::string& content_query, const std::string& subtree_query, bool has_versions = true);
 

@@ -21,9 +21,9 @@ class InputFile {
   virtual Result<std::string> Read(std::uint64_t offset, std::size_t size) const = 0;
 };
 
-// Whether the place of an archive is one file. Names of GDAL's file systems end with .pmtiles then.
+// Whether the place of an archive is one file: a regular file, or a GDAL name that ends with .pmtiles.
 bool IsSingleFile(const std::string& place);
-// Whether something may be there; of remote places this is not known.
+// Whether something is there. Always true for remote places, which are not looked up.
 bool IsPlace(const std::string& place);
 
 // The whole file. kInvalidArgument: it is larger than `max_bytes`. Other errors as Open.

@@ -16,7 +16,7 @@ inline constexpr std::string_view kPartial = ".partial";
 // kUnavailable: the file cannot be written; the message names it and the reason. Used by one thread at a time.
 class OutputFile {
  public:
-  // Makes the folders of `path`. The unfinished file has a name of its own: several may write the same file at a time.
+  // Creates the folders of `path`. Unfinished files have unique names: several may write the same file at a time.
   static Result<OutputFile> Create(const std::string& path);
   ~OutputFile();  // removes an unfinished file
   OutputFile(OutputFile&&) noexcept;
@@ -41,7 +41,7 @@ class OutputFile {
 // Writes a file without waiting for the disk: for many small files. Makes its folder. kUnavailable: as OutputFile.
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
 
-// A file without a name beside `path`, for data that wait: it is gone with the process.
+// An unnamed temporary file in the folder of `path`. The system removes it when the process ends.
 class SpoolFile {
  public:
   static Result<SpoolFile> Create(const std::string& path);

@@ -1,7 +1,7 @@
 // Writes a 3TZ file: a zip file with an index of its entries, which finds an entry without reading the directory
 // (3D Tiles Archive Format 1.3; APPNOTE.TXT of zip 6.3, with zip64 where 32 bits do not suffice).
 //
-// libzip and minizip do not fit: the index needs the offset of each entry, which libzip does not tell, and minizip
+// libzip and minizip do not fit: the index needs the offset of each entry, which libzip does not report, and minizip
 // seeks back after each entry, which OutputFile cannot. Sizes and checksums are known beforehand, so a writer is short.
 #pragma once
 
@@ -22,9 +22,9 @@ class ZipWriter {
   // `start`: where the first entry begins, after a hole; readers of zip files allow it. For tests of large files.
   static Result<ZipWriter> Create(const std::string& path, std::uint64_t start = 0);
 
-  // An entry as it is. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
+  // Adds an uncompressed entry. `name`: ASCII, with slashes, none in front. Precondition: below 4 GiB, and not empty.
   Result<void> Add(std::string_view name, std::string_view bytes);
-  // Adds a deflated entry. `gzip`: its content, compressed by proto::Gzip. kInvalidArgument: it is no gzip stream.
+  // Adds a deflated entry. `gzip`: its content, compressed by proto::Gzip. kInvalidArgument: it is not a gzip stream.
   Result<void> AddGzip(std::string_view name, std::string_view gzip);
 
   // Writes the index as the last entry, and renames the file. kInvalidArgument: two entries have one name.

@@ -1,5 +1,5 @@
 // Writes a PMTiles file: clustered, deduplicated, with a row of facts for each tile (tile_row.h) behind the leaf
-// directory that names it. Other readers of PMTiles pass over the rows.
+// directory that names it. Other readers of PMTiles skip the rows.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// What an archive knows of a tile besides its bytes: a row of fixed size with a checksum over the row, the tile's
+// What an archive stores for a tile besides its bytes: a row of fixed size with a checksum over the row, the tile's
 // number and the bytes.
 #pragma once
 

@@ -17,7 +17,7 @@ struct JobPlace {
   redis::Address address;
   std::string ca_file = {};  // as in redis::ConnectionOptions
   std::string name;
-  // Of connecting, and of each call. A Redis that replies a second late is slow but works.
+  // For connecting, and for each call. A Redis that replies a second late is slow but works.
   std::chrono::milliseconds timeout{10'000};
 
   std::string Key(const std::string& what) const;
@@ -48,7 +48,7 @@ Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connecti
 // The value of a field; empty: it has none.
 std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fields, const std::string& name);
 
-// Forgets a job, with all that it knows. The files of the bake stay.
+// Removes a job with all its keys from Redis. The files of the bake stay.
 Result<void> RemoveJob(redis::Connection& connection, const JobPlace& place);
 
 }  // namespace terrace::bake

@@ -1,5 +1,5 @@
-// The state of a job in Redis, and the scripts that change it. Redis runs a script as a whole, so that a worker that is
-// killed leaves no half of a change.
+// The state of a job in Redis, and the scripts that change it. Redis runs a script as a whole, so that a killed worker
+// never leaves half of a change.
 //
 //   terrace:{JOB}:job     hash: what is baked (fields of JobIdentity), incarnation, state, lease_ms, units
 //   terrace:{JOB}:units   stream with the consumer group "bakers": the units that are not done, field "unit"
@@ -9,15 +9,15 @@
 //   terrace:{JOB}:errors  hash: unit -> why it failed last
 //
 // A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node of a cluster.
-// The incarnation is a random number of the moment at which the queue was filled: a worker that took its unit from an
-// earlier filling must not acknowledge in a later one.
+// The incarnation is a random number that is made whenever the queue is filled. A worker that took its unit from an
+// earlier filling must not acknowledge it in a later one.
 #pragma once
 
 namespace terrace::bake::scripts {
 
-// The unit after all others: writing the manifest.
+// The last unit: writing the manifest.
 inline constexpr const char* kFinishUnit = "*finish";
-// The consumer of units that wait to be handed out again.
+// The consumer that holds units until they are handed out again.
 inline constexpr const char* kNobody = "-";
 
 // Before each of the others. KEYS: as above. ARGV[1]: the incarnation; empty: there is no job. Redis 6.2 needs
@@ -47,7 +47,7 @@ for i = 3 + 2 * fields, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i])
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, units. A job that ended incomplete tries again what it gave up.
+// ARGV: incarnation, units. If the job ended incomplete, hands out again the units that were given up.
 inline constexpr const char* kRevive = R"lua(
 if redis.call('XLEN', units) > 0 or redis.call('XLEN', dead) == 0 then return {'ok'} end
 for i = 2, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
@@ -55,8 +55,8 @@ redis.call('DEL', dead, errors)
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, worker, lease in ms. New units first, then those whose worker was not heard of for a lease; then
-// the end. Idle times are Redis's, so that the clocks of the workers do not matter.
+// ARGV: incarnation, worker, lease in ms. Hands out new units first, then units whose worker was silent for a lease,
+// last the finishing unit. Idle times are Redis's, so that the clocks of the workers do not matter.
 inline constexpr const char* kTake = R"lua(
 local worker, lease = ARGV[2], ARGV[3]
 local function hand_out(message, deliveries)
@@ -90,7 +90,7 @@ redis.call('XADD', units, '*', 'unit', '*finish')
 return hand_out(new(), 1)
 )lua";
 
-// ARGV: incarnation, worker, ids. Only what is still this worker's.
+// ARGV: incarnation, worker, ids. Renews the leases of those ids that this worker still holds.
 inline constexpr const char* kBeat = R"lua(
 for i = 3, #ARGV do
   local pending = redis.call('XPENDING', units, 'bakers', ARGV[i], ARGV[i], 1)[1]
@@ -101,8 +101,8 @@ end
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, id, unit, worker, seconds. The unit may have been given up meanwhile, because its worker was not
-// heard of: it is there now, so it is dead no more.
+// ARGV: incarnation, id, unit, worker, seconds. The unit may have been given up meanwhile, because its worker was
+// silent. Its file exists now, so it is removed from the dead units.
 inline constexpr const char* kDone = R"lua(
 local is_new = remove(ARGV[2], ARGV[3])
 for _, entry in ipairs(redis.call('XRANGE', dead, '-', '+')) do
@@ -120,8 +120,7 @@ end
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, id, unit, worker, why (empty: stopped), deliveries that count, idle time in ms that it begins
-// with.
+// ARGV: incarnation, id, unit, worker, why (empty: stopped), number of deliveries to count, initial idle time in ms.
 inline constexpr const char* kGiveBack = R"lua(
 local pending = redis.call('XPENDING', units, 'bakers', ARGV[2], ARGV[2], 1)[1]
 if not pending or pending[2] ~= ARGV[4] then return {'ok'} end
@@ -131,7 +130,7 @@ redis.call('XCLAIM', units, 'bakers', '-', 0, ARGV[2], 'IDLE', ARGV[7], 'RETRYCO
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, id, unit, worker, why (empty: as noted), deliveries.
+// ARGV: incarnation, id, unit, worker, why (empty: the last error that was noted), deliveries.
 inline constexpr const char* kBury = R"lua(
 local why = ARGV[5]
 if why == '' then
@@ -144,7 +143,7 @@ redis.call('HDEL', errors, ARGV[3])
 return {'ok'}
 )lua";
 
-// ARGV: incarnation, id of the finishing unit, units that are not there after all.
+// ARGV: incarnation, id of the finishing unit, units whose files are missing.
 inline constexpr const char* kAddMissing = R"lua(
 for i = 3, #ARGV do redis.call('XADD', units, '*', 'unit', ARGV[i]) end
 remove(ARGV[2], '*finish')

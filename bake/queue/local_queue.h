@@ -10,7 +10,7 @@
 
 namespace terrace::bake {
 
-// The units 0 .. count - 1 in this order. Those that failed come again at the end.
+// The units 0 .. count - 1 in this order. Failed units are handed out again at the end.
 class LocalQueue : public UnitQueue {
  public:
   explicit LocalQueue(std::size_t count);

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Between two attempts at the same unit, at two takes when there was nothing, and at two connections.
+// After a failed attempt at a unit, after a take that found no unit, and after a failed connection.
 constexpr milliseconds kPauseAfterFailure{500}, kPauseWithoutUnits{500}, kPauseWithoutRedis{1000};
 
 std::string RandomName() {
@@ -105,7 +105,7 @@ Result<void> RedisQueue::CheckIdentity(const std::vector<std::pair<std::string, 
                    options_.place.address.Text(), options_.place.name, differences, options_.place.name);
 }
 
-// False: another worker did something meanwhile.
+// False: another worker has changed the job meanwhile.
 Result<bool> RedisQueue::Fill(const std::string& incarnation) {
   const std::string mine = RandomName();
   std::vector<std::pair<std::string, std::string>> fields = options_.identity;
@@ -188,7 +188,7 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
   commands.push_back(command);
   auto replies = connection_->CallAll(commands);
   {
-    // What Redis refuses now, because it is a replica, say, is sent again, before what was added meanwhile.
+    // What Redis refuses now, for example as a replica, is sent again, before what was added meanwhile.
     const std::lock_guard lock(mutex_);
     for (std::size_t i = sent.size(); i-- > 0;) {
       if (!replies || (*replies)[i].is_error()) {
@@ -209,7 +209,7 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
 
 UnitQueue::Taken RedisQueue::Take() {
   const std::lock_guard calls(calls_);
-  constexpr int kTries = 100;  // units of others, and units that are in hand, are not counted
+  constexpr int kTries = 100;  // TakeOnce asks again, for example after a unit that this process holds already
   for (int i = 0; i < kTries; ++i) {
     if (const auto taken = TakeOnce()) return *taken;
   }
@@ -230,7 +230,7 @@ void RedisQueue::EndBecause(End end, const Error& why) {
   why_ = why;
 }
 
-// Nothing: ask again.
+// Returns nothing if the caller must ask again.
 std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
   if (end() != End::kNone) return Taken{Taken::State::kOver};
   std::vector<std::string> arguments;
@@ -350,7 +350,7 @@ void RedisQueue::Beat() {
     arguments.insert(arguments.end(), done_.begin(), done_.end());
     if (finish_) arguments.push_back(finish_->id);
   }
-  // A call that takes longer is given up, so that the next one comes in time. Whether Redis is away is told by Take.
+  // A call that takes longer is abandoned, so that the next one comes in time. Take notes whether Redis is away.
   constexpr milliseconds kMinTimeout{500};
   if (!beat_connection_ || beat_connection_->HasEnded()) {
     JobPlace place = options_.place;

@@ -52,9 +52,9 @@ class RedisQueue : public UnitQueue {
   void Return(std::size_t unit) override;
   bool Fail(std::size_t unit, const Error& why) override;
 
-  // Why Take said that it is over.
+  // Why Take returned kOver.
   enum class End {
-    kNone,        // it did not
+    kNone,        // it has not
     kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
     kFinished,    // another worker has done that
     kIncomplete,  // units were given up: Dead
@@ -84,7 +84,7 @@ class RedisQueue : public UnitQueue {
   Result<bool> Fill(const std::string& incarnation);
   Result<void> Revive();
   Result<void> Connect();
-  // Sends what waits, and `command` after it. Notes when Redis is away.
+  // Sends the outbox, then `command`. Notes when Redis is away.
   Result<redis::Reply> Exchange(const redis::Command& command);
   void NoteAway(const Error& why);
   void NoteBack();
@@ -93,15 +93,15 @@ class RedisQueue : public UnitQueue {
   Taken WaitOrOver();
   void EndBecause(End end, const Error& why);
   void Flush();
-  // As it is in Redis.
+  // Takes over the job's values in Redis.
   void SetJob(const std::string& incarnation, std::chrono::milliseconds lease);
   std::string Incarnation() const;
   std::chrono::milliseconds Lease() const;
   // `mutex_` is held. Puts a script about a unit into the outbox: with its incarnation and id, and the other arguments.
   void Send(const Held& held, const char* script, std::vector<std::string> arguments);
 
-  // Of the thread of the heartbeat, which has a connection of its own: a call that Redis answers late, or a search for
-  // what is missing, must not cost the units in hand.
+  // Of the heartbeat's thread. It has a connection of its own, so that a late reply of Redis, or a long search for
+  // missing units, does not cost the leases.
   void KeepBeating(const std::stop_token& stop);
   void Beat();
 
@@ -124,7 +124,7 @@ class RedisQueue : public UnitQueue {
     std::string done;  // the id that it acknowledges; empty: none
   };
   std::deque<Outgoing> outbox_;  // to be sent before the next command
-  std::set<std::string> done_;   // ids whose acknowledgement waits or is on its way: they are beaten for until then
+  std::set<std::string> done_;   // ids that are not acknowledged yet: the heartbeat renews their leases until then
   End end_ = End::kNone;
   Error why_;
 

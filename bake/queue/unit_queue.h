@@ -15,7 +15,7 @@ class UnitQueue {
     enum class State {
       kUnit,
       kWait,  // none now: others are being baked, and may be handed out again
-      kOver,  // none any more
+      kOver,  // none is left
     };
     State state = State::kOver;
     std::size_t unit = 0;
@@ -34,7 +34,7 @@ class UnitQueue {
   virtual bool Fail(std::size_t unit, const Error& why) = 0;
 };
 
-// A unit is given up after it was handed out this often.
+// A unit that was handed out this often without success is given up.
 inline constexpr int kMaxAttempts = 3;
 
 }  // namespace terrace::bake

@@ -38,9 +38,8 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .value = "FILE,...",
        .help =
            "GeoJSON files whose features edit the terrain: flatten, slope, offset, carve, holes, precision and others",
-       .details =
-           "In order, later features over earlier ones. Relative to the folder of the file. They are watched like "
-           "sources. [Edits](edits.md)",
+       .details = "Later features lie over earlier ones. Relative to the folder of the file. They are watched like "
+                  "sources. [Edits](edits.md)",
        .codec = TextList(&DatasetConfig::edits, "a list of GeoJSON files", true),
        .other_words = "geojson features overrides modifications patches"},
       {.key = "baked",

@@ -32,7 +32,7 @@ std::vector<OptionInfo> DatasetOptions();
 // Whether a change of this option at the top level of the file needs a restart.
 bool TakesRestart(std::string_view key);
 
-// Returns the keys of options at the top level of the file whose values differ.
+// Returns the keys of options at the top level of the file whose values differ between two configurations.
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
 
 // Sets the option `key` from the text of its flag. Appends errors to `errors`, with the flag as path. `directory`: as

@@ -223,7 +223,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "shared_cache",
        .value = "URL",
        .section = "load",
-       .help = "Redis in which servers of a fleet share tiles that are dear to build",
+       .help = "Redis in which servers of a fleet share tiles that take long to build",
        .details = "In the file an object, `{\"url\": \"redis://HOST:6379/0\"}`; as a flag the URL alone. "
                   "[More](#shared-cache)",
        .codec = SharedCacheOption(),
@@ -364,9 +364,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "drain_delay_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "Time for which a stopping server still serves, with /readyz 503, so that balancers turn away from it",
+       .help = "Time for which a stopping server still serves, with /readyz 503, so that balancers stop using it",
        .details = "It precedes `drain_timeout_s`. Behind a balancer that asks `/readyz`: the period of its probe times "
-                  "its failure threshold, and the time that the news takes to spread. Replies have `Connection: close` "
+                  "its failure threshold, plus the time until all balancers know. Replies have `Connection: close` "
                   "meanwhile. [More](operations.md#restarts)",
        .codec = Seconds(&Config::drain_delay, 0, 3600),
        .other_words = "lameduck shutdown_delay"},

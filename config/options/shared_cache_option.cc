@@ -33,18 +33,17 @@ const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable() {
        .missing = ": where the Redis is"},
       {.key = "password_file",
        .value = "FILE",
-       .help = "File whose first line is the password; by default that of TERRACE_SHARED_CACHE_PASSWORD, if it is set",
+       .help = "File whose first line is the password; without it, TERRACE_SHARED_CACHE_PASSWORD is used, if set",
        .details = "The server reads it once, at the start, and never prints it",
        .codec = Path(&SharedCacheConfig::password_file, "the path of a file")},
       {.key = "ca_file",
        .value = "FILE",
-       .help = "Certificates (PEM) that may sign that of a rediss:// server; by default those of the system",
+       .help = "Certificates (PEM) of authorities for a rediss:// server; by default those of the system",
        .codec = Path(&SharedCacheConfig::ca_file, "the path of a file")},
       {.key = "timeout_ms",
        .value = "MS",
        .help = "Longest time that a request waits for Redis",
-       .details = "After a time-out or an error the server does not ask for a second, and then again when Redis has "
-                  "answered a test",
+       .details = "After a time-out or an error the server waits 1 s, and uses Redis again when it has answered a test",
        .codec = Integer(&SharedCacheConfig::timeout_ms, 1, 1000)},
       {.key = "min_build_ms",
        .value = "MS",
@@ -58,15 +57,14 @@ const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable() {
       {.key = "ttl_s",
        .value = "SECONDS",
        .help = "Time after which Redis forgets a tile; 0 is never",
-       .details =
-           "Tiles of older versions are not found any more, and go by this time or by Redis's `maxmemory-policy`",
+       .details = "Tiles of older versions are no longer found; this time or Redis's `maxmemory-policy` removes them",
        .codec = Seconds(&SharedCacheConfig::ttl, 0, 31'536'000)},
       {.key = "lease_ms",
        .value = "MS",
        .help = "Time that a server waits for a tile that another one builds; 0 builds it at once",
        .details =
-           "A worker waits meanwhile, so it is for tiles that take longer to build than a few look-ups, behind a "
-           "balancer that sends a tile to any server. Behind a ring a tile has one server anyway",
+           "A worker waits meanwhile. Use it if tiles take longer to build than a few look-ups and a balancer sends "
+           "requests for a tile to any server. Behind a ring a tile has one server anyway",
        .codec = Integer(&SharedCacheConfig::lease_ms, 0, 60'000)},
   };
   return table;

@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may lie one turn further on.
+// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may exceed it by one turn.
 struct SampleBox {
   std::int64_t west = 0, north = 0, east = -1, south = -1;
 
@@ -63,8 +63,8 @@ class CellErrorBound {
   // `place` if BoundBySamples can give a tighter bound from samples that have not been read.
   double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, std::optional<CellSamples>& place) const;
 
-  // Whether BoundBySurroundings returns 0 for every cell of a box, because there is no sample around any of them: on
-  // the sea of a raster grid that is void there. Precondition: nothing is blended. False does not mean the contrary.
+  // Whether BoundBySurroundings returns 0 for every cell of a box, because all samples around them are voids, as on the
+  // sea. Precondition: nothing is blended. False does not mean the contrary.
   bool HasNoSamples(const CellBox& box) const;
 
   // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of

@@ -15,7 +15,7 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// Of one axis and a vector of columns.
+// The steps of one axis and a vector of columns.
 template <class D, class V = hn::Vec<D>>
 struct AxisSteps {
   explicit AxisSteps(D d)

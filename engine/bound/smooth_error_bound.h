@@ -17,7 +17,7 @@ namespace terrace::dem {
 
 class SmoothErrorBound {
  public:
-  // `blends`: raster grids are blended where one gives way to the next. The other arguments must outlive this object.
+  // `blends`: raster grids are blended where they meet. The other arguments must outlive this object.
   SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
                    const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends);
 
@@ -65,8 +65,8 @@ class SmoothErrorBound {
   bool is_separable_ = false;
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
-  // By column of the trace's window, over rows `top` to `bottom` of the averages: the largest differences, as in Bends,
-  // of each average from the next ones to the east and to the south. And the sum of the averages; NaN if one is void.
+  // For each column of the trace's window, over rows `top` to `bottom` of the averages: the largest differences (Bends)
+  // of each average from the next ones to the east and to the south, and the sum of the averages, NaN if one is void.
   struct Band {
     std::int64_t top = 0, bottom = -1;
     std::vector<float> x, y, xx, yy, xy, sum;

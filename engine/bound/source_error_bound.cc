@@ -179,8 +179,8 @@ class GridErrorBound {
     AddBox(box, true);
   }
 
-  // Bounds the box as a whole if possible; else its quarters, down to single cells. `may_give_way`: the box that this
-  // is a quarter of is blended.
+  // Bounds the box as a whole if possible; else its quarters, down to single cells. `may_give_way`: false if the box
+  // that this is a quarter of has no blended heights.
   void AddBox(const CellBox& box, bool may_give_way) {
     if (!Touches(box)) return;
     const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);

@@ -76,7 +76,7 @@ struct DemFile {
   std::string path;
   // Where several sources have a height, the lowest rank wins, then the finer source, then the first path in order.
   int rank = 0;
-  bool skip_if_no_raster = false;             // found in a folder: skipped if it is no raster
+  bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
@@ -195,13 +195,13 @@ struct EditOutline {
   std::vector<std::vector<GeoPosition>> lines;  // closed rings repeat the first position
 };
 
-// What edits ask of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is
-// empty if they ask nothing of it. Depends on the nodes' positions and their level alone.
+// What edits require of the mesh of a tile, by node without a halo, row by row from the south-western one. A member is
+// empty if nothing is required of it. Depends on the nodes' positions and their level alone.
 struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
   std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes all are, or are forced, are left out
+  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes are all in a hole or forced are left out
 
   bool any() const { return !weights.empty() || !forced.empty() || !hole.empty(); }
 };

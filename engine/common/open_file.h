@@ -42,7 +42,7 @@ std::uint64_t SizeOf(int file);
 
 // Reads all bytes, or returns false.
 bool ReadAt(int file, std::uint64_t offset, void* to, std::size_t bytes);
-// Returns nothing if the file of `file_bytes` bytes ends before.
+// Returns nothing if the range exceeds the `file_bytes` bytes of the file.
 std::optional<std::string> ReadAt(int file, std::uint64_t offset, std::uint64_t bytes, std::uint64_t file_bytes);
 
 // Sets the time of modification to now. Does nothing if that is not permitted.

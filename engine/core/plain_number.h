@@ -1,4 +1,4 @@
-// Numbers in messages: digits alone, without an exponent.
+// Numbers in messages: only digits, no exponent.
 #pragma once
 
 #include <string>

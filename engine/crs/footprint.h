@@ -40,8 +40,8 @@ struct Footprint {
 // boxes.
 Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, const std::string& path);
 
-// Returns the tiles of a level that overlap the footprint, as one range, or two across the antimeridian. Sharing only
-// an edge is no overlap.
+// Returns the tiles of a level that overlap the footprint, as one range, or two across the antimeridian. Tiles that
+// share only an edge with it do not overlap it.
 std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level);
 
 }  // namespace terrace::dem

@@ -9,8 +9,8 @@
 namespace terrace::dem {
 namespace {
 
-// The geoid of the first raster grid at the middle of an edit that refers to one; EGM96 if none does. Null: a datum is
-// not known.
+// The geoid that the first raster grid at the middle of an edit refers to; EGM96 if none refers to one. Null: a datum
+// is not known.
 Result<std::shared_ptr<const Geoid>> GeoidAt(const std::vector<RasterGrid>& grids,
                                              const std::vector<std::size_t>& there) {
   for (const std::size_t i : there) {
@@ -32,7 +32,7 @@ Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
         "its heights are orthometric, but the vertical datum of the source there is not known; set "
         "`vertical` of the source, such as \"egm96\", or \"vertical\": \"ellipsoid\" of the feature");
   }
-  // Of the finest models, nodes are two kilometres apart.
+  // The finest geoid models have nodes two kilometres apart.
   constexpr double kStep_m = 500, kMaxSteps = 64;
   const Box& reach = edit.reach;
   const double width = (reach.east - reach.west) * plane.east_m, height = (reach.north - reach.south) * plane.north_m;

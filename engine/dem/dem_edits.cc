@@ -166,8 +166,8 @@ template <typename NodeGrid>
 Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
                                          std::span<const std::size_t> which, std::span<float> heights,
                                          const std::stop_token& stop, double* error_m) const {
-  // Of a replacement: heights before other edits, so that its voids show what is below.
-  // Features that share a source share them.
+  // Heights of a replacement before other edits, so that its voids show what is below. Features with the same source
+  // share them.
   std::map<std::size_t, ReplacedHeights> known;
   const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
     if (const auto found = known.find(edit.replacement); found != known.end()) return &found->second;
@@ -201,7 +201,7 @@ template Result<void> DemSource::Impl::ApplyEdits(const geo::MercatorGrid&, cons
                                                   std::span<const std::size_t>, std::span<float>,
                                                   const std::stop_token&, double*) const;
 
-// Edits have heights above the ellipsoid. Heights in another datum change by as much as those.
+// Edits have heights above the ellipsoid. Heights in another datum change by the same differences.
 Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
                                                       const std::string& what, const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(level);
@@ -299,7 +299,7 @@ MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
   if (impl_->edits == nullptr) return {};
   const geo::Lattice& lattice = impl_->LatticeOf(key.level);
   const NodeWindow window{lattice.FirstColumn(key), lattice.FirstRow(key), lattice.cells + 1, lattice.cells + 1};
-  // With the halo: a line beside the edge passes nodes of the edge, and both neighbours must find it.
+  // With the halo: both neighbours must find a line beside the edge that passes nodes of the edge.
   const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
   if (which.empty()) return {};
   return impl_->edits->DemandsOf(lattice, window, which);

@@ -17,7 +17,7 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::Fill for a window, or for `part` of it; then it has no positions.
+// The trace of RasterGrid::Fill for a window. If `part` is set, the trace covers that part only and has no positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};
@@ -53,7 +53,7 @@ class DemSource::Impl {
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
   std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
 
-  // Of dem_edits.cc. ApplyEdits: to heights above the ellipsoid. `error_m`: EditSet::Apply.
+  // Defined in dem_edits.cc. ApplyEdits takes heights above the ellipsoid; `error_m`: as for EditSet::Apply.
   Result<void> OpenEdits(const DemOptions& options);
   void AddDeeperLevels(double error_fraction);
   // Of an edit with orthometric heights. Returns what is wrong with it; empty: nothing.
@@ -78,7 +78,7 @@ class DemSource::Impl {
   std::vector<std::vector<geo::TileRange>> available;
   std::vector<std::vector<geo::TileRange>> above_added;  // the tiles above those that edits added; empty: none
   float floor = 0;                                       // above the ellipsoid
-  // For the whole Earth, of the last raster grid that refers to a geoid; or null.
+  // Undulations of the last raster grid that refers to a geoid, for the whole Earth. Null: no raster grid does.
   std::shared_ptr<const Undulations> floor_undulations;
   bool has_feather = false;
   DemInfo info;
@@ -93,7 +93,7 @@ class DemSource::Impl {
   HeightRange unedited_heights;  // of `info`
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  // Level, column, row; then columns and rows of Mercator windows, 0 of edits, -1 of deeper tiles.
+  // Level, column, row; then for Mercator windows their columns and rows, for edits 0, 0, for deeper tiles -1, -1.
   using HashKey = std::array<std::int64_t, 5>;
   struct HashOfKey {
     std::size_t operator()(const HashKey& key) const {

@@ -72,8 +72,8 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// RasterGrid::Fill, where there are many raster grids for the part of the window alone that this one reaches: thousands
-// of small ones may lie in a shallow tile, and what they note waits until all heights are known.
+// RasterGrid::Fill. If there are many raster grids, only for the part of the window that this one reaches: a shallow
+// tile may have thousands of small ones, and their traces are kept until all heights are known.
 template <typename NodeGrid>
 Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
                      HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {

@@ -52,7 +52,7 @@ Result<void> CheckOptions(const DemOptions& options) {
   return {};
 }
 
-// What decides the heights of a raster besides those of its samples.
+// Adds all that the heights of a raster depend on.
 Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const FileContentOptions& options) {
   hasher.Add(raster.content());
   if (auto placed = raster.georeference().AddTo(hasher, options); !placed) return placed;
@@ -62,7 +62,7 @@ Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const 
   for (const double number : {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest}) {
     hasher.Add(number);
   }
-  // What was found or stated of voids.
+  // Detected and configured voids.
   hasher.Add(rules.rim);
   hasher.Add(std::uint64_t{rules.extra_nodata.size()});
   for (const double value : rules.extra_nodata) hasher.Add(value);

@@ -1,7 +1,7 @@
 // A digital elevation model: heights at lattice nodes, anywhere on the globe, at any level.
 //
 // A model has one or more rasters. Sources are ordered by rank and resolution; a node takes its height from the first
-// one that has one there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
+// source with a height there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
 //
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once
@@ -35,7 +35,7 @@ class DemSource {
   // The deepest level served: the first whose default error is at most a tenth of the finest source's spacing, or at
   // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
-  // The deepest level without edits. Levels below it have tiles around edits alone.
+  // The deepest level without edits. Levels below it have tiles only around edits.
   int finest_level() const;
   geo::Lattice LatticeOf(int level) const;
 
@@ -93,19 +93,19 @@ class DemSource {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
-  // Edits (docs/edits.md). All of these are 0 or empty without any.
+  // Edits (docs/edits.md). All of these are 0 or empty if there are no edits.
   //
-  // What the edits ask of the mesh of a tile.
+  // The requirements of edits for the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
-  // The same of nodes of a level's lattice. Columns wrap at 360 degrees.
+  // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // A hash of the edits that a tile's bytes depend on; 0: it has the bytes that it has without edits.
-  // `EditsOfMercator`: of pixels as ReadMercator has them. Cheap after the first call for a tile.
+  // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `EditsOfMercator`: for pixels
+  // as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsOf(const geo::TileKey& key) const;
   std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
   // A hash of the tiles below a tile that exist because of edits; 0: there are none.
   std::uint64_t DeeperTilesOf(const geo::TileKey& key) const;
-  // Availability() as far as it concerns the tile: without levels below finest_level() that have no tile below it.
+  // Availability() without its last levels that are below finest_level() and have no tile below `key`.
   std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
@@ -121,8 +121,8 @@ class DemSource {
 
   // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
   // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
-  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours;
-  // below finest_level(), of available tiles. Conservative: a change of a source near the tiles may change the hash
+  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours.
+  // Below finest_level() this holds for available tiles only. A change of a source near the tiles may change the hash
   // although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
   ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 

@@ -9,8 +9,8 @@
 
 namespace terrace::dem {
 
-// The tiles of a level that overlap a box, as one range, or two across the antimeridian. Sharing only an edge is no
-// overlap.
+// The tiles of a level that overlap a box, as one range, or two across the antimeridian. Tiles that share only an edge
+// with it do not overlap it.
 std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level);
 
 // The intersection of two boxes: none, one, or two boxes if one of them surrounds the gap of the other.

@@ -33,7 +33,7 @@ std::vector<geo::TileRange> TilesTouching(const Edit& edit, int level) {
     north = std::min(north, geo::TileRows(level - coarser) - 1);
     if (coarser == level || std::max(east - west, north - south) < kMaxBoxes) break;
   }
-  // Touched: its centre is no further away than its corners are.
+  // A box is touched if its centre is no further away than half its diagonal.
   Edit grown = edit;
   grown.blend_m = std::hypot(side * edit.plane.east_m, side * edit.plane.north_m) / 2;
   Complete(grown);

@@ -32,7 +32,7 @@ inline const char* NameOf(EditOp op) { return kEditOpNames[static_cast<std::size
 // The height of a flatten.
 enum class FlatHeight : std::uint8_t { kGiven, kMean, kMedian };
 
-// What the heights of an edit count from.
+// The reference of an edit's heights.
 enum class EditDatum : std::uint8_t {
   kNone,        // not stated: the ellipsoid
   kEllipsoid,   // of WGS 84
@@ -61,7 +61,7 @@ struct EditUndulations {
   std::size_t columns = 0, rows = 0;
   std::vector<double> values;  // row by row from the south-western one
 
-  double At(PlanPoint point) const;  // of points beyond the patch: of the nearest one on it
+  double At(PlanPoint point) const;  // beyond the patch: that of its nearest point
 };
 
 struct Edit {
@@ -75,7 +75,7 @@ struct Edit {
   // encloses it. `heights`: of the points, for slope, carve and raise; else empty.
   std::vector<std::vector<PlanPoint>> rings;
   std::vector<std::vector<double>> heights;
-  // Of slope: corners of the first ring; empty: the plane h = gradient . (x, y) + level.
+  // For slope: triangles between corners of the first ring. Empty: the plane h = gradient . (x, y) + level.
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::array<double, 3> slope{};  // gradient along x and y, height at the origin
 
@@ -84,14 +84,14 @@ struct Edit {
   FlatHeight flat = FlatHeight::kGiven;
   double height_m = 0;                 // of flatten
   EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
-  // If the heights are orthometric: is added to them. Null until the sources are known, and for the ellipsoid.
+  // Added to orthometric heights. Null until the sources are known, and for heights above the ellipsoid.
   std::shared_ptr<const EditUndulations> undulations;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
   int min_level = 0;                                         // of precision
   std::string source;                                        // of replace: a path
-  std::size_t replacement = 0;                               // of replace: by edit set, the opened source
+  std::size_t replacement = 0;                               // of replace: index of the opened source, set by DemSource
 
   // Derived by Complete.
   Box reach;                     // degrees, with the blend; west in -180 .. 180

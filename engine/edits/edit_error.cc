@@ -8,9 +8,9 @@
 namespace terrace::dem {
 namespace {
 
-// A bound of the distance between the target and the surface between its values at the nodes of a cell. The target
-// beyond a polygon is that of the nearest point of its outline, which for a convex one is no further away than the
-// points themselves.
+// A bound on the distance between the target and the surface through its values at the nodes of a cell. Beyond a
+// polygon the target is that of the nearest point of the outline. The nearest points of a convex outline are no further
+// apart than the points themselves.
 double TargetError(const Edit& edit, double diagonal_m, double furthest_m) {
   if (edit.op == EditOp::kOffset) return 0;
   const double range = edit.high_m - edit.low_m;  // of flatten: of the geoid

@@ -6,8 +6,8 @@
 // target and its bilinear surface,
 //   S' - h' = (1 - w)(S - h) + bilinear((w_node - w)(t - s)) + w (bilinear(t) - t)
 //   |S' - h'| <= (1 - w0) e + (w1 - w0) d + w1 tau.
-// An offset has t - s constant. Carving and raising have max(0, +-(s - t)) in the place of t - s: where it changes its
-// sign in the cell, w1 d is added, and e is not reduced.
+// For an offset t - s is constant. For carving and raising max(0, +-(s - t)) takes the place of t - s; where it changes
+// its sign in the cell, w1 d is added, and e is not reduced.
 #pragma once
 
 #include <span>

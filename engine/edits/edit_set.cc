@@ -189,7 +189,7 @@ void ForNodesAlong(const geo::Lattice& lattice, const NodeWindow& window, const 
   const auto column = [&](PlanPoint p) { return (plane.longitude + p.x / plane.east_m + 180) / step; };
   const auto row = [&](PlanPoint p) { return (plane.latitude + p.y / plane.north_m + 90) / step; };
   double x0 = column(a), y0 = row(a), x1 = column(b), y1 = row(b);
-  // The window with one node more on each side, which nearest nodes of clipped lines do not leave.
+  // The window with one more node on each side: the nearest nodes of a clipped line stay within it.
   const auto south = static_cast<double>(window.row - 1), north = static_cast<double>(window.row + window.rows);
   if (std::max(y0, y1) < south || std::min(y0, y1) > north) return;
   const auto west = static_cast<double>(window.column - 1), east = static_cast<double>(window.column + window.columns);

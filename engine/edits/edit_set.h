@@ -31,7 +31,7 @@ struct ReplacedHeights {
 // The result stays valid until Apply returns.
 using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
 
-// The last row of each edit, by its number: points on one parallel share it.
+// The row that each edit computed last, by the edit's number. Points on one parallel share it.
 using EditRows = std::unordered_map<std::size_t, EditRow>;
 
 class EditSet {
@@ -42,15 +42,15 @@ class EditSet {
   const std::vector<Edit>& edits() const { return edits_; }
 
   // The edits whose reach meets a box of degrees, whose longitudes lie in -540 .. 540; in order. Each thread remembers
-  // the last box without edits: a tile asks for its surroundings first, and then for many boxes within these.
+  // the last box without edits, so calls for boxes within it return at once.
   std::vector<std::size_t> Find(const Box& degrees) const;
   // Whether Find would find any; faster if it would find many.
   bool Any(const Box& degrees) const;
 
-  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null:
-  // in, an upper bound of the distance between the surface through the tile's nodes and the samples of the sources;
-  // out, the same of the edited surface and the edited samples. The window then has a halo of one, which does not
-  // count. Errors: kCancelled.
+  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null: an
+  // upper bound of the distance between the surface through the tile's nodes and the samples of the sources. It is
+  // replaced by the bound for the edited surface and the edited samples. The window then has a halo of one, which does
+  // not count. Errors: kCancelled.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
                      std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,

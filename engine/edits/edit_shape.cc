@@ -40,7 +40,7 @@ std::array<double, 3> PlaneThrough(PlanPoint a, PlanPoint b, PlanPoint c, double
 
 std::size_t EdgesOf(const Edit& edit, std::size_t ring) { return edit.rings[ring].size() - (edit.is_area ? 0 : 1); }
 
-// Never less for a larger y, so that an edge's bands contain the band of every y between its ends.
+// Does not decrease with y, so that an edge's bands contain the band of every y between its ends.
 std::size_t BandOf(const Edit& edit, double y, std::size_t bands) {
   const double band = std::floor((y - edit.bands_from) * edit.bands_per_m);
   return static_cast<std::size_t>(std::clamp(band, 0.0, static_cast<double>(bands - 1)));
@@ -140,9 +140,9 @@ double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
   return edit.undulations == nullptr ? stated : stated + edit.undulations->At(point);
 }
 
-// The lowest point that is an ear is cut off next. Of every other corner of the right turn, a point is known that lies
-// in its triangle: only when that point or a neighbour goes, the corner is tested again, from that point on. So a
-// corner meets each point once for each of its triangles, of which there are at most 3 n in all: O(n^2).
+// The ear with the lowest number is cut off next. For every other convex corner one point is known that lies in its
+// triangle. The corner is tested again only if this point goes, then from the next point on, or if a neighbour goes. So
+// a corner meets each point once for each of its triangles, of which there are at most 3 n in all: O(n^2).
 std::vector<std::array<std::uint32_t, 3>> CutEars(const std::vector<PlanPoint>& ring) {
   constexpr std::uint32_t kEar = 0xffffffff, kNever = 0xfffffffe;  // kNever: until a neighbour goes
   const auto n = static_cast<std::uint32_t>(ring.size());

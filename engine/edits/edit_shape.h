@@ -10,13 +10,13 @@ namespace terrace::dem {
 
 // The nearest point of an edit's outline or line.
 struct EditPlace {
-  double distance_m = 0;   // 0 inside a polygon; beyond the reach: some number above it
+  double distance_m = 0;   // 0 inside a polygon; beyond the reach any number above the reach
   bool is_inside = false;  // of a polygon
   std::uint32_t ring = 0, edge = 0;
   double along = 0;  // 0 .. 1 on the edge
 };
 
-// The points of an edit's plane at one y: edges that are too far are left out once for the row.
+// The points of an edit's plane at one y. Edges beyond the reach of this row are excluded once.
 class EditRow {
  public:
   EditRow(const Edit& edit, double y);

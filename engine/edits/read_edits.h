@@ -22,7 +22,7 @@ struct EditFault {
 };
 
 // Appends the edits of a file, in order, and what is wrong with it. One feature at a time is kept as JSON, so memory
-// grows with the edits and not with the text. Edits are complete but for the heights that come from sources.
+// grows with the edits and not with the text. Edits are complete, except for heights that come from sources.
 void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<EditFault>& faults);
 
 // The faults as one message of at most 20 lines.

@@ -20,7 +20,7 @@ namespace {
 
 constexpr const char* kHeightField = "height";
 
-// A raster of GDAL that reads the heights where they are.
+// A raster of GDAL over these heights, without a copy.
 GDALDatasetUniquePtr RasterOver(std::span<const float> heights, int columns, int rows) {
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("MEM");
   if (driver == nullptr) return nullptr;

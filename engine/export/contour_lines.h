@@ -28,9 +28,9 @@ inline constexpr std::size_t kMaxContourCrossings = std::size_t{1} << 20;
 // rows, row by row; NaN: none. Precondition: interval > 0.
 std::size_t CountContourCrossings(std::span<const float> heights, int columns, int rows, double interval);
 
-// Lines at all multiples of `interval`, sorted by height; those of one height in a fixed order. GDAL
-// continues lines half a square beyond the grid, and half way towards nodes without a height. The line inside a square
-// depends only on the heights of its four nodes. A height equal to a multiple counts as above it. kCancelled: stopped.
+// Lines at all multiples of `interval`, sorted by height; lines of one height are in a fixed order. GDAL continues
+// lines half a square beyond the grid, and half way towards nodes without a height. The line inside a square depends
+// only on the heights of its four nodes. A height equal to a multiple counts as above it. kCancelled: stopped.
 // kInternal: GDAL failed. Precondition: at most kMaxContourCrossings.
 Result<std::vector<ContourLine>> TraceContours(std::span<const float> heights, int columns, int rows, double interval,
                                                const std::stop_token& stop);

@@ -14,7 +14,7 @@
 
 namespace terrace::dem {
 
-// Nodes in rows from the north, from the west; the outermost nodes lie on the box.
+// Rows run from the north, nodes in a row from the west; the outermost nodes lie on the box.
 struct OutputGrid {
   int epsg = 4326;
   std::string wkt;                                  // of the CRS
@@ -28,9 +28,9 @@ struct OutputGrid {
 
 struct GridRequest {
   int epsg = 4326;
-  // Units of the CRS. Of geographic ones degrees; west > east: across the antimeridian.
+  // Units of the CRS; degrees for geographic ones, where west > east is a box across the antimeridian.
   double west = 0, south = 0, east = 0, north = 0;
-  // Either both numbers of nodes, or the spacing, which makes the box smaller to the east and to the south.
+  // Either both numbers of nodes, or the spacing. With a spacing the box ends at the last node to the east and south.
   std::optional<std::int64_t> columns = {}, rows = {};
   std::optional<double> spacing = {};
 };

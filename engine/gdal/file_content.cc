@@ -37,7 +37,7 @@ std::string BytesOf(const FileStamp& stamp) {
   return writer.Take();
 }
 
-// Of this process, by path. Thread-safe.
+// The hashes that this process knows, by path. Thread-safe.
 class Known {
  public:
   std::optional<ContentHash> Find(const std::string& path, const FileStamp& stamp) {

@@ -29,7 +29,7 @@ std::uint64_t OtherFingerprint(const std::string& path) {
   ByteWriter writer;
   writer.PutBytes(path);
   writer.Put(static_cast<std::uint64_t>(is_known ? status.st_size : 0));
-  // Servers of one file agree on its ETag, and may not on its time.
+  // Servers of one file agree on its ETag, but perhaps not on its time.
   writer.Put(static_cast<std::uint64_t>(is_known && version == nullptr ? status.st_mtime : 0));
   writer.PutBytes(version == nullptr ? "" : version);
   if (!is_known || (status.st_mtime == 0 && version == nullptr)) writer.Put(NumberOfThisStart());

@@ -23,9 +23,9 @@ class HandlePool {
   // kChanged: a file of the raster is gone or was replaced. kUnavailable: it cannot be opened.
   Result<IdlePool<GDALDataset>::Handle> Borrow();
 
-  // Whether the files are still the ones that were opened. Ask again after a read, because files may be overwritten
-  // during it. If they are not, no dataset that is open now is used again: it may hold another file than the stamps
-  // describe, should the old file come back.
+  // Checks that the files are still the ones that were opened. Check again after a read, because files may be
+  // overwritten during it. If a file has changed, no dataset that is open now is used again, even if the old file comes
+  // back: it may hold the content of another file.
   Result<void> CheckUnchanged();
 
   const StampedFiles& files() const { return files_; }

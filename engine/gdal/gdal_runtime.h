@@ -9,7 +9,7 @@
 
 namespace terrace::dem {
 
-// Registers drivers and settles the configuration, once per process. Thread-safe; cheap when done.
+// Registers drivers and sets GDAL's configuration, once per process. Thread-safe; later calls are cheap.
 void InitGdal();
 
 // GDAL's counts since the start, in all threads; for metrics.
@@ -30,7 +30,7 @@ void SetGdalCache(std::size_t bytes);
 // defaults are 256 and 100. Call before the first source is opened.
 void SetOpenSources(std::size_t idle, std::size_t vrt_parts);
 
-// Blocks GDAL's virtual file systems for the network, for output of other processes, and for anything else but files.
+// Blocks GDAL's virtual file systems that read the network, the output of other processes, or anything else but files.
 // Makes GDAL's remote file systems ("/vsicurl/", "/vsis3/" and similar) answer "no such file" for every name, also for
 // names nested in other names. File systems named at the beginning of an allowed prefix stay available. Not
 // thread-safe: call before sources are opened.

@@ -13,8 +13,8 @@
 namespace terrace::dem {
 namespace {
 
-// Whether a failed look-up says that there is no such file, and not that the store does not answer or refuses. Stores
-// that are not remote state no error.
+// Whether a failed look-up says that there is no such file; else the store does not answer, or refuses. Stores that are
+// not remote state no error.
 bool IsAbsence(int error, std::string_view message) {
   return error == VSIE_None || error == VSIE_AWSObjectNotFound || message.find("response code: 404") != message.npos;
 }
@@ -48,7 +48,7 @@ Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
   VSICurlPartialClearCache(path.c_str());
   VSIStatBufL status{};
   if (VSIStatL(path.c_str(), &status) != 0) {
-    // Only opening states why, and not what GDAL remembers.
+    // Only opening states the reason, and only without GDAL's cached results.
     VSICurlPartialClearCache(path.c_str());
     VSIErrorReset();
     if (VSILFILE* const there = VSIFOpenExL(path.c_str(), "rb", /*bSetError=*/TRUE)) VSIFCloseL(there);

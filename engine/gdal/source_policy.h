@@ -24,8 +24,8 @@ struct SourcePolicy {
 };
 
 // Sets the policy of the process. The default is an empty policy. Thread-safe, but no source should be opened during
-// the call, because it removes and restores drivers. kInvalidArgument: a root is no folder, a prefix is not remote, or
-// GDAL does not have a driver; the old policy stays in force.
+// the call, because it removes and restores drivers. kInvalidArgument: a root is not a folder, a prefix is not remote,
+// or GDAL does not have a driver; the old policy stays in force.
 Result<void> SetSourcePolicy(const SourcePolicy& policy);
 
 // Sets the default policy with VRTs allowed, for commands that read files named by their user.

@@ -16,7 +16,7 @@ namespace terrace::dem {
 // Not thread-safe: a GDAL dataset belongs to one thread at a time.
 class ImageFile {
  public:
-  // Errors, with the remedy: those of OpenRaster, and bands that are no colours. `overview`: number of an overview to
+  // Errors, with the remedy: those of OpenRaster, and bands that are not colours. `overview`: number of an overview to
   // open instead of the full image; -1: the full image.
   static Result<ImageFile> Open(const std::string& path, int overview = -1);
 

@@ -24,7 +24,7 @@ struct TilePicture {
   std::vector<std::uint8_t> rgb;  // 3 * side * side
 };
 
-// The same with alpha: 0 where the image has no colour, which is then black.
+// The same with alpha: 0, with black, where the image has no colour; else 255.
 struct MapPicture {
   int side = 0;
   std::vector<std::uint8_t> rgba;  // 4 * side * side
@@ -44,7 +44,7 @@ class Imagery {
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
   // Opens an image as described in raster_colors.h, with a georeference. kInvalidArgument, with the remedy: errors of
-  // OpenRaster and Georeference, bands that are no colours, or an image outside `around`.
+  // OpenRaster and Georeference, bands that are not colours, or an image outside `around`.
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();

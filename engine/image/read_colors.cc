@@ -27,8 +27,8 @@ constexpr double kBeyondEdge = 0.5;  // pixels
 
 bool HasCrs(const OGRSpatialReference* srs) { return srs != nullptr && !srs->IsEmpty(); }
 
-// Whether positions in one are positions in the other, whatever heights count from. Not said of degrees, which differ
-// by full circles.
+// Whether positions in one are positions in the other; the vertical part does not matter. False for degrees, because
+// they may differ by full circles.
 bool ShareCoordinates(const OGRSpatialReference* a, const OGRSpatialReference* b) {
   if (!HasCrs(a) && !HasCrs(b)) return true;
   if (!HasCrs(a) || !HasCrs(b)) return false;

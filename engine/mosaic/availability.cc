@@ -36,7 +36,7 @@ Ranges Merged(Ranges ranges, const Ranges& others) {
   return geo::Disjoint(std::move(ranges));
 }
 
-// With the tiles around them.
+// The ranges with the tiles around them.
 Ranges Grown(const Ranges& ranges, int level) {
   const std::int64_t columns = geo::TileColumns(level), last_row = geo::TileRows(level) - 1;
   Ranges grown;

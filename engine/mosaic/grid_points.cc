@@ -124,8 +124,8 @@ Result<PointBlockPtr> RasterGrid::FindPointBlock(std::int64_t block_column, std:
   return PointBlockPtr(block);
 }
 
-// The block of some cells: kept, or read and kept, or, for few points that no other wanted lately, a window around the
-// cells alone. A window may lie in several turns of a raster around the Earth; then its cells are moved into one.
+// The block of some cells: a kept one, or one that is read and kept. For few points of a block that was not requested
+// lately: only a window around them. It may lie in several turns around the Earth; then the cells are moved into one.
 Result<PointBlockPtr> RasterGrid::BlockOfCells(std::vector<GridCell>& cells, const std::stop_token& stop) const {
   const std::int64_t column = BlockColumn(cells.front()), row = BlockRow(cells.front());
   const PointBlockKey key{id_, column, row};

@@ -219,7 +219,7 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
         }
         return known.is_hole;
       };
-      // Of several members, one hole is enough.
+      // If several members have the pixel, one hole is enough.
       if (all.size() <= kFew && canonical == column) {
         for (std::size_t k = 0; k < all.size() && holes[i] == 0; ++k) holes[i] = is_hole(all[k], found[k]) ? 1 : 0;
         continue;

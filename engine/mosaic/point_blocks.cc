@@ -9,7 +9,7 @@ namespace terrace::dem {
 namespace {
 
 constexpr std::size_t kNoted = 4096;
-// Of a block besides its samples: list and index nodes, the block itself.
+// Memory of a block besides its samples: list and index nodes, the block itself.
 constexpr std::size_t kOverheadBytes = 512;
 
 std::size_t ChargeOf(const PointBlock& block) { return block.bytes() + kOverheadBytes; }

@@ -64,8 +64,8 @@ class PointBlockCache {
   PointBlockPtr Find(const PointBlockKey& key);  // null: not kept
   void Insert(const PointBlockKey& key, PointBlockPtr block);
 
-  // Returns whether the block was already noted a short while ago, and notes it. A block that is wanted once, for a few
-  // points, is not worth reading as a whole.
+  // Notes the block. Returns whether it was noted before, and its note was not replaced since by one of another block.
+  // A block that is wanted once, for a few points, is not worth reading as a whole.
   bool Note(const PointBlockKey& key);
 
   std::size_t count() const;

@@ -42,8 +42,8 @@ struct GridTrace {
   // Between averages by `factor`. Valid where `heights` is not NaN. Nodes far from the raster grid may have no
   // position.
   NodeCells cells;
-  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending, nodes that
-  // other raster grids filled have one too, if their cell lies in `window` and has a sample.
+  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending also for
+  // nodes that other raster grids filled, if their cell lies in `window` and has a sample.
   std::vector<float> heights;
   std::vector<double> undulations;  // per node, metres, included in `heights`; empty: no geoid was applied
   GridWindow window;
@@ -113,7 +113,7 @@ class RasterGrid {
   Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
                     const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells of the window's nodes that Fill uses, their columns near those of a trace's window.
+  // Returns the cells of the window's nodes that Fill uses, with columns moved near those of a trace's window.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for
@@ -122,7 +122,8 @@ class RasterGrid {
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
                           std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
-  // Whether a position lies in a member, as points do that Fill gives heights to. With wrapping: in 0 .. columns().
+  // Whether a position lies in a member, the condition for a height from FillPoints. With wrapping: columns 0 ..
+  // columns().
   bool Covers(const Position& pixel) const { return cover_.Inside(std::span(&pixel, 1))[0] != 0; }
 
   // Returns the block of cells with these numbers (PointBlockKey), and keeps it. Does not check whether the files are
@@ -150,8 +151,7 @@ class RasterGrid {
   // positions.
   void AddTo(ContentHasher& hasher) const;
   // Returns the indices of the members that heights and RangeOf of the tile, and heights of all tiles below it down to
-  // level `deepest`, may depend on, ascending. `lattices`: by level. It may return members that nothing depends
-  // on.
+  // level `deepest`, may depend on, ascending. `lattices`: by level. May return members that nothing depends on.
   std::vector<std::size_t> MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
                                         int deepest) const;
   // Which voids of a member are holes, by region.

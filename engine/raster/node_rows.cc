@@ -118,7 +118,7 @@ void Round(const double* heights, const double* added, std::size_t count, float*
     const hn::Rebind<float, decltype(d)> floats;
     auto height = hn::LoadU(d, heights + i);
     if (added != nullptr) height = hn::Add(height, hn::LoadU(d, added + i));
-    // As RoundHeight does it: Round loses the sign of zero on some sets of instructions.
+    // Like RoundHeight. Round of Highway loses the sign of zero on some sets of instructions.
     const auto scaled = hn::Mul(height, hn::Set(d, 1024)), no_fraction = hn::Set(d, 0x1p52);
     const auto steps = hn::CopySign(hn::Sub(hn::Add(hn::Abs(scaled), no_fraction), no_fraction), scaled);
     hn::StoreU(hn::DemoteTo(floats, hn::Mul(steps, hn::Set(d, 1.0 / 1024))), floats, out + i);
@@ -276,7 +276,7 @@ const NodeRows::Line& NodeRows::LineOf(std::int64_t row) {
 
 std::span<const double> NodeRows::Row(std::size_t j) {
   if (!cells_.is_separable()) {
-    // Columns that wrap are moved, and indices of 32 bits must do.
+    // Columns that wrap must be moved, and the indices have 32 bits.
     constexpr std::size_t kMaxSamples = std::size_t{1} << 31;
     if (cells_.axes().columns.wraps() || samples_.size() >= kMaxSamples) return heights_;
     HWY_DYNAMIC_DISPATCH(InterpolateNodes)

@@ -62,7 +62,7 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
                                                SightSurface surface, SightSearch& search, const std::stop_token& stop) {
   const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());
   std::vector<RayPart> open;
-  // No raster grid before this one has heights, so all of its own count.
+  // If no raster grid comes before this one, all of its heights count.
   const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
   for (std::size_t i = 0; i < pieces.size() && is_first; ++i) {
     Scan scan{pieces[i], on_grid[i], surface, search, open, stop};
@@ -89,7 +89,7 @@ std::int64_t GridSight::WrappedColumn(std::int64_t column) const {
   return grid_.wraps() ? FloorMod(column, grid_.columns()) : column;
 }
 
-// Of positions on the grid. Positions in the outer half of the outermost pixels belong to the outermost cells.
+// The cells of positions on the grid. Positions beyond the outermost centres belong to the outermost cells.
 GridSight::CellRange GridSight::CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const {
   const auto cell = [](double position, std::int64_t cells) {
     return std::clamp(static_cast<std::int64_t>(std::floor(position)), std::int64_t{0},
@@ -139,7 +139,7 @@ Result<void> GridSight::Probe(Scan& scan) {
   return {};
 }
 
-// No pointer to a block outlives a call that measures: halves are looked at after the block of the whole.
+// Measuring may end the lifetime of a block: halves are measured after the last use of the block of the whole.
 Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   blocks_.Trim();
   const Quadratic::Range x = scan.on_grid.x.Over(first, last), y = scan.on_grid.y.Over(first, last);

@@ -1,9 +1,8 @@
 // Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
 //
-// Branch and bound: a part of a ray that is higher above the largest height below it than the smallest clearance found
-// so far is skipped; others are halved until they are short. Then the cells along them are compared one by one, and
-// in those that may matter the clearance is a polynomial of the second
-// degree between the lines of the grid, and its minimum is exact.
+// Branch and bound. A part of a ray is skipped if its clearance above the largest height below it is not less than the
+// smallest clearance found so far. Other parts are halved until they are short; then the cells along them are compared
+// one by one. Within a cell the clearance is a polynomial of the second degree, so its minimum is exact.
 #pragma once
 
 #include <map>
@@ -47,7 +46,7 @@ class SightSearch {
 // Which heights of a raster grid count.
 enum class SightSurface : std::uint8_t {
   kAll,       // measured, filled, and smooth ones in holes
-  kNotHoles,  // where the cell has a measured height or one in a narrow void, as other raster grids go before holes
+  kNotHoles,  // only cells with a measured height or a filled narrow void; other raster grids precede holes
 };
 
 // One raster grid and the rays over it. For one thread.
@@ -83,8 +82,8 @@ class GridSight {
   SightBlocks blocks_;
 };
 
-// The raster grids below the rays of a request. Those of earlier rays together keep at most kMaxSightBlocks blocks, and
-// so does the one that is in use. For one thread.
+// The raster grids below the rays of a request. All grids but the one in use together keep at most kMaxSightBlocks
+// blocks; the one in use keeps at most as many. For one thread.
 class GridSights {
  public:
   // `number`: of the grid. The reference is valid until the next call.

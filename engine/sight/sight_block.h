@@ -31,9 +31,9 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  const std::vector<float>& owned() const { return owned_; }      // NaN: a void that is not narrow, also in holes
+  const std::vector<float>& owned() const { return owned_; }      // NaN: voids that are not narrow, and holes
 
-  // Of the cells between two of the block, inclusive; possibly of more.
+  // A bound over the cells between two cells of the block, inclusive; possibly over more cells.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
   // By sample, as heights(): the largest height of the 3 x 3 samples from it to the south-east, which are the corners
   // of 2 x 2 cells; voids do not count.

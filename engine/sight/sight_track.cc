@@ -92,7 +92,7 @@ SightPoint PointAt(const SightRay& ray, double share, const SightOptions& option
 
 std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& options) {
   const Course course(ray, options);
-  // Towards a pole meridians converge, and columns are no smooth function of the way any more.
+  // Meridians converge towards a pole, and columns are not a smooth function of the distance any more.
   const double latitude = std::max(std::abs(ray.from.latitude), std::abs(ray.to.latitude));
   const double longest_m = TrackPiece::kMaxLength * std::clamp(2 * std::cos(geo::ToRadians(latitude)), 0.01, 1.0);
   const int count = std::max(1, static_cast<int>(std::ceil(course.length_m() / longest_m)));

@@ -24,7 +24,7 @@ class Quadratic {
     double min, max;
   };
   Range Over(double first, double last) const;
-  // Where it has a value between `first` and `last`, where it is monotonic enough for two steps of Newton; clamped.
+  // The place between `first` and `last` with this value, clamped: two steps of Newton, for nearly linear ranges.
   double Solve(double value, double first, double last) const;
 
  private:
@@ -48,7 +48,7 @@ std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& option
 struct PieceOnGrid {
   Quadratic x, y;
 };
-// Columns of a grid that does not span 360 degrees are those of the turn around the Earth that is nearest to the grid.
+// On a grid that does not span 360 degrees, columns are those of the turn around the Earth nearest to the grid.
 std::vector<PieceOnGrid> OnGrid(std::span<const TrackPiece> pieces, const Georeference& georeference);
 
 }  // namespace terrace::dem

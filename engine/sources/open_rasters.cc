@@ -21,7 +21,7 @@
 namespace terrace::dem {
 namespace {
 
-// File extensions of rasters: a file with one of these that is no raster is probably damaged.
+// File extensions of rasters: a file with one of them that is not a raster is probably damaged.
 bool LooksLikeRaster(const std::string& path) {
   constexpr std::string_view kEndings[] = {".tif", ".tiff", ".hgt", ".hgt.zip", ".hgt.gz", ".dt0", ".dt1",
                                            ".dt2", ".dem",  ".asc", ".img",     ".bil",    ".flt", ".nc"};

@@ -108,7 +108,7 @@ class Preparer {
     writer_.reset();
   }
 
-  // The averages of chunks that an interrupted run has read are in its file alone, and that is gone now.
+  // The averages of chunks that an interrupted run has read are only in its file, which is lost.
   bool LacksChunks() const { return !writer_ && averages_ != nullptr && !averages_are_whole_; }
 
   // kCancelled: stopped.
@@ -169,7 +169,7 @@ class Preparer {
     return ReadStatistics();
   }
 
-  // In the folder, or where that fails in memory.
+  // Keeps averages in the folder; if that fails, in memory.
   void FinishCache() {
     // If a file changed meanwhile, the statistics are a mixture; the caller will refuse them.
     if (files_.FirstChanged()) return;

@@ -19,8 +19,8 @@
 namespace terrace::dem {
 namespace {
 
-// Why overviews are not averages of valid heights alone, as many have averaged nodata values in them: by what the file
-// and its owner state.
+// Why overviews are not averages of valid heights only: many have averaged nodata values in them. Judged by what the
+// file and its owner state.
 std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
   GDALRasterBand& band = HeightBand(dataset);
   const auto is_declared = [&](double value) { return rules.nodata && rules.IsSame(value, *rules.nodata); };
@@ -360,7 +360,7 @@ Result<RasterStatistics> RasterSource::ReadStatistics() const {
   auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!prepared) return tl::unexpected(prepared.error());
-  // The next time would cost as much.
+  // The next read would take as long.
   if (prepared->cache_file.empty() && !has_lost_cache_.exchange(true)) use_->Fail(kGone);
   return std::move(prepared->statistics);
 }

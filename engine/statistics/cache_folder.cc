@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kHashDigits = 16;
 
-// "alps.tif-0123456789abcdef.statistics", or with ".partial" behind it: without that. Empty: another file's name.
+// "alps.tif-0123456789abcdef.statistics", also of a name with ".partial" behind it. Empty: another file's name.
 std::string FinishedName(std::string name) {
   if (name.ends_with(CacheFolder::kPartial)) name.resize(name.size() - CacheFolder::kPartial.size());
   const std::size_t tail = 1 + kHashDigits + CacheFolder::kEnding.size();
@@ -45,7 +45,7 @@ struct Found {
   std::int64_t modified_ns = 0;
 };
 
-// Nothing where it is no file of terrace's. A link is none.
+// Nothing if it is not a file of terrace's; a link is not.
 std::optional<Found> LookAt(int folder, const char* name) {
   const OpenFile file(::openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   struct stat status {};
@@ -119,7 +119,7 @@ void CacheFolder::Scan() {
   }
 }
 
-// The oldest files until so many bytes are gone. What another process has used, replaced or is writing meanwhile stays.
+// Removes the oldest files until `bytes` are free. Keeps files that another process has used, replaced or is writing.
 void CacheFolder::Evict(std::uint64_t bytes) {
   std::uint64_t gone = 0;
   while (gone < bytes && !oldest_first_.empty()) {
@@ -137,12 +137,12 @@ void CacheFolder::Evict(std::uint64_t bytes) {
   }
 }
 
-// Several processes write between their scans: each scans before it has written a 16th of the budget, and removes an
-// eighth of the budget more than it must, so that two of them keep the budget.
+// Several processes write between their scans. Each scans before it has written a 16th of the budget, and removes an
+// eighth of the budget more than it must. So two of them keep the budget.
 Result<void> CacheFolder::Reserve(std::uint64_t bytes) {
   if (max_bytes_ == kUnbounded) return {};
   const std::lock_guard lock(mutex_);
-  // While the folder is full of files in use, tens of thousands of them are not looked at for each that comes.
+  // If the folder is full of files in use, tens of thousands of them are not examined again for each new file.
   constexpr std::chrono::seconds kPause{2};
   const auto fits = [&] { return bytes <= max_bytes_ && bytes_ <= max_bytes_ - bytes; };
   const bool is_known = scanned_at_ && since_scan_ + bytes <= max_bytes_ / 16;

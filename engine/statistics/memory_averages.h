@@ -11,8 +11,8 @@
 
 namespace terrace::dem {
 
-// Averages by the factors of KeptFactors, from the smallest factor that fits on. Filled by one thread, then immutable
-// and thread-safe.
+// Averages by the factors of KeptFactors, beginning with the smallest factor that fits. Filled by one thread, then
+// immutable and thread-safe.
 class MemoryAverages {
  public:
   // Null: the raster needs none, or none fit. One raster takes at most an eighth of the remaining budget, so that each

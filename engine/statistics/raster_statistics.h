@@ -58,7 +58,7 @@ struct RasterStatistics {
   AveragingErrors errors;
   CoarseAverages coarse;
 
-  // Of the tables, in memory.
+  // Memory of the tables.
   std::size_t bytes() const;
 };
 

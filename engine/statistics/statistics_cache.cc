@@ -263,7 +263,7 @@ void StatisticsCacheWriter::KeepWholeChunks(const std::function<void(const Chunk
   }
 }
 
-// Complete or not, the file takes space that is missing.
+// The file is removed even if it is complete, because its space is needed.
 void StatisticsCacheWriter::Remove() {
   ::unlink((path_ + ".partial").c_str());
   folder_->Release(std::exchange(reserved_, 0));

@@ -21,7 +21,7 @@
 
 namespace terrace::dem {
 
-// The layout with the rules for detected nodata, and without overviews if there is any.
+// The layout with the rules for detected nodata. If any nodata was detected, overviews are left out.
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected);
 
 // The raster and rules that a cache file belongs to.

@@ -54,7 +54,7 @@ class Reader {
     values.resize(fits_ ? count : 0);
   }
   void Rest(std::string& text) { text = bytes_.GetBytes(bytes_.remaining()); }
-  // All of the bytes were read, and no more.
+  // Whether all bytes were read, and no more.
   bool ok() const { return fits_ && bytes_.ok() && bytes_.remaining() == 0; }
 
  private:
@@ -95,7 +95,7 @@ void ChunkFields(Archive& archive, Statistics& chunk) {
   }
 }
 
-// What tables that are immutable are made of.
+// The parts of immutable tables.
 struct TableParts {
   std::uint8_t is_everything = 0;
   std::uint32_t regions = 0;

@@ -38,7 +38,7 @@ struct ZeroEdges {
   // Whether the zeros are a collar of a raster of this size. All of these must hold: zeros reach the border; nearly all
   // differences to neighbouring ground exceed the step, which excludes a sea; zeros form areas or lie along the border,
   // and are not scattered; the ground has more than one height, and reaches all four sides or nearly, because a raster
-  // is no larger than its data. A block or an island with cliffs on flat ground at 0 m is thus no collar.
+  // is no larger than its data. A block or an island with cliffs on flat ground at 0 m is not a collar.
   bool IsCollar(int raster_width, int raster_height) const;
 
  private:
@@ -62,8 +62,8 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 
 // Reads the whole band twice more. `coast_step_m`: ZeroEdges::CoastStep of its spacing.
 //
-// - -32768, -32767, -9999, 9999, 32767 and 65535 are nodata values if they stand alone: at most a quarter as many
-//   samples lie within 1,000 m of the value as are equal to it.
+// - -32768, -32767, -9999, 9999, 32767 and 65535 are nodata values if they stand alone: the samples within 1,000 m
+//   of the value are at most a quarter as many as those equal to it.
 // - Heights below -500 m or above 9,000 m are mixtures of heights and a nodata value if all of them lie within 3
 //   samples of a void, though at most a quarter of all samples do, and at least half of them differ from a neighbour by
 //   more than 1,000 m (or the coast step). No land is lower or higher, and none is so steep. A sea floor has such

@@ -39,7 +39,7 @@ ChordMisfit WorstOfChord(const Chord& chord, const BorderOptions& options);
 // BorderOptions.
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options);
 
-// The same by what errors count as (sample_limits.h). A cap applies to the error before BorderOptions::scale.
+// The same with errors as SampleLimits::Counted weights them. A cap applies to the error before BorderOptions::scale.
 Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, const Corner& b,
                                    const BorderOptions& options, const SampleLimits& limits);
 

@@ -119,7 +119,7 @@ class DataDependentCriterion {
   // Star::left_out of such a scan: the triangle between two pairs, which are the triangles of p-w of two suspects.
   static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
-  // Of a triangle that has p as a corner.
+  // The fit of a triangle that has p as a corner.
   struct Fit {
     PlaneMisfit misfit;  // only if FitErrors::are_maxima()
     double error = kUnknown;

@@ -38,8 +38,8 @@ enum class Side : std::uint8_t {
 // evaluated in double in exactly this form. Its error is
 //   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m).
 // `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts.
-// Samples that have a limit (sample_limits.h) count the rounding of their own chord alone, and in full: with
-// p = rounding |h_b - h_a| / (b - a),
+// For samples with a limit (sample_limits.h) the rounding on their own chord replaces padding_m, and kMaxBorderWeight
+// does not apply. With p = rounding |h_b - h_a| / (b - a) the error is
 //   scale max((m + p) weight, m + p + step_m).
 // The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples
 // of this border alone: two fields that share a border with equal heights and options insert the same border vertices,
@@ -97,7 +97,7 @@ struct GreedyOptions {
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error
   SampleLimits limits;          // may be empty
-  double limits_scale = 1;      // of caps inside (SampleLimits::Counted); borders keep theirs
+  double limits_scale = 1;      // `scale` of SampleLimits::Counted, inside; 1 on borders
   bool record = false;          // keep the order of insertions for MakeRefinement
 };
 

@@ -1,7 +1,7 @@
 // Records a run of insertions, from which a Refinement is made.
 //
-// During the run a log is only appended to. Make finds out which insertion removed which triangle. That takes random
-// access to the record, which would evict the mesh from the cache during the run.
+// During the run, entries are only appended to a log. Make finds out which insertion removed which triangle. That takes
+// random access to the record, which would evict the mesh from the cache during the run.
 #pragma once
 
 #include <cstddef>

@@ -34,8 +34,8 @@ struct SampleLimits {
     return !weights.empty() && (weights[sample] > 1 || caps[sample] < std::numeric_limits<float>::infinity());
   }
 
-  // What the error of a sample counts as. `scale`: caps count this many times, and from 1024 on nothing is forced: for
-  // runs that may not take more vertices.
+  // The error of a sample, weighted as defined above. `scale`: factor on the caps; from 1024 on no sample counts as
+  // forced. For runs that may not take more vertices.
   double Counted(std::size_t sample, double error, double scale = 1) const {
     constexpr double kBeyondCap = 0x1p34, kForced = 0x1p40, kGiveUp = 1024;
     if (!forced.empty() && forced[sample] != 0 && scale < kGiveUp) return std::max(error, 1.0) * kForced;
@@ -64,12 +64,13 @@ struct SampleBox {
 // The samples that have a limit.
 SampleBox BoxOfLimits(const SampleLimits& limits, int width, int height);
 
-// The worst sample of a closed triangle without its corners and without the field's border, by what errors count as.
+// The worst sample of a closed triangle, by SampleLimits::Counted, without its corners and without the field's border.
 // `sagitta_m` is added to distances. Safe to call from many threads at once.
 Candidate WorstLimited(const HeightField& field, const std::array<Corner, 3>& corners, double sagitta_m,
                        const SampleLimits& limits, double scale);
 
-// As SamplesAreWithin (scan/triangle_spans.h), with max_error as the run's error; `sagitta_m` counts.
+// SamplesAreWithin (scan/triangle_spans.h) with the bound Allowed(sample, max_error). `sagitta_m` is added to
+// distances.
 bool SamplesAreAllowed(const HeightField& field, const std::array<Corner, 3>& corners, double sagitta_m,
                        const SampleLimits& limits, double max_error);
 

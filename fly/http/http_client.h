@@ -47,8 +47,8 @@ class HttpClient {
   HttpClient(const HttpClient&) = delete;
   HttpClient& operator=(const HttpClient&) = delete;
 
-  // Calls `done` on a thread of this object, exactly once unless it is destroyed before. 0 <= client < options.clients.
-  // Any thread may call this.
+  // Calls `done` on a thread of this object, exactly once unless this object is destroyed first. Any thread may call
+  // this. Precondition: 0 <= client < options.clients.
   void Get(int client, Url url, std::string accept, std::function<void(HttpReply)> done);
 
  private:

@@ -23,7 +23,7 @@ struct Url {
   std::string Text() const;
 };
 
-// kInvalidArgument if the text is no http or https URL.
+// kInvalidArgument if the text is not an http or https URL.
 Result<Url> ParseUrl(std::string_view text);
 
 // RFC 3986, section 5, without "../" inside of `reference`.

@@ -16,7 +16,7 @@ class Subtree3d {
   // if its bits are in other files.
   static Result<Subtree3d> Parse(std::string_view bytes, int levels);
 
-  // About the tile (x, y) at `level` below the subtree's root, 0 <= level < levels.
+  // Availability of the tile (x, y) at `level` below the subtree's root, 0 <= level < levels.
   bool HasTile(int level, std::uint32_t x, std::uint32_t y) const;
   bool HasContent(int level, std::uint32_t x, std::uint32_t y) const;
   // Whether another subtree begins at (x, y) on the level below the last one.

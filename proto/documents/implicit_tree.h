@@ -33,13 +33,13 @@ std::vector<geo::TileKey> ImplicitRoots(Availability available);
 // fine sources have more levels than others. Precondition: the root is available.
 int LevelsUnder(Availability available, const geo::TileKey& root);
 
-// More levels would cost CesiumJS frames: it creates an object for each of the 5,461 tiles of a full subtree when the
-// file arrives.
+// With more levels CesiumJS would miss frames: it creates an object for each of the 5,461 tiles of a full subtree when
+// the file arrives.
 inline constexpr int kMaxServedSubtreeLevels = 7;
 
-// The number of levels of each .subtree in a tree of `levels` levels: as few subtrees above each other as possible,
-// with equally many levels. Deepest subtrees with few levels would begin at a deep level, and there would be one for
-// each of its many tiles. loaders.gl fetches all subtrees of a tree one by one before it draws.
+// The number of levels of each .subtree in a tree of `levels` levels. A path to the deepest tile crosses as few
+// subtrees as possible, all with this number of levels. If the deepest subtrees had few levels, they would begin at a
+// deep level, one at each of its many tiles. loaders.gl fetches all subtrees of a tree one by one before it draws.
 int SubtreeLevels(int levels);
 
 struct TreeRoot {
@@ -56,7 +56,7 @@ inline constexpr std::size_t kMaxNamedTiles = 1024;
 // - trees beside a pole, by one level: for a region with a corner at a pole loaders.gl makes a box without width, and
 //   deck.gl then draws nothing of Europe from nearby;
 // - trees with more levels than a subtree, as deep as kMaxNamedTiles allows, those with the most levels first.
-//   Descendants inherit the root's height range and skirts. Six levels below the root these are 8 % of the viewing
+//   Descendants inherit the root's height range and skirts. Six levels below the root the skirts are 8 % of the viewing
 //   distance, and twice as much with each further level.
 std::vector<TreeRoot> ImplicitTrees(Availability available, const std::vector<geo::TileKey>& roots);
 

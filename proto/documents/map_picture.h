@@ -16,12 +16,12 @@ const char* MediaTypeOf(PictureFormat format);
 // As in URLs: "png", "webp", "jpg".
 const char* ToString(PictureFormat format);
 
-// The samples unchanged, as PNG or as lossless WebP. WebP has red, green and blue of grey, any colour in transparent
-// pixels, and no alpha if there are none. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
+// The samples unchanged, as PNG or as lossless WebP. WebP stores grey as RGB, and no alpha if all pixels are opaque;
+// colours of transparent pixels may change. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
 
-// A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has the
-// colours at `quality`, and `background` instead of transparent pixels. Errors and preconditions as above; kRgba.
+// A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has colours
+// at `quality`, `background` for transparent pixels. Errors as above. Preconditions: those of EncodePng, kRgba.
 Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, int quality,
                                 const std::array<std::uint8_t, 3>& background);
 

@@ -20,7 +20,7 @@ struct TileJsonDescription {
   int min_zoom = 0, max_zoom = 0;
   int tile_size = 256;
   HeightEncoding encoding = HeightEncoding::kMapbox;
-  // Degrees. west > east is a box across the antimeridian: TileJSON forbids that, and has all longitudes then.
+  // Degrees. west > east is a box across the antimeridian. TileJSON forbids such boxes: it then spans all longitudes.
   double west = -180, south = -90, east = 180, north = 90;
 };
 

@@ -19,7 +19,7 @@ struct TilesetDescription {
   // them. The written range of a tile also contains those of the tiles below it.
   std::function<HeightSpan(const geo::TileKey&)> heights;
   std::string subtree_query;  // appended to the subtree templates, without '?'; may be empty
-  std::string content_query;  // likewise to the contents: "error=5&atleast=1"
+  std::string content_query;  // the same for the content templates: "error=5&atleast=1"
 };
 
 // Metres. 3D Tiles clients refine a tile if its geometric error is more than 16 pixels on the screen; terrain clients

@@ -26,7 +26,7 @@ struct ContourFeature {
 
 inline constexpr std::string_view kContourLayer = "contour";
 
-// A tile with the layer "contour" and the attributes "ele" (an integer, or a double if it is none) and "index" (a
+// A tile with the layer "contour" and the attributes "ele" (an integer, or a double if it is not whole) and "index" (a
 // bool). Features without lines are left out. Without features the tile is empty: no bytes.
 std::string EncodeContourTile(const std::vector<ContourFeature>& features);
 

@@ -70,9 +70,9 @@ class NodeVerticals {
   // large. That costs time, but the result is the same: triangles within the shift are measured exactly.
   struct Bounds {
     Shift shift;
-    // Metres by which the triangle lies below its corners' linear interpolation, at most: half the square of the radius
-    // of a circle around it, over the radius of curvature. The radius of the smallest such circle is at most 1/sqrt(3)
-    // of the longest edge.
+    // An upper bound, in metres, of how far the triangle lies below its corners' linear interpolation: half the square
+    // of the radius of a circle around it, over the radius of curvature. The radius of the smallest such circle is at
+    // most 1/sqrt(3) of the longest edge.
     double sagitta_m = 0;
   };
   Bounds BoundsOf(const std::array<NodePoint, 3>& corners, std::int64_t unit, double beside_m) const {

@@ -32,12 +32,12 @@ class TileErrorMeter {
   ~TileErrorMeter();
 
   // Measures two surfaces at every lattice sample: the height interpolated in longitude and latitude, which clients
-  // sample, and the flat triangle in ECEF, which clients draw, at its intersection with the sample's plumb line (the
-  // ellipsoid's normal). If triangles overlap along a plumb line, the one farthest from the sample counts.
+  // sample; and the flat triangle in ECEF, which clients draw, where it meets the sample's plumb line (the ellipsoid's
+  // normal). If triangles overlap along a plumb line, the one farthest from the sample counts.
   TileError Measure(const QuantizedTile& tile);
 
   // Measures only the flat triangles of `mesh`, with its vertices near lattice nodes, at `positions` in ECEF. A
-  // triangle with corners that coincide counts as the line that is left of it.
+  // triangle with coinciding corners counts as a line.
   TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
 
  private:

@@ -8,8 +8,9 @@
 
 namespace terrace::proto {
 
-// Coordinates in which both the vertices and the lattice nodes are integers. Of quantized tiles: 1 / (32767 * cells) of
-// the tile; u * cells and i * 32767 stay below 2^23, products of two below 2^46. Of a mesh on the lattice: its cells.
+// Coordinates in which vertices and lattice nodes are integers. The unit for quantized tiles is 1 / (32767 * cells) of
+// the tile; u * cells and i * 32767 stay below 2^23, products of two below 2^46. For a mesh on the lattice it is a
+// cell.
 struct NodePoint {
   std::int64_t x = 0, y = 0;
 

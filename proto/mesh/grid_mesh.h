@@ -27,10 +27,10 @@ enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 // below half a millimetre. With the default error of its level a tile spans less than 2^16 steps; with the finest, less
 // than 2^23.
 //
-// Floats allow finer steps. With floats the step is also at most 2^-7 m, so that no vertex of a tile's edge is a
-// centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by their
-// positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits: 2^-6 m
-// at level 8, 1 m at level 2.
+// Floats allow finer steps. With floats the step is also at most 2^-7 m, so that all vertices of a tile's edge are less
+// than a centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by
+// their positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits:
+// 2^-6 m at level 8, 1 m at level 2.
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width);
 
 // Whole steps along the axes of ECEF.
@@ -41,8 +41,8 @@ using GridPoint = std::array<std::int64_t, 3>;
 // micrometre, so two processors can differ here only if a coordinate is within a micrometre of a tie.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
-// The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`. Limits count down to the step
-// of which a tile's side has 2^22 to 2^23, as that of the finest error.
+// The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`. Limits refine a step only until
+// a tile's side spans 2^22 to 2^23 steps, as with the finest error.
 struct GridSteps {
   double inside = 1;
   std::array<double, 4> side{}, corner{};
@@ -51,7 +51,7 @@ struct GridSteps {
   void Double();
 };
 
-// As above, with the points of edges on the grids that both neighbours have. In units of `inside`.
+// As above, but points on edges lie on the grids of side and corner, which both neighbours have. In units of `inside`.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, const GridSteps& steps);
 
 // Whether decoders that compute in 32-bit floats decode all points, and the lower rim of skirts of this depth, exactly.
@@ -79,9 +79,9 @@ struct GridMesh {
 // rim has the normals of the edge, so that a skirt is lit like the ground above it.
 //
 // Triangles with two equal corners are left out. Where points coincide, as in a pole's row, edges collapse in both
-// neighbours and the surface stays closed. `left_out`: triangles in holes, 1, by triangle, or empty; no skirt hangs
-// from them. If all are left out, the skirt of one edge of the rim is left, because decoders expect a triangle.
-// `points` and `normals` have one entry per vertex.
+// neighbours and the surface stays closed. `left_out`: by triangle, 1 for those in holes, which get no skirts; empty:
+// none. If all are left out, the skirt of one edge of the rim is kept, because decoders expect a triangle. `points` and
+// `normals` have one entry per vertex.
 GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
                       const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
                       const std::vector<std::uint8_t>& left_out = {});

@@ -44,12 +44,12 @@ struct QuantizedMeshOptions {
 // at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
 
-// Decodes the mesh of a tile, without extensions: nothing if `encoded` is no complete quantized-mesh tile. Vertices
-// without a triangle, and triangles of one point, are kept.
+// Decodes the mesh of a tile, without extensions. Nothing: `encoded` is not a complete quantized-mesh tile. Keeps
+// vertices without a triangle, and degenerate triangles of one point.
 std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const geo::TileKey& key);
 
 // Removes the extensions that `options` does not name. The result is what EncodeQuantizedMesh returns for these
-// options. Nothing: `encoded` is no tile of EncodeQuantizedMesh, or lacks an extension that the options name.
+// options. Nothing: `encoded` was not written by EncodeQuantizedMesh, or lacks an extension that the options name.
 std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options);
 
 }  // namespace terrace::proto

@@ -7,7 +7,7 @@ namespace terrace::proto {
 // sagitta of the edge's chords on the curved ground. It depends on level and error alone, so that both sides of an edge
 // agree. A tileset's root region must reach this far below the lowest height.
 //
-// The parent's error is taken as twice the tile's. That is exact for requests by `fraction`; for requests by `error` it
+// The parent's error is taken as twice the tile's. That is exact for requests by `fraction`. For requests by `error` it
 // is an upper bound, wherever the ladder clamps (engine/geo/error_ladder.h). `error_m`: SkirtError of the request.
 double SkirtDepth(int level, double error_m);
 

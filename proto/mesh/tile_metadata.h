@@ -10,9 +10,9 @@
 
 namespace terrace::proto {
 
-// Whether a tile has metadata: on levels 0, N, 2N and so on for N = `metadata_levels` (layer.json's
-// metadataAvailability), above `finest_level`, the deepest level of the sources; from that level on, where edits added
-// tiles, if it has children. 0: no tile has. `available`: as below.
+// Whether a tile has metadata: tiles of levels 0, N, 2N and so on have it, for N = `metadata_levels` (layer.json's
+// metadataAvailability); 0: no tile. `finest_level`: the deepest level of the sources. Tiles from there on, where edits
+// added levels, have metadata only if they have children. `available`: as below.
 bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int finest_level,
                      std::span<const std::vector<geo::TileRange>> available);
 

@@ -31,8 +31,7 @@ Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::Tile
 // The query of a tile template: parameters that differ from the defaults, each with '&' before it.
 std::string MapTileQuery(const MapTileParameters& parameters);
 
-// The level of the finest tiles of a format, 0 if the size would put it above. Precondition for imagery: the dataset
-// has an image.
+// The level of a format's finest tiles at this size; at least 0. Precondition for imagery: the dataset has an image.
 int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size);
 // The level of the coarsest tiles that these parameters are valid for: coarse contours need a large interval.
 int MinMapLevel(const MapTileParameters& parameters);

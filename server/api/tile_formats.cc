@@ -27,7 +27,7 @@ tl::unexpected<Error> NoSuchTile() {
   return MakeError(ErrorCode::kNotFound, "the dataset has no such tile; its layer.json lists what it has");
 }
 
-// Among codings that a client likes equally, that of the dataset's archive comes first: its tiles leave as they are.
+// Among codings that a client likes equally, that of the dataset's archive comes first: its tiles are sent as stored.
 std::span<const tiler::Coding> CodingsOf(const DatasetView& dataset) {
   using tiler::Coding;
   static constexpr std::array<Coding, 3> kGzipFirst = {Coding::kGzip, Coding::kBrotli, Coding::kZstd};

@@ -70,9 +70,9 @@ std::span<const TileFormatRow> TileFormatRows();
 // suffix matches.
 const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder = {});
 
-// The first row of a format in a folder, whose suffix is that of TileJSON documents; null if there is none.
+// The first row of a format in a folder; null if there is none. TileJSON documents use its suffix by default.
 const TileFormatRow* FirstFormatIn(std::string_view folder);
-// The row of a format with these pictures; null if there is none.
+// The row of a format for pictures in this picture format; null if there is none.
 const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat picture);
 
 // Returns the canonical request for a route and a request's headers. kNotFound: no such dataset, or the tile lies
@@ -94,7 +94,7 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding,
 // ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
 
-// ErrorStep for a level of this dataset. If no error is requested, and the dataset has no sources, that of its archive.
+// ErrorStep for a level of this dataset. Without sources, requests without an error get the step of the archive.
 int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,

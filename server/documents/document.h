@@ -1,6 +1,6 @@
-// Documents in two forms. Those prepared in advance have both codings and their ETags: layer.json, /datasets, the
-// viewer's files. Those that depend on a request's parameters are made on a worker, because even short ones may take
-// longer than a cached tile (a subtree needs the heights of hundreds of tiles), and cached for a while.
+// Documents in two forms. Prepared ones have both codings and their ETags: layer.json, /datasets, the viewer's files.
+// Documents that depend on a request's parameters are made on a worker, because even short ones may take longer than a
+// cached tile (a subtree needs the heights of hundreds of tiles), and cached for a while.
 #pragma once
 
 #include <chrono>

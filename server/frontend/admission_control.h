@@ -75,8 +75,8 @@ class AdmissionControl {
   // the connection.
   ClientIdentity Identify(Request& request, const ClientIdentity& peer, RequestContext& context) const;
 
-  // When the request may continue, at most after `longest_wait`: clients that exceed their rate wait. All requests
-  // count but probes, also those with unknown URLs.
+  // Takes a turn for a request: a client that exceeds its rate waits, at most `longest_wait`. All requests count except
+  // probes, also those with unknown URLs.
   RateLimiter::Turn TakeTurn(const RequestContext& context, const ClientIdentity& client,
                              std::chrono::milliseconds longest_wait);
   // 429, for a request whose turn was not granted.

@@ -14,7 +14,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// A tenth of a millimetre: what plane coordinates return of degrees.
+// A tenth of a millimetre: degrees that were converted to plane coordinates and back are no more exact.
 double Degrees(double value) { return std::round(value * 1e9) / 1e9; }
 
 Json PositionsJson(const std::vector<dem::GeoPosition>& line) {

@@ -161,7 +161,7 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
     return ClientErrorResponse(datum.error(), request.id);
   }
-  // Archives have no other heights.
+  // Archives have only the heights of their meshes.
   if (view.baked_alone && query->datum == dem::HeightDatum::kEllipsoid && !query->drawn) query->drawn.emplace();
   const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
   const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
@@ -169,7 +169,7 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   response.content_type = ContentTypeOf(query->format);
   response.content_encoding = tiler::NameOf(coding);
   if (!is_image) response.vary = "Accept-Encoding";
-  // The version does not say which grid makes orthometric heights of ellipsoidal ones.
+  // The version does not cover the geoid grid that orthometric heights depend on.
   const bool is_versioned = query->datum == dem::HeightDatum::kEllipsoid;
   response.cache_control =
       is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;

@@ -153,9 +153,9 @@ std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::
 DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.
 void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made);
-// The .subtree files below it. Any available tile may be the root, so that an older tileset.json that a client has
-// cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree begins
-// at this tile.
+// The .subtree files of the tileset. Any available tile may be the root, so that an older tileset.json that a client
+// has cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree
+// begins at this tile.
 DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& context);
 
 // GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.

@@ -113,7 +113,7 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;
   if (request.method != Method::kPost) {
-    // The version does not say which grid makes orthometric heights of ellipsoidal ones, nor what was certified.
+    // The version covers neither the geoid grid that orthometric heights depend on nor certified errors.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
     response.cache_control =
         is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;

@@ -19,14 +19,14 @@ struct MadeReply {
 
 using PointHandler = asio::awaitable<Response> (*)(const Handlers& from, const RequestContext& context,
                                                    std::uint32_t dataset);
-// Calls `handler` with the index of the dataset. 415: the type of the body is not one of points. 404: no such dataset.
+// Calls `handler` with the index of the dataset. 415: the body's type is not supported. 404: no such dataset.
 Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHandler handler);
 
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
 
-// Starts a reply with JSON, in a coding that the client accepts, or with binary values. Those are not compressed: they
-// hardly shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies to POST.
+// Starts a reply with JSON, in a coding that the client accepts, or with binary values, uncompressed: they hardly
+// shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies to POST.
 struct PointReply {
   tiler::Coding coding;
   Response response;

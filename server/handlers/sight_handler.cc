@@ -134,7 +134,7 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   const auto deadline = from.Deadline();
   Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
-  if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have no other heights
+  if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;

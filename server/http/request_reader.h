@@ -17,8 +17,8 @@
 namespace terrace::server {
 
 struct ReadTimeouts {
-  std::chrono::milliseconds message{5'000};  // from a request's first byte to its empty line; in a body, without a
-                                             // single byte, and before min_rate applies
+  std::chrono::milliseconds message{5'000};  // of a head, from its first byte to its empty line; of a body, between two
+                                             // bytes, and before min_rate applies
   std::chrono::milliseconds idle{30'000};    // between a reply and the next request
   std::size_t min_rate = 4096;               // average bytes per second of a body; 0: any
 };

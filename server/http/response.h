@@ -67,7 +67,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options);
 // Cache-Control of a reply for one client alone, made from the configured value.
 std::string PrivateCacheControl(std::string_view configured);
 
-// 204: the reply to an OPTIONS request, which a browser sends before a request with headers of its own.
+// 204: the reply to an OPTIONS request, which browsers send before a request with non-standard headers.
 Response PreflightResponse(bool takes_post);
 
 // The value of the Allow header.

@@ -43,7 +43,7 @@ sockaddr_un AddressOf(const std::string& path) {
   return address;
 }
 
-// Whether a socket lies there on which nobody listens.
+// Whether there is a socket on which nobody listens.
 Result<bool> IsStale(const std::string& path) {
   struct stat found {};
   if (::lstat(path.c_str(), &found) != 0) {
@@ -99,7 +99,7 @@ Result<PathSocket> ListenOnPath(const std::string& path, unsigned mode) {
     return CannotListen(path, WhyOf(errno), "choose a path in a folder that exists and can be written");
   }
   SocketFile file(path);
-  // Nobody can connect before it listens, so nobody can while the file has the mode of the umask.
+  // Nobody can connect before it listens. So the mode of the umask, which the file has until then, does not matter.
   if (::chmod(path.c_str(), mode) != 0 || ::listen(socket.get(), SOMAXCONN) != 0) {
     return CannotListen(path, WhyOf(errno), "choose another path");
   }

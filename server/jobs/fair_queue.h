@@ -69,8 +69,8 @@ class FairQueue {
   // Removes the newest job of the client with the most waiting jobs. Returns null if no job waits.
   PoolJobPtr RemoveNewestOfLargest();
 
-  // Expected wait of a new job: the mean times of the jobs before it, by kind. These are its client's own jobs, and as
-  // much work of each other client. Running jobs are not counted, nor kinds that have never run.
+  // Expected wait of a new job: the mean times, by kind, of its client's own jobs before it, and as much work of each
+  // other client. Running jobs, and kinds that have never run, are not counted.
   std::chrono::duration<double> ExpectedWait(const JobOrder& order, JobClock::time_point now) const;
 
   std::size_t size() const { return size_; }

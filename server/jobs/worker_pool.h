@@ -41,12 +41,12 @@ void Wake(WaiterPtr waiter);
 template <typename T>
 using Work = std::function<Result<T>(std::stop_token)>;
 
-// kUnavailable, with what the work `name` has thrown. Never throws.
+// kUnavailable, with the message of the exception that the work `name` has thrown. Never throws.
 Error FailureOf(std::string_view name, const std::exception& thrown);
 // kOverloaded: the job of the work `name` was dropped for others. Never throws.
 Error DroppedJobError(std::string_view name);
 
-// The result of the work; an exception counts as kUnavailable. Never throws: on a worker that would end the program.
+// The result of the work; an exception counts as kUnavailable. Never throws, which would end the program.
 template <typename T>
 Result<T> Outcome(std::string_view name, const Work<T>& work, std::stop_token stop) {
   try {

@@ -30,7 +30,7 @@ bool IsUnix(int descriptor) {
   return ::getsockopt(descriptor, SOL_SOCKET, SO_DOMAIN, &domain, &size) == 0 && domain == AF_UNIX;
 }
 
-// As of a TCP connection.
+// In the states of a TCP connection.
 int StateOfUnix(int descriptor) {
   pollfd state{descriptor, POLLRDHUP, 0};
   if (::poll(&state, 1, 0) < 0 || (state.revents & (POLLHUP | POLLERR)) != 0) return TCP_CLOSE;

@@ -56,11 +56,11 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room for a connection of `newcomer`: closes another connection. Chooses the client with the most connections,
-  // counting the new one, but none with fewer than the newcomer. Of this client, the oldest idle connection is closed,
-  // else the oldest without a complete request, else its newest in any phase; the last only if it is another client
-  // than the newcomer and has more connections. A connection without a client ("") counts as a client of its own.
-  // Returns false if no connection can be closed.
+  // Makes room for a connection of `newcomer` by closing another one: a connection of the client with the most
+  // connections, the new one included. Clients with fewer than the newcomer lose none. Closes the client's oldest idle
+  // connection, else its oldest without a complete request, else its newest; the last only if it is another client with
+  // more connections than the newcomer. A connection without a client ("") counts as a client of its own. Returns false
+  // if no connection can be closed.
   bool EvictOne(const std::string& newcomer);
 
   // From now on every connection ends after its current request.

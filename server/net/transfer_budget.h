@@ -5,10 +5,10 @@
 // for larger replies, a quarter for uploads. A body that is larger than its pool is transferred outside of it, one at a
 // time, as if in a pool of its own. The same rules hold in each pool:
 // - A body that many replies share counts once.
-// - Bodies that do not fit wait (HoldWhenRoom). The next body is one of the client with the least recent use of the
-//   pool, in bytes times seconds, with what it holds now included; among equals, the oldest.
-// - One client may hold two thirds of the memory for replies that others do not use, or one reply. This leaves memory
-//   for the next client.
+// - Bodies that do not fit wait (HoldWhenRoom). Next is the oldest body of the client with the least recent use of the
+//   pool, in bytes times seconds, including what it holds now.
+// - A client may hold one reply of any size, or twice as much memory for replies as it leaves free: two thirds of what
+//   others do not use. This leaves memory for the next client.
 // - Waiting bodies take memory from others. A client has kGrace to take a reply that is being sent, and gains one
 //   second per kRate bytes that it takes: its reply is late once it lags kGrace behind this rate. If a body waits, the
 //   late replies of the client that holds most are cut off, if this client holds more than the waiting one. If an
@@ -87,7 +87,7 @@ class TransferBudget {
   struct Share {  // of a client
     std::size_t bytes = 0;
     std::size_t holds = 0;
-    // Byte-seconds until `as_of`, of which half are forgotten every ten seconds.
+    // Byte-seconds up to `as_of`, with a half-life of ten seconds.
     double used = 0;
     Clock::time_point as_of;
   };

@@ -1,5 +1,5 @@
-// Parses the parameters of a height request from a query, a form or JSON in a streaming way: points are parsed one by
-// one, so that a list is read only up to its first error or to the limit, and is never stored as text.
+// Parses the parameters of a height request from a query, a form or JSON. Points are parsed one by one: a list is read
+// only up to its first error or to the limit, and is never stored as text.
 #pragma once
 
 #include <array>

@@ -41,13 +41,12 @@ bool IsBinaryBody(std::string_view content_type);
 // (parameters.h) and of the sink; those of the body name its byte.
 Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters);
 
-// `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`; with either,
-// `datum=ellipsoid` or `datum=orthometric`, `certify=LEVEL` or `certify=deepest`, `normals=1`, and `surface=source` or
-// `surface=served`; with the latter `level`, `error`, `fraction`, `atleast`, `format` and `compression`, as for tiles;
-// `v` is ignored. Each may occur once in query and body together. kInvalidArgument: anything else, numbers that are not
-// finite or not a position on Earth, or more than `max_locations` points; the message is for the client, and names the
-// item and the byte of the body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes
-// of the text.
+// `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`. Optional:
+// `datum=ellipsoid|orthometric`, `certify=LEVEL|deepest`, `normals=1`, `surface=source|served`. With `surface=served`
+// also `level`, `error`, `fraction`, `atleast`, `format` and `compression`, as for tiles. `v` is ignored. Each may
+// occur once in query and body together. kInvalidArgument: anything else, numbers that are not finite or not a position
+// on Earth, or more than `max_locations` points; the message is for the client, and names the item and the byte of the
+// body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes of the text.
 Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations,
                                   const std::stop_token& stop = {});
 

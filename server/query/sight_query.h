@@ -25,7 +25,7 @@ struct SightQuery {
 // `from=lat,lon,height&to=lat,lon,height`, or `rays=lat,lon,height,lat,lon,height|...`; `heights=ellipsoid` or
 // `heights=ground`, `refraction=K`, and the parameters of surfaces (drawn_parameters.h); `v` is ignored. Or a body of
 // longitude, latitude and height of both ends of each ray as little-endian 64-bit floats. kInvalidArgument: anything
-// else, a position not on Earth, a height that no ray has, a ray longer than kMaxSightLength, or more than `max_rays`;
+// else, a position not on Earth, a height out of range, a ray longer than kMaxSightLength, or more than `max_rays`;
 // the message is for the client. kCancelled: a stop was requested.
 Result<SightQuery> ParseSight(const HeightsInput& input, std::size_t max_rays, const std::stop_token& stop = {});
 

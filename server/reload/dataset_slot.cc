@@ -19,7 +19,7 @@ namespace {
 constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
 // Delay between attempts at unchanged files; doubled each time.
 constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
-// Between openings for what the cache folder has lost; doubled each time. Whatever removes its files may do it again.
+// Delay between openings for what the cache folder has lost; doubled each time. The loss may recur.
 constexpr std::chrono::minutes kFirstRecovery{1}, kLastRecovery{60};
 // A replacement that takes longer than this is reported as a problem.
 constexpr std::chrono::seconds kPatience{10};

@@ -36,7 +36,7 @@ class DatasetSlot {
   const config::DatasetConfig& wanted() const { return wanted_; }
   const std::optional<tiler::Dataset>& serving() const { return serving_; }
   bool is_opening() const { return opening_.valid(); }
-  // Whether nothing is left to open: the wanted dataset is served, or opening it has failed for now.
+  // Whether nothing is left to open: the wanted dataset is served, or the last attempt to open it failed.
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
 
   // The problem, for people; empty: there is none, or it is too recent.

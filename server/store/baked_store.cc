@@ -22,7 +22,7 @@ std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {
   std::shared_ptr<const tiler::BakedTiles> baked;
   {
     const std::shared_lock lock(mutex_);
-    // Datasets may differ in their edits alone.
+    // Datasets may differ only in their edits.
     const auto [first, last] = baked_.equal_range(key.generation);
     const auto found = std::find_if(first, last, [&](const auto& entry) {
       const auto& source = entry.second.source;

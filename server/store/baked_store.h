@@ -32,7 +32,7 @@ class BakedStore final : public tiler::TileStore {
   Result<std::size_t> Erase(const tiler::TileSelection&, const std::stop_token&) override { return std::size_t{0}; }
   void Abandon() override {}
 
-  // Also nothing if a file is damaged. The log names each such fault once.
+  // Returns nothing also if a file is damaged. The log names each such fault once.
   std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override;
   void Insert(const tiler::CacheKey&, std::shared_ptr<const tiler::EncodedTile>) override {}
 
@@ -45,7 +45,7 @@ class BakedStore final : public tiler::TileStore {
     std::shared_ptr<const dem::DemSource> source;  // whose edits the tiles have; null: without sources
   };
   std::multimap<std::uint64_t, Archive> baked_;  // by Dataset::cache_generation; guarded by mutex_
-  std::set<std::string> reported_;               // likewise
+  std::set<std::string> reported_;               // guarded by mutex_
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, errors_{0};
 };
 

@@ -47,7 +47,7 @@ class DiskStore {
   // Returns nothing if the value is absent or damaged, or the disk failed.
   std::optional<std::string> Find(const std::string& key);
 
-  // `value` is called on the store's thread. `charge`: about the memory that it holds until then.
+  // `value` is called on the store's thread. `charge`: approximate bytes that it holds until then.
   void Keep(std::string key, std::function<std::string()> value, std::size_t charge);
 
   // Removes a value that Find returned and that could not be parsed.

@@ -1,5 +1,5 @@
-// Decides which look-ups in a remote store are worth their time: those of classes of keys of which some were found.
-// Thread-safe.
+// Decides which look-ups in a remote store are worth their time. Keys belong to classes. Few look-ups are made for
+// classes with few hits. Thread-safe.
 #pragma once
 
 #include <array>
@@ -15,14 +15,14 @@ class LookUpGate {
     for (auto& share : shares_) share.store(kOne, std::memory_order_relaxed);
   }
 
-  // `of`: the class of the key, below kClasses. Every kSample-th look-up of a class of which little is found is made
-  // nevertheless, so that a store that others have filled meanwhile is noticed.
+  // `of`: the class of the key, below kClasses. In a class with few hits, only every kSample-th look-up is made: it
+  // shows whether others have filled the store meanwhile.
   bool ShouldAsk(std::size_t of) {
     const std::uint32_t number = asked_[of].fetch_add(1, std::memory_order_relaxed);
     return shares_[of].load(std::memory_order_relaxed) >= kMinShare || number % kSample == 0;
   }
 
-  // The result of a look-up that was made. Two threads may lose one of two results.
+  // Records the result of a look-up that was made. If two threads call it at once, one result may be lost.
   void Note(std::size_t of, bool found) {
     const std::uint32_t share = shares_[of].load(std::memory_order_relaxed);
     shares_[of].store(share - share / kMemory + (found ? kOne / kMemory : 0), std::memory_order_relaxed);
@@ -32,8 +32,8 @@ class LookUpGate {
   static constexpr std::uint32_t kSample = 16;
 
  private:
-  // The share of look-ups that found something, as a moving average of about the last kMemory. It begins with all, so
-  // that a new process asks.
+  // The share of look-ups that found something, as a moving average of about the last kMemory. It begins at 1, so that
+  // a new process asks.
   static constexpr std::uint32_t kOne = 1U << 24, kMemory = 64;
   static constexpr std::uint32_t kMinShare = kOne / 20;  // a look-up takes about a twentieth of a build of several ms
 

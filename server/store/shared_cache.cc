@@ -81,7 +81,7 @@ class SharedCache final : public tiler::TileStore {
     return tile;
   }
 
-  // Tiles of a tier below have no times; there is none.
+  // Tiles from a tier below would have no times, but no tier is below.
   void Insert(const tiler::CacheKey& key, std::shared_ptr<const tiler::EncodedTile> tile) override {
     const tiler::StageTimes& times = tile->times;
     const auto build = times.read + times.refine + times.encode + times.compress;
@@ -101,7 +101,7 @@ class SharedCache final : public tiler::TileStore {
     if (lease_.count() > 0) tier_.Release(Prefix() + tiler::RecordKey(key));
   }
 
-  // Of the value in addition to the tile's bytes.
+  // Bytes of a value in addition to the tile's.
   static constexpr std::size_t kRecordBytes = 512;
 
  private:
@@ -123,7 +123,7 @@ class SharedCache final : public tiler::TileStore {
       const SharedTier::Lease lease = tier_.Take(record_key, lease_);
       if (lease == SharedTier::Lease::kNone) return std::nullopt;
       if (lease == SharedTier::Lease::kTaken) {
-        // Its last owner may have written the tile since the look-up.
+        // The last owner of the lease may have written the tile since the look-up.
         std::optional<tiler::EncodedTile> tile = Read(record_key);
         if (tile) tier_.Release(record_key);
         return tile;

@@ -92,7 +92,7 @@ void SharedTier::Drop(Loan loan) {
   borrowed_.erase(loan.connection.get());
 }
 
-// What fails in an earlier epoch was ended by the failure that began this one.
+// A failure of an earlier epoch has no effect: the failure that began this one caused it.
 void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
   if (IsTimeout(why)) ++timeouts_;  // of everybody who has waited for it
   std::deque<Idle> gone;            // closed after the lock is released
@@ -138,14 +138,14 @@ std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
     return std::nullopt;
   }
   redis::Reply reply = std::move(replies->front());
-  // A lease that Redis does not write: it is full, a copy, or cannot save. Values can still be read.
+  // Redis refuses to write the lease: it is full, a replica, or cannot save. Values can still be read.
   if (reply.is_error() &&
       std::ranges::any_of(kRefusesWrites, [&](std::string_view why) { return reply.text().starts_with(why); })) {
     RefuseWrites(loan.connection->Refusal(command.front(), reply).message);
     GiveBack(std::move(loan));
     return std::nullopt;
   }
-  // Something of another type at the key is a value that is wrong. After any other refusal Redis is of no use.
+  // A value of another type is wrong. After any other refusal Redis cannot be used.
   if (reply.is_error() && !reply.text().starts_with("WRONGTYPE")) {
     const Error refusal = loan.connection->Refusal(command.front(), reply);
     Drop(std::move(loan));
@@ -271,7 +271,7 @@ void SharedTier::Run() {
   dropped_ += queue_.size();
 }
 
-// Opens one connection for look-ups. One that answers in time switches the store on.
+// Opens one connection for look-ups. If it answers in time, the store is switched on.
 void SharedTier::Connect() {
   std::uint64_t epoch = 0;
   {
@@ -305,7 +305,7 @@ SharedTier::Clock::time_point SharedTier::NextTest() const {
   return idle_.empty() ? Clock::time_point::max() : idle_.front().since + options_.test_after;
 }
 
-// Asks on the connection that was not used for longest. A fire wall, or a failover, may have dropped it silently.
+// Tests the connection that was not used for longest. A fire wall or a failover may have dropped it silently.
 void SharedTier::Test() {
   Loan loan;
   {
@@ -350,7 +350,7 @@ void SharedTier::Write() {
   }
   const auto values =
       static_cast<std::uint64_t>(std::ranges::count_if(jobs, [](const Job& job) { return !!job.value; }));
-  // A fire wall drops what is idle silently; a write there would wait for its time-out, and interrupt readers.
+  // A fire wall drops idle connections silently. A write there would wait for its time-out, and interrupt readers.
   if (!writer_ || writer_->HasEnded() || Clock::now() - written_at_ >= options_.test_after) {
     Result<ConnectionPtr> opened = Open(kWriteTimeout, MaxReply());
     if (!opened) {

@@ -58,7 +58,7 @@ class SharedTier {
   // Returns nothing if the value is absent, too large or damaged, if Redis failed, or if the store is switched off.
   std::optional<std::string> Find(const std::string& key);
 
-  // `value` is called on the store's thread. `charge`: about the memory that it holds until then.
+  // `value` is called on the store's thread. `charge`: approximate bytes that it holds until then.
   void Keep(std::string key, std::function<std::string()> value, std::size_t charge);
   // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
@@ -70,7 +70,7 @@ class SharedTier {
   void Release(const std::string& key);
 
   // Erases the values whose keys begin with `prefix` and that `is_chosen` accepts, also those that wait to be written.
-  // Blocks. Returns their number. kUnavailable: Redis failed, values may be left. kCancelled.
+  // Blocks. Returns their number. kUnavailable: Redis failed. kCancelled: stopped. In both cases values may be left.
   Result<std::size_t> Erase(const std::string& prefix, const std::function<bool(std::string_view key)>& is_chosen,
                             const std::stop_token& stop);
 
@@ -90,7 +90,7 @@ class SharedTier {
   std::size_t MaxReply() const { return options_.max_value_bytes + 4096; }
   // A command that a caller waits for. Nothing: the store is or was just switched off.
   std::optional<redis::Reply> Ask(const redis::Command& command);
-  // A connection of a time between two failures, and which.
+  // A borrowed connection, and the period between two failures that it belongs to.
   struct Loan {
     ConnectionPtr connection;  // null: none
     std::uint64_t epoch = 0;
@@ -114,12 +114,12 @@ class SharedTier {
   mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
   std::condition_variable changed_;
   bool on_ = false;
-  std::uint64_t epoch_ = 0;  // counts how often it was switched off: connections of an earlier one are closed
+  std::uint64_t epoch_ = 0;  // counts how often it was switched off; connections of earlier epochs are closed
   struct Idle {
     ConnectionPtr connection;
     Clock::time_point since;
   };
-  std::deque<Idle> idle_;                  // for look-ups; that which was used last is at the end
+  std::deque<Idle> idle_;                  // for look-ups; the last used one is at the end
   std::set<redis::Connection*> borrowed_;  // of this epoch
   std::size_t open_ = 0;                   // idle or borrowed, of this epoch
   Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt to connect, to write
@@ -128,7 +128,7 @@ class SharedTier {
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
   std::string reported_;                         // the last reason in the log
-  Clock::time_point reported_at_, answered_at_;  // when the log said so
+  Clock::time_point reported_at_, answered_at_;  // when the log last reported a failure; that Redis answers
 
   ConnectionPtr writer_;          // of the store's thread
   Clock::time_point written_at_;  // when the writer was used last

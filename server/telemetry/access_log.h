@@ -77,7 +77,7 @@ class AccessLog {
   const std::filesystem::path file_;
   std::mutex mutex_;
   int descriptor_;                      // guarded by mutex_
-  std::unique_ptr<LineWriter> writer_;  // to the file; likewise
+  std::unique_ptr<LineWriter> writer_;  // to the file; guarded by mutex_
 };
 
 }  // namespace terrace::server

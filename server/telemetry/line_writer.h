@@ -37,9 +37,9 @@ class LineWriter {
   bool takes_all_ = false;  // a file, or a terminal
   std::mutex mutex_;
   Clock::duration patience_ = kPatience;  // guarded by mutex_: the remaining waiting time
-  Clock::time_point asked_;               // when patience_ was updated; likewise
-  bool is_cut_ = false;                   // the last line is incomplete; likewise
-  std::uint64_t missed_ = 0;              // likewise
+  Clock::time_point asked_;               // when patience_ was updated; guarded by mutex_
+  bool is_cut_ = false;                   // the last line is incomplete; guarded by mutex_
+  std::uint64_t missed_ = 0;              // guarded by mutex_
 };
 
 }  // namespace terrace::server

@@ -306,7 +306,7 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   for (const DatasetView& dataset : datasets) served.insert(dataset.name);
   std::string from;  // names before it have been checked
   for (;;) {
-    // One at a time, because replies wait meanwhile, and removing a series from a family is a search.
+    // Removes one at a time, because replies wait meanwhile, and each removal searches its family.
     const std::unique_lock lock(families_->mutex);
     auto gone = families_->of_datasets.lower_bound(from);
     while (gone != families_->of_datasets.end() && served.contains(gone->first)) ++gone;

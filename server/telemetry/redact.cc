@@ -25,7 +25,7 @@ constexpr std::string_view kParameters[] = {
     "normals", "surface",   "level",   "width",      "height",      "spacing", "azimuth",    "altitude", "zfactor",
     "style",   "interval",  "crs",     "range",      "from",        "to",      "refraction", "heights",  "rays"};
 
-// Their values that are not numbers; several are separated by '-'.
+// Values of parameters that are not numbers; several are separated by '-'.
 constexpr std::string_view kWords[] = {"octvertexnormals",
                                        "watermask",
                                        "metadata",

@@ -108,7 +108,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline) {
 
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const dem::GeoBounds all{dataset.west, dataset.south, dataset.east, dataset.north};
-  // Levels that edits have added are no finer data.
+  // Levels that edits add have no finer data.
   const int level = std::min(dataset.finest_level(), dataset.max_level());
   if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
   const std::vector<geo::TileRange>& ranges = dataset.available[static_cast<std::size_t>(level)];

@@ -56,14 +56,13 @@ struct DatasetView {
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
-  // What keys of caches contain.
+  // The dataset's part of cache keys.
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
-  // The deepest level without edits, as of dem::DemSource.
+  // The deepest level of the sources, without edits, as of dem::DemSource. An archive may end above it.
   int finest_level() const {
     return baked_alone ? baked_alone->extent().finest_level : sources_finest_level.value_or(max_level());
   }
-  // The deepest level of the sources; an archive may end above it.
 };
 
 struct Catalog {
@@ -81,7 +80,7 @@ bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 // dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
-// Whether two boxes share a point, be it on an edge. `tile` does not cross the antimeridian.
+// Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.
 bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile);
 
 // Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the

@@ -132,7 +132,7 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
     has_edits |= static_cast<bool>(dataset.edits_of) || had_edits_;
   }
   cache_.Retain(generations);
-  // Of datasets that stay: tiles that other edits touch than before.
+  // In datasets that stay: erases the tiles whose edits have changed.
   if (has_edits) {
     cache_.EraseIf([&](const tiler::CacheKey& key) {
       return std::ranges::none_of(catalog.datasets, [&](const DatasetView& dataset) {
@@ -145,7 +145,7 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
                                    [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_of); });
 }
 
-// The slowest tier first and memory last: what is found in a tier meanwhile goes into those above it.
+// The slowest tier first and memory last: a tile that is found in a tier meanwhile goes into the tiers above it.
 Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection, const std::stop_token& stop) {
   Erased erased;
   Result<void> done;

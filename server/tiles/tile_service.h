@@ -34,8 +34,7 @@ struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
   std::size_t queue_length = 10'000;                 // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
-  // Tiers below memory, the first asked first. Each gets every tile that is built or that a
-  // tier below it has.
+  // Tiers below memory, the first asked first. Each gets every tile that is built or found in a tier below it.
   std::vector<std::shared_ptr<tiler::TileStore>> stores = {};
   HeaderWriter write_head = nullptr;  // null: heads are left empty
 };
@@ -78,7 +77,7 @@ class TileService {
   void RetainTilesOf(const Catalog& catalog);
 
   // Erases these tiles from memory and the tiers below; builds that have begun keep theirs. Blocks. Errors: those of
-  // the tiers, of which the others are erased nevertheless.
+  // the tiers. If one fails, the others are erased nevertheless.
   struct Erased {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // by the tier's name

@@ -157,7 +157,7 @@ Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mes
   return placed;
 }
 
-// Removes the triangles in holes, and vertices that no other triangle has.
+// Removes the triangles in holes, and vertices that no remaining triangle uses.
 void DropHoles(const dem::MeshDemands& demands, int width, tin::TinMesh& mesh,
                std::vector<proto::MeshVertex>& vertices) {
   const std::vector<std::uint8_t> in_hole = TrianglesInHoles(demands, width, mesh);

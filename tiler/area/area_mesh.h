@@ -26,10 +26,9 @@ struct AreaRequest {
   AreaCoordinates coordinates = AreaCoordinates::kEnu;
 };
 
-// The samples that an area is meshed from: nodes of the lattice of the first level whose default error is at most the
-// requested error, or of the deepest level: of the deepest one without edits, unless all tiles that the area touches
-// exist on a deeper one and its samples are not too many. The area is clipped to the source's bounds, then extended to
-// whole cells.
+// The samples that an area is meshed from: nodes of one level's lattice. The level is the first whose default error is
+// at most the requested error, or the sources' deepest. Levels that edits added are used only if they have all tiles of
+// the area and need at most `max_samples`. The area is clipped to the source's bounds, then extended to whole cells.
 struct AreaPlan {
   int level = 0;
   dem::NodeWindow window;

@@ -109,7 +109,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                         mesh.vertices[triangle[2]]};
     std::optional<tin::SamplePosition> miss;
-    double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: times its bound
+    double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: as a multiple of the sample's bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
         const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));

@@ -48,7 +48,7 @@ class AreaSurface {
   std::vector<geo::Vec3> row_points_;                    // of rows: ECEF metres at longitude 0, height 0
 };
 
-// Rounds a position to multiples of 2^-10 m, which removes the last bits of libm's results, which differ between
+// Rounds a position to multiples of 2^-10 m. This removes the last bits of libm's results, which differ between
 // processors.
 geo::Vec3 RoundPosition(geo::Vec3 metres);
 

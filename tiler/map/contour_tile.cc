@@ -84,7 +84,7 @@ void Append(std::vector<proto::TilePoint>& line, const proto::TilePoint& point) 
   if (line.empty() || line.back() != point) line.push_back(point);
 }
 
-// Without points that the line hardly needs. Of a small ring one point is left.
+// Removes points that change the line by at most kTolerance. One point of a small ring is left.
 std::vector<proto::TilePoint> Simplified(const std::vector<proto::TilePoint>& line) {
   std::vector<bool> keeps(line.size());
   std::size_t before = 0;  // the kept point before

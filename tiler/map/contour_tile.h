@@ -11,7 +11,7 @@
 
 namespace terrace::tiler {
 
-// Centimetres; the interval of a level's tiles if none is requested, and the smallest that may be requested.
+// Centimetres: the default interval of a level's tiles, and the smallest that may be requested.
 std::uint32_t DefaultIntervalCm(int level);
 std::uint32_t MinIntervalCm(int level);
 inline constexpr std::uint32_t kMaxIntervalCm = 1'000'000;
@@ -19,16 +19,15 @@ inline constexpr std::uint32_t kMaxIntervalCm = 1'000'000;
 // Every fifth line is an index line.
 inline constexpr int kIndexEvery = 5;
 
-// Pixels of margin around a tile that ContoursOf needs, and of those that its lines reach.
+// Pixels around a tile: the margin of heights that ContoursOf needs, and how far its lines extend.
 inline constexpr int kContourMargin = 3;
 inline constexpr int kContourBuffer = 2;
 
 // The lines of a tile of 256 pixels and of kContourBuffer pixels around it. Pieces between two neighbouring pixels are
 // whole, never cut, and depend on these pixels alone: neighbouring tiles have the same pieces at their common edge.
-// Away from edges points are left out that lie within an eighth of a pixel of the line without them. If
-// there were more than dem::kMaxContourCrossings points, the interval is multiplied by kIndexEvery until there are not;
-// the lines that remain are those of neighbouring tiles. kCancelled: stopped. Preconditions: a margin of
-// kContourMargin, an interval above 0.
+// Away from edges, lines are simplified by up to an eighth of a pixel. The interval is multiplied by kIndexEvery until
+// there are at most dem::kMaxContourCrossings points; the lines still match those of neighbouring tiles. kCancelled:
+// stopped. Preconditions: a margin of kContourMargin, an interval above 0.
 Result<std::vector<proto::ContourFeature>> ContoursOf(const MapHeights& heights, std::uint32_t interval_cm,
                                                       const std::stop_token& stop);
 

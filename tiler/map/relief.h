@@ -1,6 +1,6 @@
 // Slopes and shades of a map tile, from gradients by Horn's formula (Horn, Hill Shading and the Reflectance Map, 1981)
 // over 3 x 3 pixels, as `gdaldem` computes them. Distances are those on the ellipsoid at each row, not those of the
-// map. No function of the C library's that rounds differently between processors is used.
+// map. Uses no function of the C library whose rounding differs between processors.
 #pragma once
 
 #include <array>
@@ -15,8 +15,8 @@ namespace terrace::tiler {
 // Pixels around a tile that its gradients depend on.
 inline constexpr int kReliefMargin = 1;
 
-// Metres of height per metre to the east and to the north; NaN where there is no height. In the place of a neighbour
-// without a height, the pixel's own height is used.
+// Metres of height per metre to the east and to the north; NaN where there is no height. A neighbour without a height
+// counts with the pixel's own height.
 struct Gradient {
   double east = 0, north = 0;
 };

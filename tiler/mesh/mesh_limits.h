@@ -1,4 +1,4 @@
-// What edits ask of a tile's mesh: precision by place, vertices that must be there, and holes (docs/edits.md).
+// What edits require of a tile's mesh: precision by place, vertices that must be there, and holes (docs/edits.md).
 #pragma once
 
 #include <cstdint>
@@ -12,8 +12,8 @@
 
 namespace terrace::tiler {
 
-// The error that the mesh of a tile must keep to its nodes so that its error to the ground is at most `error_m`: the
-// heights of nodes are rounded to 2^-10 m, and their positions are inexact.
+// The error bound of a tile's mesh at its nodes for an error of at most `error_m` to the ground. It is smaller, because
+// the heights of nodes are rounded to 2^-10 m and their positions are inexact.
 double MeshError(double error_m);
 
 // The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.
@@ -28,15 +28,15 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 // corners.
 proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m);
 
-// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if all of its samples are,
-// or are vertices of the hole's outline.
+// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its samples is
+// in the hole or is a vertex of the hole's outline.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
-// The same of a field of `width` nodes a row.
+// The same for a field of `width` nodes a row.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh);
 
-// Removes the triangles in holes. Vertices on the tile's edges stay, because clients need the lists of edges: a
-// triangle whose corners are all that vertex is added for each one that no triangle refers to.
+// Removes the triangles in holes. Vertices on the tile's edges stay, because clients need the lists of edges. An edge
+// vertex k that no triangle refers to gets the degenerate triangle (k, k, k).
 void LeaveOut(const std::vector<std::uint8_t>& in_hole, const tin::TinMesh& mesh, int cells,
               std::vector<std::array<std::uint32_t, 3>>& triangles);
 

@@ -59,10 +59,10 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   return meshed;
 }
 
-// Makes a mesh within the format's limit of vertices. Inside the tile it has `scale` times the error, a power of two,
-// which doubles until the vertices suffice. Edges do not depend on the inside: they keep the threshold of the requested
-// error and its seeds exactly, because scaling by a power of two is exact. `error_m`: in, the requested error; out, the
-// error that was reached inside.
+// Makes a mesh within the format's limit of vertices. Inside the tile its error is `scale` times the requested one;
+// `scale`, a power of two, doubles until the vertices suffice. Edges do not depend on the inside: they keep the
+// threshold of the requested error and its seeds exactly, because scaling by a power of two is exact. `error_m`: the
+// requested error; becomes the error that was reached inside.
 Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double scale,
                                         double& error_m, const std::stop_token& stop) {
   for (;; scale *= 2) {

@@ -17,17 +17,17 @@ namespace terrace::tiler {
 
 // The extent of a dataset without sources: what its documents say instead of dem::DemInfo.
 struct BakedExtent {
-  std::vector<TileFormat> formats;  // of which there are tiles
+  std::vector<TileFormat> formats;  // of the tiles in the archive
   std::vector<std::vector<geo::TileRange>> available;
   dem::GeoBounds bounds;
   dem::HeightRange heights;
   double floor_m = 0;
   bool has_datum = true;
-  std::size_t sources = 0;                      // number of sources that it was baked from
-  int finest_level = 0;                         // likewise, without edits (dem::DemSource::finest_level)
+  std::size_t sources = 0;                      // number of sources of the baked dataset
+  int finest_level = 0;                         // of the baked dataset without edits (dem::DemSource::finest_level)
   int max_mercator_depth = 0;                   // of the height tiles in the archive
-  bool normals = false, water_mask = false;     // extensions that the tiles of quantized-mesh have
-  int metadata_levels = 0;                      // likewise; 0: none
+  bool normals = false, water_mask = false;     // extensions of quantized-mesh tiles
+  int metadata_levels = 0;                      // tiles at multiples of it have metadata; 0: none
   std::vector<int> error_steps;                 // of tiles with a mesh, by level; empty: 0
   std::optional<proto::TextureFormat> texture;  // of GLB tiles
 };
@@ -45,7 +45,7 @@ class BakedTiles {
   // damaged or cannot be read; the message names it.
   virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
 
-  // DemSource::RangeBound of a tile that was baked; of others the range of the dataset.
+  // DemSource::RangeBound of a baked tile; for other tiles the range of the dataset.
   virtual dem::HeightRange RangeBound(const geo::TileKey& key) const = 0;
 
   // Why Find finds nothing for a request: kNotFound.

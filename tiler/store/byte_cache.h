@@ -101,8 +101,8 @@ class ByteCache {
     }
   }
 
-  // Removes the entries whose keys `is_chosen` accepts. Returns how many values they had. No lock is held while it
-  // chooses, which may take long; entries that come meanwhile may stay.
+  // Removes the entries whose keys `is_chosen` accepts, and returns the number of their values. Calls `is_chosen`
+  // without a lock, because it may take long; entries that are inserted meanwhile may stay.
   template <typename Predicate>
   std::size_t EraseIf(const Predicate& is_chosen) {
     std::size_t erased = 0;

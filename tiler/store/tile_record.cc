@@ -95,7 +95,7 @@ bool IsSelected(const TileSelection& selection, std::string_view record_key) {
   tile.x = reader.Get<std::int64_t>();
   tile.y = reader.Get<std::int64_t>();
   bool is_mercator = false;
-  if (reader.remaining() > sizeof(std::uint64_t)) {  // a tile's
+  if (reader.remaining() > sizeof(std::uint64_t)) {  // the key of a tile
     reader.Get<std::int32_t>();
     is_mercator = IsMercator(static_cast<TileFormat>(reader.Get<std::uint8_t>()));
   }
@@ -121,7 +121,7 @@ Result<EncodedTile> ParseTile(std::string_view bytes) {
   tile.max_error_m = reader.Get<double>();
   const auto is_certified = reader.Get<std::uint8_t>();
   const auto certified_error_m = reader.Get<double>();
-  // One record per tile.
+  // A tile has exactly one valid record.
   if (is_certified > 1 || (is_certified == 0 && std::bit_cast<std::uint64_t>(certified_error_m) != 0))
     return NotARecord();
   if (is_certified == 1) tile.certified_error_m = certified_error_m;

@@ -19,9 +19,9 @@ namespace terrace::tiler {
 std::string RecordKey(const CacheKey& key);
 std::string RecordKey(const RefinedTileKey& key);
 
-// What the keys of a generation's records of one level begin with, and no others.
+// The prefix of the keys of a generation's records of one level. Other keys do not begin with it.
 std::string RecordPrefix(std::uint64_t generation, int level);
-// Whether the record of this key is a selected tile's, or its refinement.
+// Whether a record's key belongs to a selected tile or to the refinement of one.
 bool IsSelected(const TileSelection& selection, std::string_view record_key);
 
 std::string SerializeTile(const EncodedTile& tile);

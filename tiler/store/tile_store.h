@@ -50,8 +50,8 @@ struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
   std::uint64_t written = 0;
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
   bool on = false;            // both reading and writing
-  // Of a store on a network: look-ups that took too long, look-ups that were not made because it was switched off or
-  // because little of their kind is found, and how often it was switched off.
+  // For a store on a network: look-ups that timed out; look-ups that were skipped, because the store was switched off
+  // or look-ups of that kind rarely succeed; how often it was switched off.
   std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;
 };
 
@@ -70,7 +70,7 @@ class StoreBase {
   // Returns when everything that was inserted before the call is written or dropped.
   virtual void Flush() {}
 
-  // Drops values that wait to be written, and accepts no more: the process ends, and has no time left.
+  // Drops values that wait to be written, and accepts no more. For a process that must end at once.
   virtual void Abandon() = 0;
 };
 
@@ -83,7 +83,7 @@ class Store : public StoreBase {
   // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
 
-  // The value that Find did not find is not inserted: its build failed or was cancelled.
+  // Tells that no Insert follows a Find that found nothing: the build failed or was cancelled.
   virtual void GiveUp(const Key&) {}
 };
 

@@ -21,7 +21,7 @@ struct DrawnTriangles {
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
   std::vector<std::uint8_t> in_hole;  // whether clients do not draw a triangle, for each triangle; empty: they draw all
-  bool lacks_holes = false;  // triangles in holes are not among them: where there are none inside the tile, is a hole
+  bool lacks_holes = false;  // triangles in holes were left out: a place in the tile without a triangle is a hole
 };
 
 struct DrawnPoint {
@@ -36,12 +36,12 @@ class DrawnMesh {
   DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles);
 
   // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
-  // is rare except near the tile's edge. Of several triangles, the one that it meets farthest inside counts.
+  // is rare except near the tile's edge. If it meets several triangles, uses the one that it meets farthest inside.
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
   // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
   // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles
-  // end at chords of them: in the northern hemisphere they exceed the northern edge, and leave out a strip at the
-  // southern one.
+  // end at chords of them. In the northern hemisphere chords lie beyond the northern edge, and leave out a strip at the
+  // southern edge.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.

@@ -107,7 +107,7 @@ Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::sp
       drawn = meshes[own]->Nearest(points[i]);
     }
     const auto key = drawn->is_beside ? NeighbourOf(has_tile, read.tiles[own], points[i]) : std::nullopt;
-    // One more than the limit is no fault of the client's points.
+    // A neighbour beyond the limit of tiles is not read, because the client did not ask for it.
     if (key && (numbers.contains(*key) || read.tiles.size() < kMaxDrawnTiles)) {
       const Result<std::uint32_t> other = number_of(*key);
       if (const Result<void> ready = made(*other); !ready) return tl::unexpected(ready.error());

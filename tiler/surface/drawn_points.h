@@ -43,9 +43,9 @@ using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const 
 using HasTile = std::function<bool(const geo::TileKey&)>;
 
 // Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
-// available ancestor; beside an edge, where only the neighbour's triangles are, to the neighbour. On the edge between
-// two tiles to the eastern and the northern one. In holes heights and normals are NaN. `normals`: adds normals.
-// kInvalidArgument: too many tiles.
+// available ancestor. On an edge between two tiles it belongs to the eastern and the northern one. Beside an edge where
+// only the neighbour has triangles, it belongs to the neighbour. In holes heights and normals are NaN. `normals`: adds
+// normals. kInvalidArgument: too many tiles.
 Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
 

@@ -16,7 +16,7 @@ inline constexpr double kMaxSamplesAlong = 2e8;
 
 // kInvalidArgument, with a message for the client: the rays cross more.
 Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem::SightRay> rays);
-// The same where there are tiles alone: 256 samples along a tile's side count, and at least one every 500 m.
+// The same for a dataset without sources. Counts 256 samples along a tile's side, and at least one every 500 m.
 Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays);
 
 // As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:

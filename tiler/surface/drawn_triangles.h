@@ -11,11 +11,11 @@ namespace terrace::tiler {
 
 struct EncoderInput;  // tile_pipeline.h
 
-// Those of the bytes that EncodeQuantizedMesh and EncodeGlb (encoders.h) make of the same input. Errors: theirs.
+// The triangles in the bytes that EncodeQuantizedMesh and EncodeGlb (encoders.h) make of the same input. Same errors.
 Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
 Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);  // encoders/glb.cc
 
-// Those of a finished tile of quantized-mesh; kUnavailable: the bytes are none.
+// The triangles of a finished quantized-mesh tile. kUnavailable: the bytes are not such a tile.
 Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key);
 
 }  // namespace terrace::tiler

@@ -12,8 +12,8 @@
 namespace terrace::tiler {
 
 // Unit vectors east, north, up, one for each point, of heights above the ellipsoid. Central differences over the
-// spacing of the finest source, half of it on each side. Where one side has no height, over the other side; where both
-// have none, or the point has none, NaN. Errors: those of ReadPoints.
+// spacing of the finest source, half of it on each side; one-sided if one side has no height. NaN if both sides or the
+// point have none. Errors: those of ReadPoints.
 Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& source,
                                                         std::span<const dem::GeoPosition> points,
                                                         const std::stop_token& stop);

@@ -26,7 +26,7 @@ namespace terrace::tin {
 struct DropOptions {
   double max_error = 0;                  // metres, >= 0: no sample of a new triangle is further off
   const SampleLimits* limits = nullptr;  // with max_error as the run's error; null: none. Forced vertices stay
-  Curvature curvature{};                 // a new triangle's sagitta counts into the error of its samples
+  Curvature curvature{};                 // a new triangle's sagitta is added to the error of its samples
 
   // Quantized positions, 0 to 32767, by column and by row. New triangles must be counter-clockwise in these positions
   // too, because rounding can flip a sliver. Both empty: not tested.

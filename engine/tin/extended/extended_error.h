@@ -17,8 +17,8 @@ struct ExtendedError {
   std::size_t color_samples = 0;  // valid samples with a known colour
 };
 
-// Rasterizes every triangle with exact integer coverage; a sample on an edge counts once. When `stop` is requested,
-// what was measured until then. Safe to call from many threads at once.
+// Rasterizes every triangle with exact integer coverage; a sample on an edge counts once. If `stop` is requested,
+// returns what was measured until then. Safe to call from many threads at once.
 ExtendedError MeasureExtendedError(const ExtendedField& field, const ColoredMesh& mesh, std::stop_token stop = {});
 
 }  // namespace terrace::tin

@@ -5,8 +5,8 @@
 // differ from the surface by dz metres and by dr, dg and db, with colours from 0 to 1. Its error is
 //   (1 - w) |dz| + w (M / 3) (|dr| + |dg| + |db|)  metres,
 // with the weight w of colour, 0 to 1, and the range M of the valid heights: the full range of colours counts as much
-// as the full range of heights. If all heights are equal, the paper's M is 0; here it is 1 then, so that a flat field
-// with w = 1 is an image, with its error as a share of the range of colours.
+// as the full range of heights. If all heights are equal, M is 1 here and 0 in the paper: a flat field with w = 1 is
+// then an image, and its error is a share of the range of colours.
 //
 // Immutable after Make: safe to use from many threads at once.
 #pragma once

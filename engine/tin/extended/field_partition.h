@@ -44,7 +44,7 @@ class FieldPartition {
   std::size_t blocks_along_x() const { return columns_.size() - 1; }
   FieldBlock block(std::size_t i) const;
 
-  // Of the field, in samples.
+  // The field's size in samples.
   int width() const { return columns_.back() + 1; }
   int height() const { return rows_.back() + 1; }
 

@@ -21,9 +21,9 @@ class HeightField {
   static constexpr int kMaxSide = 1 << 15;
 
   // `heights` has width * height values in metres, row by row. It is not copied if it has at least 8 rows and a
-  // capacity for 32 more values per row. NaN and infinities are voids. Voids count in no error, and no vertex takes its
-  // height from one. Refuses fields that are smaller than 2 x 2 or larger than kMaxSide on a side, that have a wrong
-  // number of values, or no valid sample.
+  // capacity for 32 more values per row. NaN and infinities are voids. Voids do not contribute to errors, and no vertex
+  // has the height of a void. Refuses fields that are smaller than 2 x 2 or larger than kMaxSide on a side, that have a
+  // wrong number of values, or no valid sample.
   static Result<HeightField> Make(int width, int height, std::vector<float> heights);
 
   int width() const { return width_; }

@@ -34,7 +34,7 @@ struct Plane {
     per_row = (dx1 * dz2 - dx2 * dz1) / doubled_area;
   }
 
-  // The height in row y at the column of `origin`; the height at column x of the row that `at_row` is from.
+  // The height in row y at the column of `origin`; the height at column x, where `at_row` is AtRow of its row.
   constexpr double AtRow(int y) const { return origin.z + per_row * (y - origin.y); }
   constexpr double At(int x, double at_row) const { return at_row + per_column * (x - origin.x); }
 

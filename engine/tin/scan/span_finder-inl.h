@@ -34,7 +34,7 @@ using Columns = std::array<std::int32_t, kRows + 16>;
 // The exact spans of a triangle. Relative to p, an edge crosses row y at x = n / dy with an integer n = x0 dy + (y -
 // y0) dx, rounded up on the west side, down on the east. In single precision, where extents are at most 2^11, n is at
 // most 2^23 and so exact; the float nearest to a quotient of at most 2^11 is less than 2^-12 from it, and a quotient
-// that is no integer is at least 2^-11 from the next one. In double the same holds of extents up to 2^16. A triangle is
+// that is not an integer is at least 2^-11 from the next. In double the same holds of extents up to 2^16. A triangle is
 // convex: of two lines on one side the nearer one bounds the row, so lines need not end at corners. Beyond its edge a
 // line's quotient may be larger and rounded, but it stays the farther one.
 template <typename Tag>

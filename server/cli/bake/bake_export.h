@@ -12,8 +12,8 @@ namespace terrace::cli {
 // kInvalidArgument: something is there.
 Result<void> CheckExportPlace(const std::string& out);
 
-// Writes the form that the arguments name to their `out`, from a finished bake, and removes the bake. kUnavailable: the
-// place cannot be written. kCancelled: stopped.
+// Converts a finished bake to the form that the arguments name, writes it to their `out`, and removes the bake.
+// kUnavailable: the place cannot be written. kCancelled: stopped.
 Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop);
 
 }  // namespace terrace::cli

@@ -11,10 +11,10 @@
 namespace terrace::cli {
 
 // Adds the dataset's archive, if the configuration names one. An archive that cannot be opened or is of another version
-// is not used; the log says why. `dataset`: complete otherwise.
+// is not used; the log says why. Precondition: all other members of `dataset` are set.
 void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset);
 
-// A dataset without sources: of its archive alone. Errors name the place and the remedy.
+// Makes a dataset without sources, from its archive alone. Errors name the place and the remedy.
 Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted);
 
 // Whether `path` is an archive: a folder with a manifest, or a .pmtiles file.

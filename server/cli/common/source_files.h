@@ -10,14 +10,14 @@
 
 namespace terrace::cli {
 
-// The name of the dataset of a file or folder that the command line names. A folder keeps what looks like an extension.
+// The name of a dataset, from the file or folder on the command line. Folder names keep what looks like an extension.
 std::string DatasetNameOf(const std::string& dem);
 
 std::size_t FileCount(const std::vector<config::SourceConfig>& sources);
 
 // For messages: "alps.tif", "alps.tif and 2 more sources".
 std::string NameOf(const std::vector<config::SourceConfig>& sources);
-// The same of a dataset; without sources its archive.
+// The same for a dataset; if it has no sources, the name of its archive.
 std::string NameOf(const config::DatasetConfig& dataset);
 
 // Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
