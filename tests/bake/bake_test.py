@@ -380,6 +380,7 @@ class Bake(unittest.TestCase):
             done = self.run_bake("--out", place, "--form", form)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertFalse(place.with_name(place.name + ".bake").exists())
+            self.assertEqual("Content-Encoding: gzip" in done.stderr, form == "folder", done.stderr)
             again = self.run_bake("--out", place, "--form", form)
             self.assertEqual(again.returncode, 2)
             self.assertIn("is there already", again.stderr)
@@ -391,6 +392,9 @@ class Bake(unittest.TestCase):
                     for x in range(box["startX"], box["endX"] + 1) for y in range(box["startY"], box["endY"] + 1)}
         self.assertEqual(promised, set(tiles))
         self.assertEqual({(zoom - 1, x, y): tile for (zoom, x, y), tile in tiles_of(single).items()}, tiles)
+        plain = self.run_bake("--out", self.place("plain"), "--form", "folder", "--no-gzip", levels="0-3")
+        self.assertEqual(plain.returncode, 0, plain.stderr)
+        self.assertNotIn("gzip", plain.stderr)
 
     def test_dry_run_counts_the_tiles(self):
         manifest, tiles = archive(self.reference)

@@ -36,12 +36,12 @@ class Install(unittest.TestCase):
     def tearDownClass(cls):
         cls.scratch.cleanup()
 
-    def configure(self, version):
-        source = self.folder / f"embed-{version}"
+    def configure(self, version, program=None):
+        source = self.folder / f"embed-{version}-{'main' if program is None else 'other'}"
         source.mkdir()
         text = (ROOT / "examples/embed/CMakeLists.txt").read_text()
         (source / "CMakeLists.txt").write_text(re.sub(r"find_package\(terrace [\d.]+", f"find_package(terrace {version}", text))
-        (source / "main.cc").write_bytes((ROOT / "examples/embed/main.cc").read_bytes())
+        (source / "main.cc").write_text(program or (ROOT / "examples/embed/main.cc").read_text())
         return source, subprocess.run(["cmake", "-S", source, "-B", source / "build", f"-DCMAKE_PREFIX_PATH={self.prefix}"],
                                       text=True, capture_output=True)
 
@@ -57,6 +57,15 @@ class Install(unittest.TestCase):
             run(program, ROOT / "config/samples/jacksboro.tif", 11, 1089, 1437, 20, tiles[-1])
         self.assertGreater(tiles[0].stat().st_size, 1000)
         self.assertEqual(tiles[0].read_bytes(), tiles[1].read_bytes())
+
+    def test_the_program_of_the_page_prints_heights(self):
+        program = re.search(r"```cpp\n(.*?)```", (ROOT / "docs/embedding.md").read_text(), re.DOTALL)[1]
+        version = re.search(r"project\(terrace VERSION (\d+\.\d+)", (ROOT / "CMakeLists.txt").read_text())[1]
+        source, configured = self.configure(version, program)
+        self.assertEqual(configured.returncode, 0, configured.stdout + configured.stderr)
+        run("cmake", "--build", source / "build")
+        printed = subprocess.run([source / "build/embed", ROOT / "config/samples/jacksboro.tif"], capture_output=True, text=True, check=True)
+        self.assertEqual(printed.stdout.splitlines()[-2:], ["375.00", "nan"])  # after a warning: the datum is not stated
 
     def test_another_minor_version_is_refused(self):
         _, configured = self.configure("1.99")

@@ -242,6 +242,12 @@ int BakeAlone(const PlacedBake& bake) {
         bake.arguments.finish ? "the shards that baked them again" : "the same command again");
     return kExitFailure;
   }
+  if (bake.arguments.form == kFolder && bake.targets.front().manifest.kind.coding == tiler::Coding::kGzip) {
+    std::fputs(
+        "terrace: the tiles are compressed: the host must send them with Content-Encoding: gzip (docs/baking.md, \"A "
+        "static host\"); for one that cannot, as python3 -m http.server, bake with --no-gzip\n",
+        stderr);
+  }
   if (bake.shard.count > 1) {
     std::fprintf(
         stderr,
