@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import axe from 'axe-core';
 
 const kTags = ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'];
-const kLeastContrasts = 5;  // of texts: fewer mean that axe could not see what is behind them
+const kMinContrasts = 5;  // of texts: fewer mean that axe could not see what is behind them
 
 // Checks both themes. The panels are translucent, and axe cannot see a canvas, so the globe gives way to the colour that is
 // worst for their contrast: white behind dark panels, black behind light ones.
@@ -29,6 +29,6 @@ export async function assertAccessible(page, state) {
       };
     }, { theme, behind, tags: kTags });
     assert.deepEqual(violations, [], `${state}, ${theme}: ${JSON.stringify(violations, undefined, 1)}`);
-    assert.ok(contrasts >= kLeastContrasts, `${state}, ${theme}: only ${contrasts} texts have a known contrast`);
+    assert.ok(contrasts >= kMinContrasts, `${state}, ${theme}: only ${contrasts} texts have a known contrast`);
   }
 }
