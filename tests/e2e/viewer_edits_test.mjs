@@ -5,6 +5,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { chromium } from 'playwright-core';
+import { assertAccessible } from './axe.mjs';
 import { json, request, run, samples, serve } from './harness.mjs';
 import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
 
@@ -118,6 +119,7 @@ describe('edits in the viewer', () => {
     await page.locator('#draft-blend').fill('30');
     await page.waitForFunction(() => /Raises the ground by up to .* lowers it/.test(document.getElementById('draft-text').textContent), undefined, kWait);
     assert.ok(await page.evaluate(() => terrace.globe.scene.primitives.contains(terrace.state.draft.surface)));
+    await assertAccessible(page, 'drawing an edit');
     const [download] = await Promise.all([page.waitForEvent('download'), page.locator('#draft-save').click()]);
     assert.equal(download.suggestedFilename(), 'hills-edits.geojson');
     const drawn = path.join(folder, 'drawn.geojson');

@@ -5,6 +5,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { chromium } from 'playwright-core';
+import { assertAccessible } from './axe.mjs';
 import { samples, serve } from './harness.mjs';
 import { lineOfSight, measurePath } from '../../server/viewer/ground_path.js';
 import { fromLocalMeanTime, sunAltitude, sunDirection } from '../../server/viewer/sun.js';
@@ -102,6 +103,7 @@ describe('features of the viewer', () => {
     await page.keyboard.press('End');
     assert.match(await page.locator('#plot').getAttribute('aria-valuetext'), /^8,982 m: [\d,]+ m$/);
     await page.locator('.marker.place').waitFor({ state: 'attached' });
+    await assertAccessible(page, 'a profile');
   });
 
   it('tell what hides a place', async () => {
@@ -114,6 +116,7 @@ describe('features of the viewer', () => {
     await page.waitForFunction(() => /^(Visible|Hidden)/.test(document.getElementById('dock-text').textContent), undefined, kWait);
     await page.locator('#target').fill('9000');
     await page.waitForFunction(() => /^Visible/.test(document.getElementById('dock-text').textContent), undefined, kWait);
+    await assertAccessible(page, 'a line of sight');
     await page.locator('#dock-close').click();
     assert.equal(await page.locator('.overlay .line').count(), 0);
   });
@@ -138,6 +141,7 @@ describe('features of the viewer', () => {
     const state = () => page.evaluate(() => [terrace.state.colouring, terrace.state.sun, terrace.state.right]);
     const before = await state();
     assert.match(page.url(), /colours=slope&sun=\d{4}-06-21T18:30&right=4/);
+    await assertAccessible(page, 'all settings, two errors');
     await page.reload();
     await settled();
     assert.deepEqual(await state(), before);
@@ -146,11 +150,20 @@ describe('features of the viewer', () => {
     await page.locator('#colouring').selectOption('height');
   });
 
+  it('tell the keys', async () => {
+    await page.locator('#help').click();
+    assert.ok(await page.locator('#keys').isVisible());
+    await assertAccessible(page, 'the keys');
+    await page.keyboard.press('Escape');
+    assert.ok(await page.locator('#keys').isHidden());
+  });
+
   it('go on after the server was killed and started again', async () => {
     await page.evaluate(() => (window.sameDocument = true));
     const port = new URL(server.url).port;
     await server.stop('SIGKILL');
     await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
+    await assertAccessible(page, 'a message');
     server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
     await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
     await page.locator('#fraction').focus();
@@ -189,6 +202,7 @@ describe('features of the viewer', () => {
     await flat.locator('#globe').focus();
     await flat.keyboard.press('Enter');
     await flat.waitForFunction(() => / m$/.test(document.getElementById('readout').textContent), undefined, kWait);
+    await assertAccessible(flat, 'the flat map');
     await plain.close();
   });
 });

@@ -6,6 +6,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { chromium } from 'playwright-core';
+import { assertAccessible } from './axe.mjs';
 import { samples, serve } from './harness.mjs';
 
 const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
@@ -68,6 +69,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     for (let i = 0; i < 60 && await shareOfMagenta(page) < 0.3; ++i) await page.waitForTimeout(1000);
     assert.ok(await shareOfMagenta(page) > 0.3, `${await shareOfMagenta(page)}`);
     assert.ok(asked.some((url) => /^\/hills\/imagery\/geodetic\/\d+\/\d+\/\d+\.webp$/.test(url)), asked.join(' '));
+    await assertAccessible(page, 'layers');
     await page.locator('#imagery').uncheck();
     await settled();
     for (let i = 0; i < 60 && await shareOfMagenta(page) > 0; ++i) await page.waitForTimeout(500);

@@ -6,6 +6,7 @@ import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { chromium } from 'playwright-core';
+import { assertAccessible } from './axe.mjs';
 import { samples, serve } from './harness.mjs';
 
 const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
@@ -208,6 +209,10 @@ describe('the viewer', () => {
     const panel = await phone.locator('#panel').boundingBox();
     const inside = panel.x >= 0 && panel.x + panel.width <= 360 && panel.y >= 0 && panel.y + panel.height <= 640;
     assert.ok(inside, JSON.stringify(panel));
+    await assertAccessible(phone, 'the panel on a phone');
+    await phone.locator('#tool-distance').click();
+    await phone.locator('#dock').waitFor();
+    await assertAccessible(phone, 'measuring on a phone');
     assert.deepEqual(phone.wrongs, []);
     await phone.close();
   });
@@ -307,6 +312,7 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     assert.match(await page.locator('#token-reason').innerText(), /hills needs a token/);
     assert.ok(await page.locator('#token-cancel').isVisible(), 'there is something to see without');
     assert.match(page.url(), /#dataset=hills$/, 'a reload asks again');
+    await assertAccessible(page, 'asking for a token');
 
     await page.locator('#token').fill('another-token-of-the-kind');
     await page.keyboard.press('Enter');

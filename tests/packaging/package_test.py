@@ -5,10 +5,12 @@
 """
 import gzip
 import json
+import os
 import pathlib
 import re
 import subprocess
 import sys
+import tarfile
 import tempfile
 import unittest
 
@@ -89,6 +91,13 @@ class Package(unittest.TestCase):
         self.assertEqual(len(refs), len(set(refs)))
         named = {ref for entry in document["dependencies"] for ref in [entry["ref"], *entry["dependsOn"]]}
         self.assertEqual(named - set(refs), set())
+
+    def test_all_files_have_the_time_of_the_commit(self):
+        with subprocess.Popen(["dpkg-deb", "--fsys-tarfile", self.deb], stdout=subprocess.PIPE) as unpack:
+            with tarfile.open(fileobj=unpack.stdout, mode="r|") as archive:
+                times = {member.mtime for member in archive}
+        commit = os.environ.get("SOURCE_DATE_EPOCH") or run("git", "-C", ROOT, "log", "-1", "--format=%ct")
+        self.assertEqual(times, {int(commit)})
 
     def test_the_viewer_is_found_beside_the_program(self):
         printed = json.loads(run(self.terrace, "serve", self.root / "usr/share/terrace/samples/jacksboro.tif", "--print-config"))
