@@ -68,6 +68,11 @@ class Preparer {
   Result<PreparedRaster> Run() {
     if (!cache_file_.empty()) {
       if (Load()) return std::move(prepared_);
+    }
+    if (options_.only_kept) {
+      return MakeError(ErrorCode::kCancelled, "{}: its statistics are not in the cache", path_);
+    }
+    if (!cache_file_.empty()) {
       if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
       if (!writer_ && Load()) return std::move(prepared_);
     }
@@ -138,6 +143,7 @@ class Preparer {
       if (done > 0)
         LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
     }
+    if (options_.progress && done > 0) options_.progress(static_cast<double>(done) / chunks_.count());
     averages_are_whole_ = done == 0;
     for (; done < chunks_.count(); ++done) {
       const auto part =
