@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "engine/dem/common/parallel_for.h"
@@ -94,13 +95,25 @@ LeftOutFiles LeaveOutOthers(std::vector<DemFile>& files) {
 // 90 KB.
 constexpr std::size_t kKeptTables = std::size_t{192} << 20, kPagedTables = std::size_t{64} << 20;
 
+// Files are opened on as many threads as there are cores. A few large files leave cores to their statistics. The limit
+// is one of memory: each thread holds the samples of a chunk, their sums and their averages.
+unsigned ThreadsOfEach(std::size_t files) {
+  constexpr std::size_t kMaxThreads = 8;
+  return static_cast<unsigned>(std::clamp<std::size_t>(std::thread::hardware_concurrency() / files, 1, kMaxThreads));
+}
+
 // Opens files from several threads.
 class Opening {
  public:
   using Opened = Result<std::unique_ptr<RasterSource>>;
 
   Opening(const std::vector<DemFile>& files, const DemOptions& options, bool only_kept)
-      : files_(files), options_(options), only_kept_(only_kept), shares_(files.size()), opened_(files.size()) {}
+      : files_(files),
+        options_(options),
+        only_kept_(only_kept),
+        threads_(only_kept ? 0 : ThreadsOfEach(files.size())),
+        shares_(files.size()),
+        opened_(files.size()) {}
 
   // Returns false after a fatal error. Files before this one are still opened, because the error of the first file
   // counts.
@@ -113,7 +126,7 @@ class Opening {
       running_.emplace(i, stop);
     }
     Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache,
-                                       ProgressOf(i), stop.get_token(), pages_, only_kept_);
+                                       ProgressOf(i), stop.get_token(), pages_, threads_);
     if (options_.progress) AddProgress(i, 1);
     const bool goes_on = opened || IsNothing(i, opened) || LacksStatistics(opened) ||
                          (options_.fault && !options_.stop.stop_requested());
@@ -154,6 +167,7 @@ class Opening {
   const std::vector<DemFile>& files_;
   const DemOptions& options_;
   const bool only_kept_;
+  const unsigned threads_;  // of each file
   const std::shared_ptr<StatisticsPages> pages_ = std::make_shared<StatisticsPages>(kKeptTables, kPagedTables);
   SourceLog log_;
   std::mutex mutex_;
