@@ -1,5 +1,6 @@
 #include "server/application.h"
 
+#include <algorithm>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/this_coro.hpp>
 #include <boost/asio/use_awaitable.hpp>
@@ -66,6 +67,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     const RouteRow& row = *context_.route.row;
     if (application_.opening() && !row.needs_no_catalog) return AfterOpening();
     HandlersPtr handlers = application_.Current();
+    if (std::optional<Response> pending = RefusePending(*handlers)) return *std::move(pending);
     Answer answer = row.handle(*handlers, context_);
     auto* response = std::get_if<Response>(&answer);
     if (response == nullptr) return Finish(std::move(handlers), std::get<asio::awaitable<Response>>(std::move(answer)));
@@ -95,6 +97,19 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     refusal = application_.parts_.frontend.admission_control.Refuse(context_);
     if (refusal) refusal->labels.route = context_.route.row->label;
     return refusal;
+  }
+
+  // A dataset that is not open yet.
+  std::optional<Response> RefusePending(const Handlers& handlers) const {
+    const std::vector<std::string>& names = handlers.catalog->pending;
+    if (std::ranges::find(names, context_.route.dataset) == names.end()) return std::nullopt;
+    for (const PendingDataset& pending : application_.PendingOf(*handlers.catalog)) {
+      if (pending.name != context_.route.dataset) continue;
+      Response response = PendingResponse(pending, context_.request->id);
+      response.labels.route = context_.route.row->label;
+      return response;
+    }
+    return std::nullopt;
   }
 
   asio::awaitable<Response> AfterOpening();
@@ -193,6 +208,19 @@ std::map<std::string, std::string> TerrainApplication::problems() const {
   std::map<std::string, std::string> all = problems_;
   if (!cache.empty()) all.emplace(kCacheTrouble, cache);
   return all;
+}
+
+// Never 100 %: after the last block other work follows.
+std::vector<PendingDataset> TerrainApplication::PendingOf(const Catalog& catalog) const {
+  if (catalog.pending.empty()) return {};
+  constexpr int kMaxPercent = 99;
+  const std::map<std::string, std::string> troubles = problems();
+  std::vector<PendingDataset> pending;
+  for (const std::string& name : catalog.pending) {
+    const double share = parts_.share_done ? parts_.share_done(name) : 0;
+    pending.push_back({name, std::clamp(static_cast<int>(100 * share), 0, kMaxPercent), troubles.contains(name)});
+  }
+  return pending;
 }
 
 std::uint64_t TerrainApplication::replaced() const {

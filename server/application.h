@@ -36,7 +36,8 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_problem;  // the problem kCacheTrouble; "": there is none; may be empty
+  std::function<std::string()> cache_problem;            // the problem kCacheTrouble; "": there is none; may be empty
+  std::function<double(const std::string&)> share_done;  // of a pending dataset; may be empty
 };
 
 class TerrainApplication final : public Application, public ProcessState {
@@ -58,6 +59,7 @@ class TerrainApplication final : public Application, public ProcessState {
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
   std::map<std::string, std::string> problems() const override;
+  std::vector<PendingDataset> PendingOf(const Catalog& catalog) const override;
   std::uint64_t replaced() const;  // how often a catalog has replaced another
 
  private:

@@ -76,7 +76,7 @@ class RunningServer final : public Server {
         metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
         application_({*frontend_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
-                      options_.cache_problem},
+                      options_.cache_problem, options_.share_done},
                      std::move(catalog), options_.config),
         admin_({tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
                 [this] { return application_.catalog(); }, application_.deadline()}),
@@ -210,7 +210,8 @@ class RunningServer final : public Server {
 
   // No balancer uses a server that was never ready.
   std::chrono::milliseconds DrainDelay() const {
-    return application_.opening() ? std::chrono::milliseconds(0) : options_.config.drain_delay;
+    const bool was_ready = !application_.opening() && !application_.catalog()->datasets.empty();
+    return was_ready ? options_.config.drain_delay : std::chrono::milliseconds(0);
   }
 
   std::chrono::milliseconds DrainGrace() const { return std::min(options_.drain_grace, options_.config.drain_timeout); }
@@ -259,7 +260,9 @@ class RunningServer final : public Server {
     state.refused_connections = frontend_->connections.refused();
     state.transfers = frontend_->transfers.stats();
     state.catalog = application_.catalog();
+    const auto pending = application_.PendingOf(*state.catalog);
     state.problems = application_.problems().size();
+    state.problems += static_cast<std::size_t>(std::ranges::count(pending, false, &PendingDataset::has_failed));
     state.catalogs = application_.replaced();
     return state;
   }

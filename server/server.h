@@ -29,7 +29,9 @@ struct ServerOptions {
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};
   std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
   std::function<std::string()> cache_problem = {};                // why cache_dir is not used; "": it is; thread-safe
-  std::chrono::milliseconds metrics_age{1'000};                   // how long a text of /metrics is reused
+  // The share done of the pending datasets of a catalog, 0 .. 1; thread-safe; empty: unknown.
+  std::function<double(const std::string& dataset)> share_done = {};
+  std::chrono::milliseconds metrics_age{1'000};  // how long a text of /metrics is reused
   // How long new requests are still served after a stop and drain_delay; part of drain_timeout.
   std::chrono::milliseconds drain_grace{500};
   bool stop_on_signals = false;  // SIGINT and SIGTERM act like RequestStop; the second ends the process with status 1
@@ -57,7 +59,8 @@ class Server {
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.
-  // kInvalidArgument: as above; nothing changes. May be called on any thread, but not concurrently.
+  // Datasets that are pending answer 503. kInvalidArgument: as above; nothing changes. May be called on any thread, but
+  // not concurrently.
   virtual Result<void> Replace(CatalogPtr catalog, const config::Config& config) = 0;
 
   // Requests a stop and waits for it.

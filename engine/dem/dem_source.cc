@@ -223,11 +223,20 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, cons
 }
 
 Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, const DemOptions& options) {
+  return OpenAs(std::move(files), options, /*only_kept=*/false);
+}
+
+Result<std::unique_ptr<DemSource>> DemSource::OpenKept(std::vector<DemFile> files, const DemOptions& options) {
+  return OpenAs(std::move(files), options, /*only_kept=*/true);
+}
+
+Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files, const DemOptions& options,
+                                                     bool only_kept) {
   TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   std::vector<std::string> left_out;
-  const auto rasters = OpenRasters(files, options, left_out);
+  const auto rasters = OpenRasters(files, options, left_out, only_kept);
   if (!rasters) return tl::unexpected(rasters.error());
   auto grids = GridsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
   if (!grids) return tl::unexpected(grids.error());

@@ -28,6 +28,9 @@ class DemSource {
   // Opens and checks rasters, and reads each once for its statistics. Errors name the file, the fault and the remedy.
   static Result<std::unique_ptr<DemSource>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
+  // Open from the statistics that the cache has, without reading a raster. kCancelled: it lacks some, or it was
+  // stopped; all files were checked then, if it was not stopped.
+  static Result<std::unique_ptr<DemSource>> OpenKept(std::vector<DemFile> files, const DemOptions& options);
   ~DemSource();
 
   const DemInfo& info() const;
@@ -135,6 +138,8 @@ class DemSource {
  private:
   class Impl;
   explicit DemSource(std::unique_ptr<Impl> impl);
+  static Result<std::unique_ptr<DemSource>> OpenAs(std::vector<DemFile> files, const DemOptions& options,
+                                                   bool only_kept);
   std::unique_ptr<Impl> impl_;
 };
 

@@ -10,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "engine/common/parallel_for.h"
@@ -60,39 +61,59 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
               names.size() > kMaxNamed ? fmt::format(" and {} more", names.size() - kMaxNamed) : "");
 }
 
-// Removes files of folders that are no rasters. Returns those that look like rasters, with reasons.
-std::vector<std::string> LeaveOutOthers(std::vector<DemFile>& files) {
+// Files of folders that are no rasters, with reasons.
+struct LeftOutFiles {
+  std::vector<std::string> missed, others;  // look like rasters; do not
+
+  void Tell() const {
+    TellLeftOut(spdlog::level::warn, missed);
+    TellLeftOut(spdlog::level::debug, others);
+  }
+};
+
+// Removes them from `files`.
+LeftOutFiles LeaveOutOthers(std::vector<DemFile>& files) {
   std::vector<std::optional<LeftOut>> verdicts(files.size());
   ParallelFor(files.size(), [&](std::size_t i) {
     verdicts[i] = LeftOutOf(files[i]);
     return true;
   });
-  std::vector<std::string> missed, others;
+  LeftOutFiles left_out;
   std::vector<DemFile> kept;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (verdicts[i]) {
-      (verdicts[i]->looks_like_raster ? missed : others).push_back(std::move(verdicts[i]->text));
+      (verdicts[i]->looks_like_raster ? left_out.missed : left_out.others).push_back(std::move(verdicts[i]->text));
     } else {
       kept.push_back(std::move(files[i]));
     }
   }
   files = std::move(kept);
-  TellLeftOut(spdlog::level::warn, missed);
-  TellLeftOut(spdlog::level::debug, others);
-  return missed;
+  return left_out;
 }
 
 // Limits, in bytes, of a dataset's statistics: kept in memory, and paged. A raster of 3600 x 3600 samples takes 70 to
 // 90 KB.
 constexpr std::size_t kKeptTables = std::size_t{192} << 20, kPagedTables = std::size_t{64} << 20;
 
+// Files are opened on as many threads as there are cores. A few large files leave cores to their statistics. The limit
+// is one of memory: each thread holds the samples of a chunk, their sums and their averages.
+unsigned ThreadsOfEach(std::size_t files) {
+  constexpr std::size_t kMaxThreads = 8;
+  return static_cast<unsigned>(std::clamp<std::size_t>(std::thread::hardware_concurrency() / files, 1, kMaxThreads));
+}
+
 // Opens files from several threads.
 class Opening {
  public:
   using Opened = Result<std::unique_ptr<RasterSource>>;
 
-  Opening(const std::vector<DemFile>& files, const DemOptions& options)
-      : files_(files), options_(options), shares_(files.size()), opened_(files.size()) {}
+  Opening(const std::vector<DemFile>& files, const DemOptions& options, bool only_kept)
+      : files_(files),
+        options_(options),
+        only_kept_(only_kept),
+        threads_(only_kept ? 0 : ThreadsOfEach(files.size())),
+        shares_(files.size()),
+        opened_(files.size()) {}
 
   // Returns false after a fatal error. Files before this one are still opened, because the error of the first file
   // counts.
@@ -105,9 +126,10 @@ class Opening {
       running_.emplace(i, stop);
     }
     Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache,
-                                       ProgressOf(i), stop.get_token(), pages_);
+                                       ProgressOf(i), stop.get_token(), pages_, threads_);
     if (options_.progress) AddProgress(i, 1);
-    const bool goes_on = opened || IsNothing(i, opened) || (options_.fault && !options_.stop.stop_requested());
+    const bool goes_on = opened || IsNothing(i, opened) || LacksStatistics(opened) ||
+                         (options_.fault && !options_.stop.stop_requested());
     const std::lock_guard lock(mutex_);
     running_.erase(i);
     if (!goes_on) {
@@ -120,6 +142,10 @@ class Opening {
   // Datasets that are split into files may have files without a height.
   bool IsNothing(std::size_t i, const Opened& opened) const {
     return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].skip_if_no_raster;
+  }
+
+  bool LacksStatistics(const Opened& opened) const {
+    return only_kept_ && !options_.stop.stop_requested() && !opened && opened.error().code == ErrorCode::kCancelled;
   }
 
   // Nothing: not begun.
@@ -140,6 +166,8 @@ class Opening {
 
   const std::vector<DemFile>& files_;
   const DemOptions& options_;
+  const bool only_kept_;
+  const unsigned threads_;  // of each file
   const std::shared_ptr<StatisticsPages> pages_ = std::make_shared<StatisticsPages>(kKeptTables, kPagedTables);
   SourceLog log_;
   std::mutex mutex_;
@@ -151,20 +179,24 @@ class Opening {
 
 }  // namespace
 
-Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& options,
-                            std::vector<std::string>& left_out) {
+Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out,
+                            bool only_kept) {
   const std::string folder = EscapeControls(std::filesystem::path(files.front().path).parent_path().string());
-  left_out = LeaveOutOthers(files);
+  LeftOutFiles others = LeaveOutOthers(files);
+  // If statistics are missing, the files are opened once more, and told then.
+  if (!only_kept) others.Tell();
   if (files.empty()) {
+    if (only_kept) others.Tell();
     return MakeError(ErrorCode::kNotFound,
                      "{}: none of the files in this folder is a raster; name a folder of rasters or a raster", folder);
   }
-  Opening opening(files, options);
+  Opening opening(files, options, only_kept);
   ParallelFor(files.size(), [&opening](std::size_t i) { return opening.Open(i); });
   Rasters rasters;
   std::vector<DemFile> kept;
   std::vector<std::string> without_height;
-  std::optional<Error> fault;  // the first
+  std::optional<Error> fault;    // the first
+  std::optional<Error> lacking;  // the first file without statistics
   for (std::size_t i = 0; i < files.size() && opening.opened()[i]; ++i) {
     Opening::Opened& opened = *opening.opened()[i];
     const bool is_last = kept.empty() && i + 1 == files.size();
@@ -174,14 +206,20 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     }
     if (opened) {
       rasters.push_back(*std::move(opened));
+    } else if (opening.LacksStatistics(opened)) {
+      if (!lacking) lacking = opened.error();
     } else {
+      if (only_kept) others.Tell();
       if (!options.fault || options.stop.stop_requested()) return tl::unexpected(opened.error());
       options.fault(opened.error());
       if (!fault) fault = opened.error();
     }
     kept.push_back(std::move(files[i]));
   }
+  if (lacking) return tl::unexpected(*std::move(lacking));
+  if (only_kept) others.Tell();
   TellLeftOut(spdlog::level::warn, without_height);
+  left_out = std::move(others.missed);
   left_out.insert(left_out.end(), without_height.begin(), without_height.end());
   if (fault) return tl::unexpected(*std::move(fault));
   files = std::move(kept);

@@ -3,8 +3,11 @@
 #include <fmt/format.h>
 #include <xxhash.h>
 
+#include <deque>
 #include <filesystem>
+#include <future>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 
@@ -68,6 +71,11 @@ class Preparer {
   Result<PreparedRaster> Run() {
     if (!cache_file_.empty()) {
       if (Load()) return std::move(prepared_);
+    }
+    if (options_.threads == 0) {
+      return MakeError(ErrorCode::kCancelled, "{}: its statistics are not in the cache", path_);
+    }
+    if (!cache_file_.empty()) {
       if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
       if (!writer_ && Load()) return std::move(prepared_);
     }
@@ -138,10 +146,23 @@ class Preparer {
       if (done > 0)
         LogSource(SourceLog::Level::kInfo, path_, "{} of {} parts were prepared before", done, chunks_.count());
     }
+    if (options_.progress && done > 0) options_.progress(static_cast<double>(done) / chunks_.count());
     averages_are_whole_ = done == 0;
-    for (; done < chunks_.count(); ++done) {
-      const auto part =
-          ReadChunkStatistics(dataset_, layout, chunks_.At(done), prepared_.preparation.chunks_read, options_.stop);
+    // One thread at a time reads samples, because the dataset cannot be shared. Computing takes most of the time.
+    const std::size_t threads = NeedsSamplesAlone(layout) ? options_.threads : 1;
+    // Without a thread to be had, this one computes.
+    const std::launch where = threads > 1 ? std::launch::async | std::launch::deferred : std::launch::deferred;
+    std::mutex turn;
+    std::deque<std::future<Result<ChunkStatistics>>> ahead;  // in order; each waits when it is destroyed
+    for (int next = done; done < chunks_.count(); ++done) {
+      for (; next < chunks_.count() && ahead.size() < threads; ++next) {
+        ahead.push_back(std::async(where, [this, &layout, &turn, next] {
+          return ReadChunkStatistics(dataset_, layout, chunks_.At(next), prepared_.preparation.chunks_read,
+                                     options_.stop, &turn);
+        }));
+      }
+      const Result<ChunkStatistics> part = ahead.front().get();
+      ahead.pop_front();
       if (!part) return tl::unexpected(part.error());
       assembler.Add(chunks_.At(done), *part);
       if (averages_) averages_->Add(chunks_.At(done), *part);

@@ -190,7 +190,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          const RasterCache& cache,
                                                          const std::function<void(double)>& progress,
                                                          const std::stop_token& stop,
-                                                         std::shared_ptr<StatisticsPages> pages) {
+                                                         std::shared_ptr<StatisticsPages> pages, unsigned threads) {
   const auto start = std::chrono::steady_clock::now();
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
   ForgetRemote(path);
@@ -224,7 +224,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
   source->layout_.rules.extra_nodata = options.nodata;
   std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
-  const PrepareOptions prepare{cache, options.find_voids, progress, stop};
+  const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
   auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
   if (prepared && !prepared->detected.any()) {
     const std::string why = DropMisleadingOverviews(**dataset, prepared->statistics, source->layout_);

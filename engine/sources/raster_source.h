@@ -69,12 +69,14 @@ class RasterSource {
  public:
   // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
   // Statistics are stored in `cache`, or loaded from it. `pages`: limits the memory of the statistics of this and other
-  // rasters; null: no limit. kCancelled: stopped.
+  // rasters; null: no limit. `threads`: that compute statistics. kCancelled: stopped; or without threads, the cache
+  // lacks the statistics: all other checks have passed then.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const RasterCache& cache = {},
                                                     const std::function<void(double)>& progress = {},
                                                     const std::stop_token& stop = {},
-                                                    std::shared_ptr<StatisticsPages> pages = nullptr);
+                                                    std::shared_ptr<StatisticsPages> pages = nullptr,
+                                                    unsigned threads = 1);
   ~RasterSource();
 
   const RasterInfo& info() const { return info_; }

@@ -335,8 +335,12 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
          static_cast<std::size_t>(DivideUp(chunk.rows, factor));
 }
 
+bool NeedsSamplesAlone(const RasterLayout& layout) { return layout.overview_factors.empty() && !layout.wraps; }
+
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                            std::int64_t& read, const std::stop_token& stop) {
+                                            std::int64_t& read, const std::stop_token& stop, std::mutex* turn) {
+  std::unique_lock<std::mutex> lock;
+  if (turn != nullptr) lock = std::unique_lock(*turn);
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   ChunkStatistics statistics = VoidStatistics(chunk, layout);
   if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);
@@ -348,6 +352,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
       !done) {
     return tl::unexpected(done.error());
   }
+  if (lock) lock.unlock();
   for (BlockRange& range : statistics.ranges) range = {};
   CountSamples(samples, chunk, layout, statistics);
   if (statistics.is_void()) return VoidOrOverviews(dataset, layout, chunk, stop);

@@ -7,6 +7,7 @@
 #include <gdal_priv.h>
 
 #include <cstdint>
+#include <mutex>
 #include <stop_token>
 #include <vector>
 
@@ -75,9 +76,15 @@ ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 // Number of averages of a factor in a chunk that is not void; 0 if an overview has them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
-// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading.
-// kUnavailable: the raster cannot be read. kCancelled: stopped.
+// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading. `turn`:
+// locked while the samples are read, so that several threads may share the dataset and `read`; null: one thread uses
+// them. kUnavailable: the raster cannot be read. kCancelled: stopped.
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                            std::int64_t& read, const std::stop_token& stop = {});
+                                            std::int64_t& read, const std::stop_token& stop = {},
+                                            std::mutex* turn = nullptr);
+
+// Whether statistics need the dataset only for their samples. Otherwise threads must not share it: overviews, and the
+// averages beyond the antimeridian, are read in between.
+bool NeedsSamplesAlone(const RasterLayout& layout);
 
 }  // namespace terrace::dem

@@ -34,6 +34,13 @@ namespace terrace::server {
 // The key of the statistics cache's folder among the problems. No dataset has such a name.
 inline constexpr const char* kCacheTrouble = "/cache_dir";
 
+// A dataset that is configured and not open yet.
+struct PendingDataset {
+  std::string name;
+  int percent = 0;          // of its sources that are read
+  bool has_failed = false;  // it cannot be opened as it is now
+};
+
 // The current state of the process. Thread-safe.
 class ProcessState {
  public:
@@ -42,6 +49,8 @@ class ProcessState {
   virtual bool opening() const = 0;  // the first catalog has not been opened yet
   // Problems by dataset; "" is the configuration, kCacheTrouble the cache folder.
   virtual std::map<std::string, std::string> problems() const = 0;
+  // The pending datasets of a catalog, in its order.
+  virtual std::vector<PendingDataset> PendingOf(const Catalog& catalog) const = 0;
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
 };
 
@@ -175,16 +184,20 @@ using IsSeen = std::function<bool(const DatasetView&)>;
 // {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
 //   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","grid","sight",
 //   "mesh","edits","hillshade","slope","contours","imagery","imagery_geodetic"},"imagery":{"attribution","bounds","max_level",
-//   "geodetic_max_level"}}],"more_with_token":true}
+//   "geodetic_max_level"}}],"preparing":[{"name","percent","failed":true}],"more_with_token":true}
 // Degrees, west > east across the antimeridian; metres; URLs are absolute paths on this server. `more_with_token` is
 // present for every client that may not see all datasets, whether or not there are more, so that it reveals nothing.
+// `preparing` lists `pending`, which are those that the client may see; it is absent if there are none.
 // Returns an empty string if a stop was requested; so does IndexHtml.
 std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen = {},
-                         const std::stop_token& stop = {});
+                         const std::stop_token& stop = {}, std::span<const PendingDataset> pending = {});
 
 // The page at `/` if no viewer is installed.
 std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen = {},
-                      const std::stop_token& stop = {});
+                      const std::stop_token& stop = {}, std::span<const PendingDataset> pending = {});
+
+// 503 for a URL of a pending dataset: what is being done, and how far.
+Response PendingResponse(const PendingDataset& dataset, std::string_view request_id);
 
 // A reply about the state of the server. `content_type`: a literal.
 Response StateResponse(int status, std::string_view content_type, Body text);

@@ -20,6 +20,8 @@ Response StateResponse(int status, std::string_view content_type, Body text) {
 
 namespace {
 
+constexpr const char* kPendingRetryAfter = "5";
+
 Response PlainState(int status, std::string text) {
   return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
 }
@@ -36,8 +38,19 @@ Answer AnswerLive(const Handlers&, const RequestContext& context) {
   return none ? PlainState(200, "ok\n") : ClientErrorResponse(none.error(), context.request->id);
 }
 
-// The first word is the state. A degraded server still answers, so it should stay in service. Reasons contain file
-// names and go only to the log. Datasets are named only to clients that may see all of them.
+Response PendingResponse(const PendingDataset& dataset, std::string_view request_id) {
+  Response response = ProblemResponse(
+      503,
+      dataset.has_failed ? "this dataset is not served yet: its source cannot be opened as it is now"
+                         : fmt::format("this dataset is being prepared: {} % of its sources is read", dataset.percent),
+      request_id);
+  response.headers.emplace_back("Retry-After", kPendingRetryAfter);
+  return response;
+}
+
+// The first word is the state. Without a dataset there is nothing to answer from. A degraded server still answers, so
+// it should stay in service. Reasons contain file names and go only to the log. Datasets are named only to clients that
+// may see all of them.
 Answer AnswerReady(const Handlers& from, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
@@ -48,7 +61,9 @@ Answer AnswerReady(const Handlers& from, const RequestContext& context) {
     return response;
   }
   const std::map<std::string, std::string> problems = from.process.problems();
-  std::string text = problems.empty() ? "ready\n" : "degraded\n";
+  const std::vector<PendingDataset> pending = from.process.PendingOf(*from.catalog);
+  const bool is_opening = from.catalog->datasets.empty() && !pending.empty();
+  std::string text = is_opening ? "opening\n" : problems.empty() && pending.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : problems) {
     if (dataset == kCacheTrouble) {
       // It names no file.
@@ -60,7 +75,14 @@ Answer AnswerReady(const Handlers& from, const RequestContext& context) {
           fmt::format("dataset{}: its source cannot be opened as it is now\n", context.sees_all() ? " " + dataset : "");
     }
   }
-  return PlainState(200, std::move(text));
+  for (const PendingDataset& dataset : pending) {
+    if (dataset.has_failed) continue;  // above
+    text +=
+        fmt::format("dataset{}: being prepared, {} %\n", context.sees_all() ? " " + dataset.name : "", dataset.percent);
+  }
+  Response response = PlainState(is_opening ? 503 : 200, std::move(text));
+  if (is_opening) response.headers.emplace_back("Retry-After", kPendingRetryAfter);
+  return response;
 }
 
 Answer AnswerMetrics(const Handlers& from, const RequestContext& context) {

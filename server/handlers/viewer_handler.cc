@@ -35,26 +35,40 @@ std::string EscapeHtml(std::string_view text) {
   return escaped;
 }
 
-using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&);
+using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&,
+                                      std::span<const PendingDataset>);
 
-// A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets.
-DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const RequestContext& context, WriteDatasets write) {
+// The pending datasets that the client may see.
+std::vector<PendingDataset> PendingOfSeen(const Handlers& from, const RequestContext& context) {
+  std::vector<PendingDataset> pending = from.process.PendingOf(*from.catalog);
+  std::erase_if(pending,
+                [&](const PendingDataset& one) { return !context.sees_all() && !context.grant->Sees(one.name); });
+  return pending;
+}
+
+// A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets. `pending`: what
+// PendingOfSeen returns.
+DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const RequestContext& context, WriteDatasets write,
+                        std::vector<PendingDataset> pending) {
   DocumentPlan plan;
   // Each token has one Grant as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(context.grant.get()));
+  for (const PendingDataset& one : pending) plan.key += fmt::format(" {}:{}:{}", one.name, one.percent, one.has_failed);
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
-  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), grant = context.grant,
-                write](const std::stop_token& stop) {
-    return write(
-        datasets, [&](const DatasetView& view) { return grant->Sees(view.name); }, stop);
+  const GrantPtr limited = context.sees_all() ? nullptr : context.grant;
+  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), limited, write,
+                pending = std::move(pending)](const std::stop_token& stop) {
+    const auto is_seen = limited ? IsSeen([&](const DatasetView& view) { return limited->Sees(view.name); }) : IsSeen();
+    return write(datasets, is_seen, stop, pending);
   };
   return plan;
 }
 
 }  // namespace
 
-std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
+std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop,
+                         std::span<const PendingDataset> pending) {
   using Json = nlohmann::ordered_json;
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
@@ -101,12 +115,18 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   }
   Json document;
   document["datasets"] = std::move(list);
+  for (const PendingDataset& one : pending) {
+    Json entry{{"name", one.name}, {"percent", one.percent}};
+    if (one.has_failed) entry["failed"] = true;
+    document["preparing"].push_back(std::move(entry));
+  }
   if (is_seen) document["more_with_token"] = true;
   // Attributions are the operator's text: invalid UTF-8 must not make the whole list fail.
   return document.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop) {
+std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop,
+                      std::span<const PendingDataset> pending) {
   std::string items;
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
@@ -116,32 +136,38 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
                    "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",
                    PercentEncode(dataset.name), EscapeHtml(dataset.name));
   }
+  for (const PendingDataset& one : pending) {
+    fmt::format_to(std::back_inserter(items), "<li>{}: {}</li>\n", EscapeHtml(one.name),
+                   one.has_failed ? "cannot be opened as it is now" : fmt::format("being prepared, {} %", one.percent));
+  }
   return fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title></head>\n"
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>terrace</title>{}</head>\n"
       "<body><h1>terrace</h1>\n<p>Terrain as quantized-mesh, 3D Tiles and raster-dem. Datasets "
       "(<a href=\"/datasets\">as JSON</a>):</p>\n<ul>\n{}</ul>\n</body></html>\n",
-      items);
+      pending.empty() ? "" : "<meta http-equiv=\"refresh\" content=\"5\">", items);
 }
 
 DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  if (context.sees_all()) return Serve(from.list, *context.request, kRevalidate);
-  return PlanOfSeen(from, from.list, context, DatasetsJson);
+  std::vector<PendingDataset> pending = PendingOfSeen(from, context);
+  if (context.sees_all() && pending.empty()) return Serve(from.list, *context.request, kRevalidate);
+  return PlanOfSeen(from, from.list, context, DatasetsJson, std::move(pending));
 }
 
 // Pages keep their state in the query, so any query is allowed.
 DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& context) {
   if (const Document* file = from.viewer->Find(context.route.file)) return Serve(*file, *context.request, kRevalidate);
   if (from.viewer->empty() && context.route.file == "index.html") {
-    if (context.sees_all()) {
+    std::vector<PendingDataset> pending = PendingOfSeen(from, context);
+    if (context.sees_all() && pending.empty()) {
       Response index = Serve(from.index, *context.request, kRevalidate);
       index.depends_on_token = context.grant != nullptr;
       return index;
     }
-    DocumentPlan index = PlanOfSeen(from, from.index, context, IndexHtml);
-    index.depends_on_token = true;
+    DocumentPlan index = PlanOfSeen(from, from.index, context, IndexHtml, std::move(pending));
+    index.depends_on_token = context.grant != nullptr;
     return index;
   }
   return ProblemResponse(404, "no such URL; /datasets lists those of each dataset", context.request->id);

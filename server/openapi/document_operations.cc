@@ -42,13 +42,16 @@ constexpr ExampleRequest kViewerFileExamples[] = {{"/viewer/style.css"}, {"/view
 
 }  // namespace
 
-const Operation kDatasetsOperation{.id = "getDatasets",
-                                   .tag = "documents",
-                                   .summary = "All datasets that the client may see",
-                                   .description = "Name, version, bounds, levels and URLs of each dataset.",
-                                   .replies = kDatasetsReplies,
-                                   .headers = kDocumentHeaders,
-                                   .examples = kDatasetsExamples};
+const Operation kDatasetsOperation{
+    .id = "getDatasets",
+    .tag = "documents",
+    .summary = "All datasets that the client may see",
+    .description =
+        "Name, version, bounds, levels and URLs of each dataset. While the server prepares "
+        "others, `preparing` says how far; their URLs answer 503.",
+    .replies = kDatasetsReplies,
+    .headers = kDocumentHeaders,
+    .examples = kDatasetsExamples};
 
 const Operation kLayerOperation{.id = "getLayer",
                                 .tag = "documents",

@@ -15,6 +15,11 @@ constexpr NamedSchema kSchemas[] = {
     {"DatasetVersion", R"({"type":"string","pattern":"^[0-9a-f]{12}$"})"},
     {"Datasets", R"({"type":"object","required":["datasets"],"additionalProperties":false,"properties":{
        "more_with_token":{"const":true,"description":"A token may show others"},
+       "preparing":{"type":"array","minItems":1,"description":"Datasets that are configured and not served yet",
+         "items":{"type":"object","required":["name","percent"],"additionalProperties":false,"properties":{
+           "name":{"type":"string"},
+           "percent":{"type":"integer","minimum":0,"maximum":99,"description":"Share of the sources that is read"},
+           "failed":{"const":true,"description":"The sources cannot be opened as they are now"}}}},
        "datasets":{"type":"array","items":{"type":"object",
          "required":["name","version","attribution","bounds","finest_bounds","sources","min_level","max_level","heights","urls"],
          "additionalProperties":false,

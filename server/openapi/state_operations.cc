@@ -27,8 +27,10 @@ const Operation kReadyOperation{
     .tag = "monitoring",
     .summary = "Readiness",
     .description =
-        "`ready`, or `degraded` if a changed source or configuration cannot be loaded. 503: `opening` while "
-        "the server starts, `draining` while it stops.",
+        "`ready`, or `degraded` if a changed source or configuration cannot be loaded, or while a dataset is being "
+        "prepared and others are served. 503: `opening` while the server starts or prepares all that it has, "
+        "`draining` "
+        "while it stops.",
     .replies = kPlainText,
     .unavailable = kPlainText,
     .headers = kStateHeaders,

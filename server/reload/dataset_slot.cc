@@ -73,11 +73,19 @@ Result<tiler::Dataset> OpenQuietly(const DatasetOpener& open, const config::Data
 DatasetSlot::DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving)
     : wanted_(std::move(wanted)), serving_(std::move(serving)), files_(FilesOf(*serving_)) {}
 
+DatasetSlot::DatasetSlot(config::DatasetConfig wanted, std::future<Result<tiler::Dataset>> opening,
+                         std::stop_source stop)
+    : wanted_(std::move(wanted)),
+      opening_(std::move(opening)),
+      stop_opening_(std::move(stop)),
+      tried_(StampsOf(NamedFiles(wanted_))) {}
+
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
 
 std::string DatasetSlot::Problem() const {
   if (!problem_.empty()) return problem_;
-  if (stale_since_ && Clock::now() - *stale_since_ > kPatience) return "its source changes and is not complete yet";
+  if (serving_ && stale_since_ && Clock::now() - *stale_since_ > kPatience)
+    return "its source changes and is not complete yet";
   return {};
 }
 
@@ -177,9 +185,12 @@ bool DatasetSlot::TakeOpened() {
     }
     return false;
   }
-  const auto took = stale_since_ ? Clock::now() - *stale_since_ : Clock::duration(0);
-  spdlog::info("dataset {}: {} is served now, version {}, {} after the change was seen", wanted_.name, PlaceOf(wanted_),
-               tiler::VersionText(opened->generation), std::chrono::duration_cast<std::chrono::milliseconds>(took));
+  const auto took = [this] {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(Clock::now() - *stale_since_);
+  };
+  spdlog::info("dataset {}: {} is served now, version {}{}", wanted_.name, PlaceOf(wanted_),
+               tiler::VersionText(opened->generation),
+               stale_since_ ? fmt::format(", {} after the change was seen", took()) : "");
   serving_ = *std::move(opened);
   files_ = FilesOf(*serving_);
   next_file_ = 0;

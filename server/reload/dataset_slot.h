@@ -27,6 +27,8 @@ class DatasetSlot {
 
   // Serves nothing yet; opens as soon as possible.
   explicit DatasetSlot(config::DatasetConfig wanted) : wanted_(std::move(wanted)) {}
+  // Serves nothing yet; `opening` has begun to open it, until `stop` is requested.
+  DatasetSlot(config::DatasetConfig wanted, std::future<Result<tiler::Dataset>> opening, std::stop_source stop);
   // Serves `serving`, opened from `wanted`.
   DatasetSlot(config::DatasetConfig wanted, tiler::Dataset serving);
   DatasetSlot(DatasetSlot&&) = default;

@@ -77,9 +77,16 @@ std::string TextOf(const std::vector<config::ConfigError>& errors) {
 }  // namespace
 
 Reloader::Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks)
-    : hooks_(std::move(hooks)), config_(std::move(config)), started_(config_), seen_(config_) {
+    : Reloader(std::move(config), std::vector<DatasetSlot>(), std::move(hooks)) {
   for (std::size_t i = 0; i < datasets.size(); ++i) slots_.emplace_back(config_.datasets[i], std::move(datasets[i]));
 }
+
+Reloader::Reloader(config::Config config, std::vector<DatasetSlot> slots, Hooks hooks)
+    : hooks_(std::move(hooks)),
+      config_(std::move(config)),
+      started_(config_),
+      slots_(std::move(slots)),
+      seen_(config_) {}
 
 Reloader::~Reloader() { Stop(); }
 

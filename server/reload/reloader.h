@@ -39,6 +39,8 @@ class Reloader {
 
   // `datasets`: the served datasets, opened from `config.datasets` in the same order.
   Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks);
+  // `slots`: one for each of `config.datasets`, in the same order. Opens those that serve nothing.
+  Reloader(config::Config config, std::vector<DatasetSlot> slots, Hooks hooks);
   ~Reloader();  // Stop
 
   // Starts the thread. `watch` false: checks only on request.

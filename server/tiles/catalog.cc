@@ -99,8 +99,9 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
 
 }  // namespace
 
-CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline) {
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending) {
   auto catalog = std::make_shared<Catalog>();
+  catalog->pending = std::move(pending);
   for (const tiler::Dataset& dataset : pipeline->datasets()) catalog->datasets.push_back(ViewOf(pipeline, dataset));
   catalog->pipeline = std::move(pipeline);
   return catalog;

@@ -68,10 +68,11 @@ struct DatasetView {
 struct Catalog {
   std::vector<DatasetView> datasets;
   std::shared_ptr<const tiler::TilePipeline> pipeline;
+  std::vector<std::string> pending = {};  // names of datasets that are configured and not open yet
 };
 using CatalogPtr = std::shared_ptr<const Catalog>;
 
-CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline);
+CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending = {});
 
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);

@@ -30,14 +30,15 @@ export class Access {
     stored((storage) => (token ? storage.setItem(kKey, token) : storage.removeItem(kKey)));
   }
 
-  // {datasets, moreWithToken}: the datasets that are visible with this token.
+  // {datasets, preparing, moreWithToken}: the datasets that are visible with this token, and {name, percent, failed} of
+  // those that are not there yet.
   async list(token = this.#token) {
     if (!/^[\w.~+/=-]*$/.test(token)) throw new UnknownToken();
     const response = await fetch("/datasets", { headers: headersOf(token) });
     if (response.status === 401) throw new UnknownToken();
     if (!response.ok) throw new Error(`the server answered ${response.status} to /datasets`);
-    const { datasets, more_with_token: moreWithToken = false } = await response.json();
-    return { datasets: datasets.map(withDefaults), moreWithToken };
+    const { datasets, preparing = [], more_with_token: moreWithToken = false } = await response.json();
+    return { datasets: datasets.map(withDefaults), preparing, moreWithToken };
   }
 
   // Whether the server refuses this URL with the current token.
@@ -80,6 +81,12 @@ export class Access {
     return results.map(({ elevation, distance, location }) =>
       ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
   }
+}
+
+// A sentence about a dataset of `preparing`.
+export function pendingText({ name, percent, failed }) {
+  return failed ? `${name} cannot be opened as it is now; the server's log says why.`
+    : `${name} is being prepared: ${percent} %. It is shown as soon as it is there.`;
 }
 
 function headersOf(token) {

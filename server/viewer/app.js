@@ -1,5 +1,5 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
-import { UnknownToken } from "/viewer/access.js";
+import { pendingText, UnknownToken } from "/viewer/access.js";
 import { access, firstList, startOf } from "/viewer/early.js";
 import { boxOf, defaultFraction, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
@@ -19,9 +19,9 @@ const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
-// of the line. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
+// of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
 // missing. `isGone`: the server has no more this dataset.
-const state = { datasets: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
+const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [] };
@@ -125,9 +125,23 @@ function lose() {
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
 }
 
-// The server has answered with its list. Shows the dataset anew if it has another version, or if tiles could not be read.
+// Tells about the dataset that is waited for, if the server is preparing it; without one, about all that it prepares.
+function tellPending() {
+  const name = state.wanted?.dataset;
+  const awaited = state.preparing.filter((pending) => (name ? pending.name === name : !state.dataset));
+  if (awaited.length > 0) panel.setMessage(awaited.map(pendingText).join(" "));
+  return awaited.length > 0;
+}
+
+// The server has answered with its list. Shows a dataset that was waited for. Shows the dataset anew if it has another version, or if tiles could not be read.
 function follow(wasLost) {
   const { dataset } = state;
+  const isThere = state.datasets.some(({ name }) => name === state.wanted?.dataset);
+  if (isThere || (!dataset && state.datasets.length > 0)) {
+    panel.setMessage(undefined);
+    return apply(state.wanted ?? decodeView(location.hash));
+  }
+  if (tellPending() && !dataset) return;
   if (!dataset || !state.ready) return wasLost ? apply(state.wanted ?? decodeView(location.hash)) : undefined;
   const current = state.datasets.find(({ name }) => name === dataset.name);
   if (!current) {
@@ -285,7 +299,7 @@ async function apply(view) {
   setColouring(view.colouring);
   setSun(view.sun);
   await show();
-  if (!state.wanted) return;
+  if (!state.wanted || tellPending()) return;
   if (state.moreWithToken) ask(`${view.dataset} needs a token, or is not on this server.`);
   else complain(`There is no dataset ${view.dataset} on this server; this is ${state.dataset.name}.`);
 }
@@ -309,9 +323,10 @@ async function list(token) {
   keep(await access.list(token));
 }
 
-function keep({ datasets, moreWithToken }) {
-  Object.assign(state, { datasets, moreWithToken });
-  panel.setDatasets(datasets, moreWithToken, state.dataset?.name);
+function keep({ datasets, preparing, moreWithToken }) {
+  Object.assign(state, { datasets, preparing, moreWithToken });
+  watch.isHasty = preparing.length > 0;
+  panel.setDatasets(datasets, preparing, moreWithToken, state.dataset?.name);
 }
 
 async function useToken(token) {
@@ -351,6 +366,7 @@ async function start() {
   }
   watch.start();
   if (state.datasets.length > 0) return apply(decodeView(location.hash));
+  if (tellPending()) return;
   if (state.moreWithToken) return ask("The datasets of this server need a token.");
   complain("This server has no datasets. Start it with a DEM: terrace serve maui.tif");
 }

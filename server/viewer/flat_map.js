@@ -1,12 +1,14 @@
 // The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
 // colours by height or the dataset's image, shading, and contours. Drag and wheel or arrow keys, plus and minus move it; a
 // click reads a height.
+import { pendingText } from "/viewer/access.js";
 import { heightColour, niceInterval } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
 
 const kTile = 256;
+const kPendingMs = 1500;
 const kMaxTiles = 300;  // in memory
 const byId = (id) => document.getElementById(id);
 
@@ -222,6 +224,16 @@ class FlatMap {
   }
 }
 
+// The list of datasets; while the server prepares the only ones, waits for it, and tells.
+async function listWhenThere(fail) {
+  for (let list = await firstList; ; list = await access.list().catch(() => list)) {
+    byId("message").hidden = true;
+    if (list.datasets.length > 0 || list.preparing.length === 0) return list;
+    fail(list.preparing.map(pendingText).join(" "));
+    await new Promise((resolve) => setTimeout(resolve, kPendingMs));
+  }
+}
+
 export async function startFlatMap() {
   document.body.classList.add("flat");
   const map = new FlatMap(byId("globe"), access);
@@ -230,7 +242,7 @@ export async function startFlatMap() {
   const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
   say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
   try {
-    const { datasets } = await firstList;
+    const { datasets } = await listWhenThere(fail);
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
     const show = async (name) => {

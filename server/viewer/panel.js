@@ -75,13 +75,15 @@ export class Panel {
     this.noteTimer = setTimeout(() => (byId("note").hidden = true), 4000);
   }
 
-  // `moreWithToken`: a token may show others. `shown`: name of the dataset that is drawn.
-  setDatasets(datasets, moreWithToken, shown) {
-    const names = datasets.map(({ name }) => name).join("\n");
+  // `preparing`: datasets that are not there yet. `moreWithToken`: a token may show others. `shown`: name of the dataset
+  // that is drawn.
+  setDatasets(datasets, preparing, moreWithToken, shown) {
+    const pending = preparing.map(({ name }) => Object.assign(new Option(`${name} (being prepared)`, name), { disabled: true }));
+    const names = [...datasets, {}, ...preparing].map(({ name }) => name).join("\n");
     byId("use-token").hidden = !moreWithToken;
     if (names === this.names) return;  // an open list must not close
     this.names = names;
-    byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
+    byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)), ...pending);
     if (shown) byId("dataset").value = shown;
   }
 

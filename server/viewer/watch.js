@@ -1,5 +1,6 @@
 // Asks the server again and again what it has, so that the page follows restarts and new versions without a reload.
 const kCalmMs = 5000;
+const kHastyMs = 1500;
 const kFirstRetryMs = 500;
 const kLastRetryMs = 5000;
 
@@ -9,14 +10,14 @@ export class Watch {
   #running = false;
 
   // `list`: fetches the datasets, throws if that fails. `onLost(error)`: it failed for the first time. `onList(wasLost)`:
-  // it succeeded.
+  // it succeeded. `isHasty`: something is about to appear.
   constructor({ list, onLost, onList }) {
-    Object.assign(this, { list, onLost, onList, isLost: false });
+    Object.assign(this, { list, onLost, onList, isLost: false, isHasty: false });
   }
 
   start() {
     document.addEventListener("visibilitychange", () => document.hidden || this.check());
-    this.#wait(kCalmMs);
+    this.#wait(this.isHasty ? kHastyMs : kCalmMs);
   }
 
   // Asks now; a tile has failed, for example.
@@ -36,7 +37,7 @@ export class Watch {
       this.#retryMs = Math.min(kLastRetryMs, 1.5 * this.#retryMs);
     } finally {
       this.#running = false;
-      this.#wait(this.isLost ? this.#retryMs : kCalmMs);
+      this.#wait(this.isLost ? this.#retryMs : this.isHasty ? kHastyMs : kCalmMs);
     }
   }
 

@@ -67,6 +67,47 @@ describe('the start of the viewer', () => {
     await page.close();
   });
 
+  // The server's list as it is while the datasets named in `pending` are being prepared.
+  const prepare = async (page, pending) => {
+    await page.route('**/datasets', async (route) => {
+      const all = await (await route.fetch()).json();
+      const datasets = all.datasets.filter(({ name }) => !(name in pending));
+      const preparing = Object.entries(pending).map(([name, percent]) => ({ name, percent }));
+      await route.fulfill({ json: { datasets, ...(preparing.length > 0 && { preparing }) } });
+    });
+  };
+  const says = (page, text) => page.waitForFunction((wanted) => document.getElementById('message').textContent.includes(wanted), text, kWait);
+
+  it('tells how far the only datasets are, and begins by itself when they are there', async () => {
+    const page = await newPage();
+    const pending = { earth: 12, jacksboro: 0 };
+    await prepare(page, pending);
+    await page.goto(server.url, { waitUntil: 'commit' });
+    await says(page, 'earth is being prepared: 12 %');
+    pending.earth = 57;
+    await says(page, 'earth is being prepared: 57 %');
+    delete pending.earth;
+    await ground(page);
+    assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'earth');
+    assert.equal(await page.locator('#message').isVisible(), false);
+    assert.deepEqual(await page.locator('#dataset option').allTextContents(), ['earth', 'jacksboro (being prepared)']);
+    assert.deepEqual(await page.evaluate(() => terrace.state.problems), []);
+    await page.close();
+  });
+
+  it('shows the dataset of its address as soon as that is there', async () => {
+    const page = await newPage();
+    const pending = { jacksboro: 42 };
+    await prepare(page, pending);
+    await page.goto(`${server.url}/#dataset=jacksboro`, { waitUntil: 'commit' });
+    await says(page, 'jacksboro is being prepared: 42 %');
+    assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'earth', 'another one is shown meanwhile');
+    delete pending.jacksboro;
+    await page.waitForFunction(() => terrace.state.dataset.name === 'jacksboro' && terrace.globe.hasGround, undefined, kWait);
+    assert.equal(await page.locator('#message').isVisible(), false);
+    await page.close();
+  });
+
   it('never shows a white globe, in few bytes', async () => {
     const page = await newPage();
     const devtools = await page.context().newCDPSession(page);

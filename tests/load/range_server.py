@@ -6,9 +6,11 @@ import threading
 
 
 class RangeServer:
-    """Serves the files of a folder at `url` while it is open. `requests` and `bytes` count what was answered."""
+    """Serves the files of a folder at `url` while it is open. `requests` and `bytes` count what was answered.
 
-    def __init__(self, folder):
+    `before`: called with the first and the last byte before a body is sent; may wait. False: the reply is 500."""
+
+    def __init__(self, folder, before=lambda first, last: True):
         outer = self
 
         class Handler(http.server.BaseHTTPRequestHandler):
@@ -28,6 +30,11 @@ class RangeServer:
                 wanted = re.fullmatch(r"bytes=(\d+)-(\d*)", self.headers.get("Range", ""))
                 if wanted:
                     first, last = int(wanted[1]), min(int(wanted[2] or last), last)
+                if has_body and not before(first, last):
+                    self.send_response(500)
+                    self.send_header("Content-Length", "0")
+                    self.end_headers()
+                    return
                 self.send_response(206 if wanted else 200)
                 self.send_header("Accept-Ranges", "bytes")
                 self.send_header("Content-Length", str(last - first + 1))

@@ -6,7 +6,10 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/server/server_fixture.h"
@@ -59,6 +62,94 @@ TEST_F(Opening, MayBeStopped) {
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status, 503) << "told, not cut off";
   EXPECT_TRUE(server_->Wait());
+}
+
+class Pending : public ServerFixture {
+ protected:
+  CatalogPtr WithPending(std::vector<DatasetView> datasets) const {
+    Catalog catalog = *MakeCatalog();
+    catalog.datasets = std::move(datasets);
+    catalog.pending = {"alps", "andes"};
+    return std::make_shared<const Catalog>(std::move(catalog));
+  }
+
+  ServerOptions WithShares() {
+    ServerOptions options;
+    options.share_done = [this](const std::string& dataset) { return dataset == "alps" ? share_.load() : 0; };
+    return options;
+  }
+
+  std::atomic<double> share_{0.426};
+};
+
+TEST_F(Pending, DatasetsAreToldWhileOthersAreServed) {
+  Listen(WithShares());
+  ASSERT_TRUE(server_->Replace(WithPending(MakeCatalog()->datasets), {}));
+  EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain").status, 200);
+  for (const char* target :
+       {"/alps/0/0/0.terrain", "/alps/layer.json", "/alps/tileset.json", "/alps/heights?locations=1,1"}) {
+    const Reply reply = Fetch(port(), target);
+    EXPECT_EQ(reply.status, 503) << target;
+    EXPECT_EQ(reply.Field("retry-after"), "5");
+    EXPECT_EQ(reply.Field("cache-control"), "no-store");
+    EXPECT_NE(reply.body.find("being prepared: 42 %"), std::string::npos) << reply.body;
+  }
+  EXPECT_EQ(Fetch(port(), "/pyrenees/layer.json").status, 404);
+  const Reply ready = Fetch(port(), "/readyz");
+  EXPECT_EQ(ready.status, 200);
+  EXPECT_EQ(ready.body, "degraded\ndataset alps: being prepared, 42 %\ndataset andes: being prepared, 0 %\n");
+  EXPECT_NE(Fetch(port(), "/metrics").body.find("\nterrace_degraded 2\n"), std::string::npos);
+
+  const Reply first = Fetch(port(), "/datasets");
+  EXPECT_NE(first.body.find(R"("preparing":[{"name":"alps","percent":42},{"name":"andes","percent":0}])"),
+            std::string::npos)
+      << first.body;
+  EXPECT_NE(first.body.find(R"("name":"maui")"), std::string::npos);
+  share_ = 1;  // something is left to do as long as the dataset is not there
+  EXPECT_NE(Fetch(port(), "/datasets").body.find(R"({"name":"alps","percent":99})"), std::string::npos);
+  server_->SetProblems({{"andes", "/secret/andes.tif: is no raster"}});
+  EXPECT_NE(Fetch(port(), "/datasets").body.find(R"({"name":"andes","percent":0,"failed":true})"), std::string::npos);
+  EXPECT_EQ(Fetch(port(), "/readyz").body,
+            "degraded\ndataset andes: its source cannot be opened as it is now\ndataset alps: being prepared, 99 %\n");
+  const Reply failed = Fetch(port(), "/andes/layer.json");
+  EXPECT_EQ(failed.status, 503);
+  EXPECT_NE(failed.body.find("cannot be opened"), std::string::npos);
+  EXPECT_EQ(failed.body.find("secret"), std::string::npos);
+
+  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  server_->SetProblems({});
+  EXPECT_EQ(Fetch(port(), "/readyz").body, "ready\n");
+  EXPECT_EQ(Fetch(port(), "/datasets").body.find("preparing"), std::string::npos);
+  EXPECT_EQ(Fetch(port(), "/alps/layer.json").status, 404);
+}
+
+TEST_F(Pending, AServerWithoutAnythingElseIsNotReady) {
+  Listen(WithShares());
+  ASSERT_TRUE(server_->Replace(WithPending({}), {}));
+  const Reply ready = Fetch(port(), "/readyz");
+  EXPECT_EQ(ready.status, 503);
+  EXPECT_EQ(ready.Field("retry-after"), "5");
+  EXPECT_EQ(ready.body, "opening\ndataset alps: being prepared, 42 %\ndataset andes: being prepared, 0 %\n");
+  EXPECT_EQ(Fetch(port(), "/datasets").status, 200);
+  const Reply page = Fetch(port(), "/");
+  EXPECT_EQ(page.status, 200);
+  EXPECT_NE(page.body.find("alps: being prepared, 42 %"), std::string::npos) << page.body;
+  EXPECT_NE(page.body.find("http-equiv=\"refresh\""), std::string::npos);
+}
+
+TEST_F(Pending, DatasetsAreHiddenFromTokensThatMayNotSeeThem) {
+  ServerOptions options = WithShares();
+  options.config.datasets = {PublicDataset("maui"), PublicDataset("andes")};
+  options.config.tokens = {{"everybody", config::TokenHash("secret-of-all"), {}, 0}};
+  Listen(options);
+  ASSERT_TRUE(server_->Replace(WithPending(MakeCatalog()->datasets), options.config));
+  const Reply list = Fetch(port(), "/datasets");
+  EXPECT_NE(list.body.find(R"("preparing":[{"name":"andes","percent":0}])"), std::string::npos) << list.body;
+  EXPECT_EQ(list.body.find("alps"), std::string::npos);
+  EXPECT_NE(Fetch(port(), "/alps/layer.json").status, 503) << "tells nothing of it";
+  const Reply ready = Fetch(port(), "/readyz");
+  EXPECT_EQ(ready.body.find("alps"), std::string::npos) << ready.body;
+  EXPECT_NE(ready.body.find("being prepared, 42 %"), std::string::npos);
 }
 
 // A listening socket that the test holds, as systemd does.

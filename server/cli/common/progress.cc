@@ -58,6 +58,11 @@ void Progress::Update(double share) {
   last_ = now;
 }
 
+void Progress::UseLines() {
+  if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
+  terminal_ = false;
+}
+
 std::function<void(double)> Progress::Callback() {
   return [this](double share) { Update(share); };
 }

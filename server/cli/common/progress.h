@@ -24,6 +24,9 @@ class Progress {
 
   void Update(double share);  // 0 .. 1
 
+  // From now on a line every ten seconds, also on a terminal: other lines are written meanwhile.
+  void UseLines();
+
   // For APIs that take a function; must not outlive this object.
   std::function<void(double)> Callback();
 
@@ -33,7 +36,7 @@ class Progress {
 
   const std::string what_;
   const std::size_t count_;
-  const bool terminal_;
+  bool terminal_;
   const std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point last_;
   double share_ = 0;  // never decreases

@@ -1,6 +1,7 @@
 // terrace serve: datasets from a config file and from the command line, over HTTP.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -35,10 +36,10 @@
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
-#include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
 #include "server/cli/serve/check_start.h"
 #include "server/cli/serve/descriptor_plan.h"
+#include "server/cli/serve/first_datasets.h"
 #include "server/cli/serve/log.h"
 #include "server/cli/serve/service_manager.h"
 #include "server/memory_trimmer.h"
@@ -49,7 +50,6 @@
 #include "server/store/shared_cache.h"
 #include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
-#include "tiler/encoder_version.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::cli {
@@ -211,27 +211,13 @@ config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::C
   return config;
 }
 
-// Opens every source. Returns false if one failed, after the errors of all were printed, or if it was stopped.
-bool OpenDatasets(const config::Config& config, const dem::RasterCache& cache, const std::stop_token& stop,
-                  std::vector<tiler::Dataset>& datasets) {
-  bool all_open = true;
+// The configured datasets that are not among the served ones.
+std::vector<std::string> PendingOf(const config::Config& config, const std::vector<tiler::Dataset>& served) {
+  std::vector<std::string> pending;
   for (const config::DatasetConfig& wanted : config.datasets) {
-    Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted), FileCount(wanted.sources));
-    Result<tiler::Dataset> dataset = OpenDataset(wanted, cache, TERRACE_VERSION, progress.Callback(), stop);
-    if (stop.stop_requested()) return false;
-    if (!dataset) {
-      std::fprintf(stderr, "terrace: dataset %s: %s\n", wanted.name.c_str(), dataset.error().message.c_str());
-      all_open = false;
-      continue;
-    }
-    const int max_level = dataset->source ? dataset->source->max_level()
-                                          : static_cast<int>(dataset->baked->extent().available.size()) - 1;
-    const std::string archive = dataset->source && dataset->baked ? ", archive " + wanted.baked : "";
-    spdlog::info("dataset {}: {}{}, levels 0 to {}, version {}", dataset->name, NameOf(wanted), archive, max_level,
-                 tiler::VersionText(dataset->generation));
-    datasets.push_back(*std::move(dataset));
+    if (std::ranges::find(served, wanted.name, &tiler::Dataset::name) == served.end()) pending.push_back(wanted.name);
   }
-  return all_open;
+  return pending;
 }
 
 // The configuration of the server: with the installed viewer, if the configuration asks for it.
@@ -353,6 +339,8 @@ int Serve(const ServeArguments& arguments) {
   const auto refinements = options.refinements;
   const dem::RasterCache cache = OpenCache(config);
   options.cache_problem = [folder = cache.folder] { return folder ? folder->problem() : std::string(); };
+  const auto shares = std::make_shared<PreparedShares>();
+  options.share_done = [shares](const std::string& dataset) { return shares->Of(dataset); };
   std::unique_ptr<server::Reloader> reloader;  // once there are datasets to watch
   options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
   options.on_signal[SIGHUP] = [&reloader] {
@@ -368,25 +356,31 @@ int Serve(const ServeArguments& arguments) {
   const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
   options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
   options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
-  // Listens before sources are opened, which may take long; requests wait meanwhile.
+  // Listens before sources are opened; requests wait meanwhile. Later, those for datasets that are not open get 503.
   auto started = server::Server::Start(nullptr, options);
   if (!started) return FailToStart(started.error());
   const std::unique_ptr<server::Server> server = *std::move(started);
   NotifyOpening();
 
-  std::vector<tiler::Dataset> datasets;
-  const bool are_open = OpenDatasets(config, cache, stop_opening.get_token(), datasets);
+  std::optional<FirstDatasets> first = OpenFirstDatasets(config, cache, stop_opening.get_token(), shares);
   if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
-  if (!are_open) return kExitFailure;
-  if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
-  baked->Use(datasets);
-  std::atomic<std::size_t> count = datasets.size();
-  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served) {
-    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements));
+  if (!first) return kExitFailure;
+  baked->Use(first->open);
+  const bool is_complete = first->pending.empty();
+  std::atomic<std::size_t> count = first->open.size(), pending = first->pending.size();
+  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, std::vector<std::string> waiting) {
+    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), std::move(waiting));
   };
   const auto served_text = [&] {
-    const std::size_t datasets_served = count;
-    return fmt::format("{} dataset{} at {}", datasets_served, datasets_served == 1 ? "" : "s", server->url());
+    const std::size_t served = count, waiting = pending;
+    return fmt::format("{} dataset{} at {}{}", served, served == 1 ? "" : "s", server->url(),
+                       waiting == 0 ? "" : fmt::format(", {} being prepared", waiting));
+  };
+  // When all datasets of the start are there.
+  const auto announce = [&] {
+    if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
+    fmt::print("terrace: serving {}\n", served_text());
+    std::fflush(stdout);
   };
   config::ConfigWatch watch(arguments.config_path, [&arguments, config, is_read_once]() -> config::ConfigResult {
     if (is_read_once) return config;
@@ -401,41 +395,66 @@ int Serve(const ServeArguments& arguments) {
   server::Reloader::Hooks hooks;
   hooks.load = [&watch] { return watch.Load(); };
   hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
-  hooks.open = [cache](const config::DatasetConfig& wanted, std::stop_token stop) {
-    return OpenDataset(wanted, cache, TERRACE_VERSION, {}, std::move(stop));
+  hooks.open = [cache, shares](const config::DatasetConfig& wanted, std::stop_token stop) {
+    shares->Begin(wanted.name);
+    const auto tell = [&](double share) { shares->Raise(wanted.name, share); };
+    return OpenDataset(wanted, cache, TERRACE_VERSION, tell, std::move(stop));
   };
+  // These belong to the reloader's thread. `is_untouched`: nothing was served yet, and the configuration is the first.
+  bool is_announced = is_complete, is_untouched = first->open.empty();
+  std::atomic<bool> has_failed = false;
   hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
     refinements->SetCapacity(now.refinement_cache_bytes);
-    if (const Result<void> replaced = server->Replace(catalog_of(served), now); !replaced) {
+    const std::vector<std::string> waiting = PendingOf(now, served);
+    if (const Result<void> replaced = server->Replace(catalog_of(served, waiting), now); !replaced) {
       spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
     } else {
       count = served.size();
+      pending = waiting.size();
     }
+    is_untouched = false;
     baked->Use(served);
     std::vector<std::uint64_t> generations;
     for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
     refinements->Retain(generations);
+    if (!waiting.empty() || std::exchange(is_announced, true)) return;
+    announce();
+    NotifyReady(served_text());
   };
   hooks.reloaded = [&] {
     server->ReopenAccessLog();
     NotifyReady(served_text());
   };
-  hooks.tell = [&](const std::map<std::string, std::string>& problems) { server->SetProblems(problems); };
-  reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
-  if (const Result<void> served = server->Replace(catalog_of(datasets), config); !served) {
+  hooks.tell = [&](const std::map<std::string, std::string>& problems) {
+    server->SetProblems(problems);
+    const bool has_nothing = is_untouched && std::ranges::all_of(config.datasets, [&](const auto& dataset) {
+                               return problems.contains(dataset.name);
+                             });
+    if (!has_nothing) return;
+    for (const auto& [name, problem] : problems) PrintFault(name, problem);
+    has_failed = true;
+    server->RequestStop();
+  };
+  reloader = std::make_unique<server::Reloader>(config, std::move(first->slots), std::move(hooks));
+  if (const Result<void> served = server->Replace(catalog_of(first->open, first->pending), config); !served) {
     return FailToStart(served.error());
   }
-  datasets.clear();  // replaced files must not stay open
+  first->open.clear();  // replaced files must not stay open
+  shares->GoToBackground();
+  if (is_complete) {
+    announce();
+  } else {
+    std::fprintf(stderr, "%sterrace: %s answers; being prepared: %s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "",
+                 server->url().c_str(), fmt::format("{}", fmt::join(first->pending, ", ")).c_str());
+  }
   reloader->Start(config.watch);
-  fmt::print("terrace: serving {}\n", served_text());
-  std::fflush(stdout);
   NotifyReady(served_text());
   MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
   const server::MemoryTrimmer trimmer;
   const bool drained = server->Wait();
   reloader->Stop();
-  return drained ? kExitOk : kExitFailure;
+  return drained && !has_failed ? kExitOk : kExitFailure;
 }
 
 }  // namespace
@@ -452,7 +471,8 @@ void AddServe(CLI::App& app, int& exit_code) {
       "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. An\n"
       "archive of 'terrace bake' becomes the dataset that was baked. Options of\n"
       "the command line override those of the configuration. The server prints one line with its\n"
-      "URL on stdout when it is ready; the log goes to stderr. SIGTERM or SIGINT ends the server after open\n"
+      "URL on stdout when all datasets are there; the log goes to stderr. SIGTERM or SIGINT ends the server after "
+      "open\n"
       "requests are answered; a second signal ends it at once.");
   command->add_option("DEM", arguments->dems,
                       "Rasters that GDAL can read, folders of them, or archives; each is one dataset");

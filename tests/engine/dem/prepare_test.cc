@@ -15,6 +15,7 @@
 #include <iterator>
 #include <map>
 #include <random>
+#include <utility>
 
 #include "engine/gdal/raster_file.h"
 #include "engine/raster/grid_cells.h"
@@ -98,6 +99,29 @@ TEST(Prepare, AveragesFromTheCacheAreThoseOfTheSamplesBitForBit) {
   EXPECT_EQ(second->info().heights.min, first->info().heights.min);
   EXPECT_EQ(second->info().heights.max, first->info().heights.max);
   EXPECT_EQ(second->info().valid_samples, 3u * (700 * 600 - 39 * 149));
+}
+
+TEST(Prepare, StatisticsAreTheSameOnSeveralThreads) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir);
+  std::vector<std::string> written;
+  for (const unsigned threads : {1u, 5u}) {
+    const std::string cache = dir.File("cache" + std::to_string(threads));
+    double last = 0;
+    const auto source = RasterSource::Open(
+        path, {}, CacheIn(cache), [&](double done) { EXPECT_GT(done, std::exchange(last, done)); }, {}, nullptr,
+        threads);
+    ASSERT_TRUE(source) << source.error().message;
+    EXPECT_EQ(last, 1);
+    ExpectSameAverages(path, **source);
+    for (const auto& file : std::filesystem::directory_iterator(cache)) {
+      if (file.path().extension() != CacheFolder::kEnding) continue;
+      std::ifstream in(file.path(), std::ios::binary);
+      written.emplace_back(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+    }
+  }
+  ASSERT_EQ(written.size(), 2u);
+  EXPECT_TRUE(written[0] == written[1]);
 }
 
 TEST(Prepare, TilesAreTheSameWithAndWithoutACache) {
@@ -445,6 +469,47 @@ TEST(Prepare, GoesOnInTheSecondPass) {
   EXPECT_EQ(source->preparation().chunks_read, 4) << "the first pass is over, and the detected nodata is kept";
   ExpectNodataIsVoid(*source);
   ExpectSameAverages(path, *source);
+}
+
+TEST(Prepare, SeveralThreadsStopWhenToldAndKeepWhatIsDone) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
+  std::stop_source stop;
+  const auto told = [&](double done) {
+    if (done >= .3) stop.request_stop();
+  };
+  const auto stopped = RasterSource::Open(path, {}, CacheIn(cache), told, stop.get_token(), nullptr, 4);
+  ASSERT_FALSE(stopped);
+  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+  const auto source = RasterSource::Open(path, {}, CacheIn(cache), {}, {}, nullptr, 4);
+  ASSERT_TRUE(source);
+  const Preparation& preparation = (*source)->preparation();
+  EXPECT_GE(preparation.chunks_kept, preparation.chunks * 3 / 10);
+  EXPECT_LT(preparation.chunks_kept, preparation.chunks);
+  ExpectSameAverages(path, **source);
+}
+
+TEST(Prepare, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
+  const TempDir dir;
+  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache"), wrong = dir.File("wrong.tif");
+  std::ofstream(wrong) << "no raster";
+  DemOptions options;
+  options.cache = CacheIn(cache);
+  const auto lacks = DemSource::OpenKept({{path}}, options);
+  ASSERT_FALSE(lacks);
+  EXPECT_EQ(lacks.error().code, ErrorCode::kCancelled);
+  const auto is_checked = DemSource::OpenKept({{path}, {wrong}}, options);
+  ASSERT_FALSE(is_checked);
+  EXPECT_NE(is_checked.error().code, ErrorCode::kCancelled);
+  EXPECT_NE(is_checked.error().message.find(wrong), std::string::npos) << is_checked.error().message;
+  EXPECT_FALSE(std::filesystem::exists(cache) && !std::filesystem::is_empty(cache)) << "nothing was begun";
+
+  const auto prepared = OpenOrFail(path, options);
+  const auto kept = DemSource::OpenKept({{path}}, options);
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ((*kept)->fingerprint(), prepared->fingerprint());
+  options.cache = {};
+  EXPECT_FALSE(DemSource::OpenKept({{path}}, options)) << "without a cache nothing is kept";
 }
 
 TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {

@@ -7,7 +7,9 @@
 #include <atomic>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <stdexcept>
+#include <stop_token>
 #include <thread>
 #include <utility>
 
@@ -77,6 +79,13 @@ class ReloaderTest : public testing::Test {
     std::vector<tiler::Dataset> datasets;
     for (const config::DatasetConfig& wanted : config_.datasets) datasets.push_back(*Open(wanted, {}));
     openings_ = 0;
+    for (const tiler::Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
+    next_ = config_;
+    reloader_ = std::make_unique<Reloader>(config_, std::move(datasets), MakeHooks());
+    reloader_->Start(/*watch=*/true);
+  }
+
+  Reloader::Hooks MakeHooks() {
     Reloader::Hooks hooks;
     hooks.may_have_changed = [this] {
       ++looks_;
@@ -100,10 +109,7 @@ class ReloaderTest : public testing::Test {
       const std::lock_guard lock(mutex_);
       problems_ = problems;
     };
-    for (const tiler::Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
-    next_ = config_;
-    reloader_ = std::make_unique<Reloader>(config_, std::move(datasets), std::move(hooks));
-    reloader_->Start(/*watch=*/true);
+    return hooks;
   }
 
   void Load(config::ConfigResult next) {
@@ -227,6 +233,48 @@ TEST_F(ReloaderTest, ADatasetThatGoesWhileItIsOpenedIsForgotten) {
   Load(next);
   ASSERT_TRUE(Eventually([&] { return Served().size() == 2; }));
   EXPECT_EQ(Served()[1].first, "c");
+}
+
+// As at a start: "a" is open, another thread opens "b", and nobody has begun with "c".
+TEST_F(ReloaderTest, ServesWhatAStartHasNotOpened) {
+  config_.datasets = {MakeConfig("a"), MakeConfig("b"), MakeConfig("c")};
+  next_ = config_;
+  std::promise<Result<tiler::Dataset>> of_b;
+  std::stop_source stop_b;
+  std::vector<DatasetSlot> slots;
+  slots.emplace_back(config_.datasets[0], *Open(config_.datasets[0], {}));
+  slots.emplace_back(config_.datasets[1], of_b.get_future(), stop_b);
+  slots.emplace_back(config_.datasets[2]);
+  openings_ = 0;
+  reloader_ = std::make_unique<Reloader>(config_, std::move(slots), MakeHooks());
+  reloader_->Start(/*watch=*/false);
+  const auto names = [this] {
+    std::string all;
+    for (const auto& [name, generation] : Served()) all += name;
+    return all;
+  };
+  ASSERT_TRUE(Eventually([&] { return names() == "ac"; }));
+  of_b.set_value(MakeError(ErrorCode::kUnavailable, "no block"));
+  ASSERT_TRUE(Eventually([&] { return Problems()["b"] == "no block"; }));
+  EXPECT_EQ(openings_, 1);
+  Put("b");
+  reloader_->Look();
+  ASSERT_TRUE(Eventually([&] { return names() == "abc" && Problems().empty(); }));
+}
+
+TEST_F(ReloaderTest, StoppingStopsTheOpeningOfAStart) {
+  std::stop_source stop;
+  std::vector<DatasetSlot> slots;
+  blocks_ = true;
+  slots.emplace_back(
+      config_.datasets[0],
+      std::async(std::launch::async, [this, token = stop.get_token()] { return Open(config_.datasets[0], token); }),
+      stop);
+  next_ = config_;
+  reloader_ = std::make_unique<Reloader>(config_, std::move(slots), MakeHooks());
+  reloader_->Start(/*watch=*/true);
+  reloader_.reset();  // otherwise this would never return
+  EXPECT_TRUE(stop.stop_requested());
 }
 
 TEST_F(ReloaderTest, StoppingStopsAnOpening) {
