@@ -98,7 +98,7 @@ Library = collections.namedtuple("Library", "name headers files")
 LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
-    Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|tin)|proto/error)/.*(\.cc|-inl\.h)"),
+    Library("Highway", r"hwy/.*", r"(engine/(dem/(bound|raster)|geo|tin)|proto/(error|mesh))/.*(\.cc|-inl\.h)"),
     Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/dem/"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/dem/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
