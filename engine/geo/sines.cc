@@ -50,8 +50,8 @@ HWY_INLINE void Compute(D d, const double* degrees, SinCos* out) {
   const V sine = hn::Mul(hn::Mul(Series(d, square, 1), radians), grid), cosine = hn::Mul(Series(d, square, 0), grid);
   const V near_sine = hn::Round(sine), near_cosine = hn::Round(cosine);
   const V off = hn::Max(hn::Abs(hn::Sub(sine, near_sine)), hn::Abs(hn::Sub(cosine, near_cosine)));
-  constexpr std::size_t kMostLanes = 8;
-  double of_sine[kMostLanes], of_cosine[kMostLanes], quarters[kMostLanes], doubts[kMostLanes];
+  constexpr std::size_t kMaxLanes = 8;
+  double of_sine[kMaxLanes], of_cosine[kMaxLanes], quarters[kMaxLanes], doubts[kMaxLanes];
   hn::StoreU(hn::Mul(near_sine, per_grid), d, of_sine);
   hn::StoreU(hn::Mul(near_cosine, per_grid), d, of_cosine);
   hn::StoreU(quarter, d, quarters);

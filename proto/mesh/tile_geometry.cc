@@ -71,13 +71,13 @@ double FarthestFrom(geo::Vec3 center, const std::vector<geo::Vec3>& positions) {
 class DistinctCoordinates {
  public:
   explicit DistinctCoordinates(std::span<const std::uint16_t> coordinates) {
-    constexpr unsigned kMostCells = 256, kRange = kQuantizedMax + 1;
+    constexpr unsigned kMaxCells = 256, kRange = kQuantizedMax + 1;
     constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
-    std::array<std::size_t, kMostCells + 1> last;  // by slot
+    std::array<std::size_t, kMaxCells + 1> last;  // by slot
     last.fill(kNone);
     places_.reserve(coordinates.size());
     for (const std::uint16_t coordinate : coordinates) {
-      std::size_t& place = last[(coordinate * kMostCells + kRange / 2) / kRange];
+      std::size_t& place = last[(coordinate * kMaxCells + kRange / 2) / kRange];
       if (place == kNone || values_[place] != coordinate) {
         place = values_.size();
         values_.push_back(coordinate);
