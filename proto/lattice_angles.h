@@ -5,18 +5,25 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "engine/geo/sines.h"
 #include "proto/lattice_view.h"
 
 namespace terrace::proto {
 
 struct LatticeAngles {
   explicit LatticeAngles(const LatticeView& lattice) {
-    columns.reserve(static_cast<std::size_t>(lattice.cells()) + 1);
-    rows.reserve(static_cast<std::size_t>(lattice.cells()) + 1);
-    for (int k = 0; k <= lattice.cells(); ++k) {
-      columns.push_back(geo::RoundedSinCos(lattice.Longitude(k)));
-      rows.push_back(geo::RoundedSinCos(lattice.Latitude(k)));
+    if (lattice.angles != nullptr) {
+      *this = *lattice.angles;
+      return;
     }
+    const auto nodes = static_cast<std::size_t>(lattice.cells()) + 1;
+    std::vector<double> longitudes(nodes), latitudes(nodes);
+    for (std::size_t k = 0; k < nodes; ++k) {
+      longitudes[k] = lattice.Longitude(static_cast<int>(k));
+      latitudes[k] = lattice.Latitude(static_cast<int>(k));
+    }
+    columns = geo::RoundedSinCosOf(longitudes);
+    rows = geo::RoundedSinCosOf(latitudes);
   }
 
   std::vector<geo::SinCos> columns, rows;  // of longitudes and latitudes, by lattice column and row, 0 .. cells

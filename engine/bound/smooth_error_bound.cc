@@ -293,7 +293,7 @@ void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const
 
 // All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
 void SmoothErrorBound::PrepareRows(int south, int north) {
-  band_ = {};
+  band_.top = 0, band_.bottom = -1;
   if (!is_separable_ || trace_.samples.empty()) return;
   const auto rows = static_cast<std::size_t>(north - south + 3);
   const auto nodes = std::span(trace_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
@@ -310,27 +310,9 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
   SampleRange range = RangeOf(at);
   range.left = window.column, range.right = window.column + window.columns - 1;
   range = Clipped(range);
-  const auto columns = static_cast<std::size_t>(window.columns);
   band_.top = range.top, band_.bottom = range.bottom;
-  for (std::vector<float>* of_column : {&band_.x, &band_.y, &band_.xx, &band_.yy, &band_.xy, &band_.sum}) {
-    of_column->assign(columns, 0);
-  }
-  const auto raise = [](std::vector<float>& largest, std::size_t count, const auto& value) {
-    float* const out = largest.data();
-    for (std::size_t c = 0; c < count; ++c) {
-      const float size = std::abs(value(c));
-      out[c] = size > out[c] ? size : out[c];
-    }
-  };
-  ForRows(range, [&](const Row& row) {
-    for (std::size_t c = 0; c < columns; ++c) band_.sum[c] += row.here[c];
-    raise(band_.x, columns - 1, [&](std::size_t c) { return row.X(c); });
-    raise(band_.xx, columns > 2 ? columns - 2 : 0, [&](std::size_t c) { return row.XX(c); });
-    if (row.below == nullptr) return;
-    raise(band_.y, columns, [&](std::size_t c) { return row.Y(c); });
-    raise(band_.xy, columns - 1, [&](std::size_t c) { return row.XY(c); });
-    if (row.above != nullptr) raise(band_.yy, columns, [&](std::size_t c) { return row.YY(c); });
-  });
+  band_.Reset(static_cast<std::size_t>(window.columns));
+  ForRows(range, [&](const Row& row) { AddRow(row.above, row.here, row.below, band_); });
 }
 
 }  // namespace terrace::dem

@@ -10,6 +10,7 @@
 #include "engine/bound/geoid_error_bound.h"
 #include "engine/bound/grid_statistics.h"
 #include "engine/bound/node_steps.h"
+#include "engine/bound/row_bends.h"
 #include "engine/bound/tile_cells.h"
 #include "engine/mosaic/raster_grid.h"
 
@@ -65,11 +66,9 @@ class SmoothErrorBound {
   bool is_separable_ = false;
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
-  // For each column of the trace's window, over rows `top` to `bottom` of the averages: the largest differences (Bends)
-  // of each average from the next ones to the east and to the south, and the sum of the averages, NaN if one is void.
-  struct Band {
+  // By column of the trace's window, over rows `top` to `bottom` of the averages.
+  struct Band : ColumnBends {
     std::int64_t top = 0, bottom = -1;
-    std::vector<float> x, y, xx, yy, xy, sum;
   };
   Band band_;
 };

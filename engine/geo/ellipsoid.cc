@@ -9,11 +9,6 @@ double PrimeVerticalRadiusFromSine(double sine) {
 
 }  // namespace
 
-Vec3 Normalized(Vec3 a) {
-  const double length = Length(a);
-  return length > 0 ? a * (1 / length) : a;
-}
-
 Vec3 SurfaceNormal(double longitude_deg, double latitude_deg) {
   return SurfaceNormal(RoundedSinCos(longitude_deg), RoundedSinCos(latitude_deg));
 }
@@ -25,10 +20,10 @@ Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m) {
 }
 
 Vec3 ToEcef(SinCos lon, SinCos lat, double height_m) {
-  const double radius = PrimeVerticalRadiusFromSine(lat.sin);
-  const double from_axis = (radius + height_m) * lat.cos;
-  return {from_axis * lon.cos, from_axis * lon.sin, (radius * (1 - kEccentricitySquared) + height_m) * lat.sin};
+  return ToEcef(lon, lat, PrimeVerticalRadiusFromSine(lat.sin), height_m);
 }
+
+double PrimeVerticalRadius(SinCos latitude) { return PrimeVerticalRadiusFromSine(latitude.sin); }
 
 double PrimeVerticalRadius(double latitude_deg) { return PrimeVerticalRadiusFromSine(RoundedSinCos(latitude_deg).sin); }
 

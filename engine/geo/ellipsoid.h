@@ -27,7 +27,10 @@ struct Vec3 {
 inline double Dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 Cross(Vec3 a, Vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline double Length(Vec3 a) { return std::sqrt(Dot(a, a)); }
-Vec3 Normalized(Vec3 a);  // the zero vector stays zero
+inline Vec3 Normalized(Vec3 a) {  // the zero vector stays zero
+  const double length = Length(a);
+  return length > 0 ? a * (1 / length) : a;
+}
 
 // Unit normal of the ellipsoid ("up") at a geodetic position, degrees. At the poles exactly (0, 0, +-1).
 Vec3 SurfaceNormal(SinCos longitude, SinCos latitude);
@@ -36,8 +39,15 @@ Vec3 SurfaceNormal(double longitude_deg, double latitude_deg);
 // ECEF metres of a geodetic position, degrees and metres above the ellipsoid.
 Vec3 ToEcef(SinCos longitude, SinCos latitude, double height_m);
 Vec3 ToEcef(double longitude_deg, double latitude_deg, double height_m);
+// The same with the parallel's PrimeVerticalRadius, for many positions on it.
+inline Vec3 ToEcef(SinCos longitude, SinCos latitude, double prime_vertical_m, double height_m) {
+  const double from_axis = (prime_vertical_m + height_m) * latitude.cos;
+  return {from_axis * longitude.cos, from_axis * longitude.sin,
+          (prime_vertical_m * (1 - kEccentricitySquared) + height_m) * latitude.sin};
+}
 
 // Radius of curvature in the prime vertical, metres: the normal's length from the surface to the polar axis.
+double PrimeVerticalRadius(SinCos latitude);
 double PrimeVerticalRadius(double latitude_deg);
 
 // Metres per degree along the parallel and along the meridian at a latitude.

@@ -381,15 +381,18 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
 
 }  // namespace
 
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile) {
+double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile,
+                        const std::vector<geo::Vec3>& positions) {
   std::vector<LatticePoint> places;
   std::vector<double> heights;
+  places.reserve(tile.u.size());
+  heights.reserve(tile.u.size());
   const double scale = static_cast<double>(lattice.cells()) / kQuantizedMax;
   for (std::size_t k = 0; k < tile.u.size(); ++k) {
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  return MeasureEdges(lattice, places, heights, DecodePositions(tile), 0, tile.triangles);
+  return MeasureEdges(lattice, places, heights, positions, 0, tile.triangles);
 }
 
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,

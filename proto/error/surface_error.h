@@ -17,7 +17,9 @@ namespace terrace::proto {
 // Metres: at least the distance between the two surfaces along the edges of all triangles, both for the height
 // interpolated in longitude and latitude and for the flat triangles in ECEF. The larger of this and TileError::max_m
 // bounds both surfaces everywhere in the tile; docs/decisions/0011-certified-error.md has the proof.
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile);
+//
+// `positions`: of the tile's vertices, DecodePositions.
+double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, const std::vector<geo::Vec3>& positions);
 
 // The same for flat triangles with their vertices at exact lattice positions, as in TileErrorMeter::MeasureFlat.
 double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,

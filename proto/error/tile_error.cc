@@ -10,6 +10,7 @@
 #include "engine/geo/ellipsoid.h"
 #include "proto/error/node_verticals.h"
 #include "proto/error/row_error.h"
+#include "proto/error/triangle_bound.h"
 #include "proto/mesh/edge_rows.h"
 #include "proto/mesh/tile_geometry.h"
 
@@ -238,18 +239,49 @@ class TileErrorMeter::Impl {
     const Linear plane = PlaneOf(t, p, twice_area);
     const double unit = static_cast<double>(surface_.unit);
     const double x = bounds.shift.x * unit, y = bounds.shift.y * unit;
-    const std::array<EdgeRows, 3> edges = EdgesOf(p);
-    const std::array<double, 3> moves = {edges[0].Move(x, y), edges[1].Move(x, y), edges[2].Move(x, y)};
-    const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
-    const auto up = static_cast<std::int64_t>(y) + 1;
-    double max_m = 0;
-    VisitRows(
-        plane, p[0], low - up, high + up,
-        [&](std::int64_t row, std::int64_t& first, std::int64_t& last) {
-          for (std::size_t k = 0; k < 3; ++k) edges[k].ClipMoved(row, moves[k], first, last);
-        },
-        [&](int, int, int, double largest) { max_m = std::max(max_m, largest); });
-    return {max_m + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y, false};
+    return {LargestNear(p, plane, bounds.shift) + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y,
+            false};
+  }
+
+  // An upper bound on the difference between the plane and the samples of all nodes that lie beside the triangle by at
+  // most `shift`. Floats have 24 bits: sides move out by kRounding lattice steps more, for box sides up to 257.
+  double LargestNear(const std::array<NodePoint, 3>& p, const Linear& plane, NodeVerticals::Shift shift) const {
+    constexpr double kRounding = 0x1p-12;
+    const double unit = static_cast<double>(surface_.unit), inverse = 1 / unit, last = cells_;
+    std::array<double, 3> x, y;  // lattice steps
+    for (std::size_t k = 0; k < 3; ++k) {
+      x[k] = static_cast<double>(p[k].x) * inverse;
+      y[k] = static_cast<double>(p[k].y) * inverse;
+    }
+    const int west = Ceil(std::max(std::min({x[0], x[1], x[2]}) - shift.x, 0.0)),
+              east = static_cast<int>(std::min(std::max({x[0], x[1], x[2]}) + shift.x, last)),
+              south = Ceil(std::max(std::min({y[0], y[1], y[2]}) - shift.y, 0.0)),
+              north = static_cast<int>(std::min(std::max({y[0], y[1], y[2]}) + shift.y, last));
+    if (west > east || south > north) return 0;
+    BoxedTriangle box;
+    box.columns = east - west + 1;
+    box.rows = north - south + 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = k == 2 ? 0 : k + 1;
+      const double dx = x[next] - x[k], dy = y[next] - y[k];
+      const double move = std::abs(dx) * (shift.y + kRounding) + std::abs(dy) * (shift.x + kRounding);
+      box.sides[k] = {static_cast<float>(dy * (x[k] - west) - dx * (y[k] - south) + move), static_cast<float>(-dy),
+                      static_cast<float>(dx)};
+    }
+    const double height = plane.At(static_cast<double>(west) * unit - static_cast<double>(p[0].x),
+                                   static_cast<double>(south) * unit - static_cast<double>(p[0].y));
+    box.height = static_cast<float>(height);
+    box.per_column = static_cast<float>(plane.dx * unit);
+    box.per_row = static_cast<float>(plane.dy * unit);
+    const double largest = LargestInTriangle(box, lattice_.Row(south) + west, cells_ + 3);
+    const double rise = std::abs(plane.dx * unit) * box.columns + std::abs(plane.dy * unit) * box.rows;
+    return largest + 0x1p-20 * (largest + rise) + std::abs(height - static_cast<double>(box.height));
+  }
+
+  // Of a value that is not negative. std::ceil is a call.
+  static int Ceil(double value) {
+    const int floor = static_cast<int>(value);
+    return floor + (static_cast<double>(floor) < value ? 1 : 0);
   }
 
   TriangleError MeasureTriangle(std::size_t t, std::vector<tin::SamplePosition>& samples,
@@ -307,14 +339,28 @@ class TileErrorMeter::Impl {
       if (columns.first > columns.last) continue;
       const double largest = verticals_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
       if (largest <= found.largest && largest <= min_allowed_) continue;
-      for (int i = static_cast<int>(columns.first); i <= columns.last; ++i) {
-        const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
-        const double counted = Counted(error, i, j);
-        const bool counts = error > found.largest || (counted > bound_ && counted > MissOf(i, j, found).error);
-        if (!counts) continue;  // NaN: no height
-        const bool meets = (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m ||
-                           verticals_.Meets(corners, i, j);
-        if (meets) Take(error, i, j, found);
+      const auto measure = [&](std::int64_t from, std::int64_t to) {
+        for (int i = static_cast<int>(from); i <= to; ++i) {
+          const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
+          const double counted = Counted(error, i, j);
+          const bool counts = error > found.largest || (counted > bound_ && counted > MissOf(i, j, found).error);
+          if (!counts) continue;  // NaN: no height
+          const bool meets = (i >= columns.inner_first && i <= columns.inner_last) || error <= kNothing_m ||
+                             verticals_.Meets(corners, i, j);
+          if (meets) Take(error, i, j, found);
+        }
+      };
+      // Inner nodes need no test. If none of them has too large an error, only their largest one counts.
+      const bool has_inner = columns.inner_first <= columns.inner_last;
+      const double inner =
+          has_inner ? verticals_.LargestOfRow(plane, j, columns.inner_first, columns.inner_last, lattice_.Row(j)) : 0;
+      if (has_inner && inner <= min_allowed_) {
+        found.largest = std::max(found.largest, inner);
+        if (inner == largest) continue;
+        measure(columns.first, columns.inner_first - 1);
+        measure(columns.inner_last + 1, columns.last);
+      } else {
+        measure(columns.first, columns.last);
       }
     }
   }
@@ -368,6 +414,8 @@ TileError TileErrorMeter::MeasureFlat(const tin::TinMesh& mesh, const std::vecto
   }
   return impl_->Measure(std::move(surface));
 }
+
+const std::vector<geo::Vec3>& TileErrorMeter::positions() const { return impl_->surface().ecef; }
 
 bool AllCounterClockwise(const QuantizedTile& tile) {
   return std::all_of(tile.triangles.begin(), tile.triangles.end(), [&](const std::array<std::uint32_t, 3>& t) {

@@ -40,6 +40,9 @@ class TileErrorMeter {
   // triangle with coinciding corners counts as a line.
   TileError MeasureFlat(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions);
 
+  // Of the vertices of the mesh that was measured last: ECEF, as clients decode them.
+  const std::vector<geo::Vec3>& positions() const;
+
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;

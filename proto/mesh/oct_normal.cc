@@ -10,9 +10,9 @@ namespace {
 
 double SignNotZero(double value) { return value < 0 ? -1 : 1; }
 
-// -1..1 to 0..255, halves upwards as JavaScript's Math.round does.
+// -1..1 to 0..255, halves upwards as JavaScript's Math.round does. The sum is positive, so the cast is its floor.
 std::uint8_t ToByte(double value) {
-  return static_cast<std::uint8_t>(std::floor((std::clamp(value, -1.0, 1.0) * 0.5 + 0.5) * 255 + 0.5));
+  return static_cast<std::uint8_t>(static_cast<int>((std::clamp(value, -1.0, 1.0) * 0.5 + 0.5) * 255 + 0.5));
 }
 
 }  // namespace

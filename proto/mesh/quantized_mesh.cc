@@ -50,8 +50,7 @@ void PutVec3(ByteWriter& out, geo::Vec3 v) {
   out.Put(v.z);
 }
 
-void PutHeader(ByteWriter& out, const QuantizedTile& tile) {
-  const std::vector<geo::Vec3> positions = DecodePositions(tile);
+void PutHeader(ByteWriter& out, const QuantizedTile& tile, const std::vector<geo::Vec3>& positions) {
   const BoundingSphere sphere = EnclosingSphere(positions);
   // Clients make vertices relative to the sphere's centre and ignore the tile's; one value serves for both.
   PutVec3(out, sphere.center);
@@ -63,28 +62,37 @@ void PutHeader(ByteWriter& out, const QuantizedTile& tile) {
   TERRACE_CHECK(out.size() == kHeaderBytes);
 }
 
+void PutAll(ByteWriter& out, const std::vector<std::uint16_t>& values) {
+  out.PutBytes({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(std::uint16_t)});
+}
+
 // Values have 15 bits, so their differences fit into 16 bits with sign.
 void PutZigZagDeltas(ByteWriter& out, const std::vector<std::uint16_t>& values) {
+  std::vector<std::uint16_t> deltas(values.size());
   int previous = 0;
-  for (std::uint16_t value : values) {
-    const int delta = value - previous;
-    out.Put(static_cast<std::uint16_t>((delta << 1) ^ (delta >> 31)));
-    previous = value;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const int delta = values[i] - previous;
+    deltas[i] = static_cast<std::uint16_t>((delta << 1) ^ (delta >> 31));
+    previous = values[i];
   }
+  PutAll(out, deltas);
 }
 
 // High-water-mark coding: each index is stored as its distance below the number of vertices so far; zero is a new
 // vertex.
 void PutTriangles(ByteWriter& out, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   out.Put(static_cast<std::uint32_t>(triangles.size()));
+  std::vector<std::uint16_t> codes(3 * triangles.size());
   std::uint32_t high_water_mark = 0;
+  auto to = codes.begin();
   for (const std::array<std::uint32_t, 3>& triangle : triangles) {
     for (std::uint32_t index : triangle) {
       const std::uint32_t code = high_water_mark - index;
-      out.Put(static_cast<std::uint16_t>(code));
-      if (code == 0) ++high_water_mark;
+      *to++ = static_cast<std::uint16_t>(code);
+      high_water_mark += code == 0 ? 1 : 0;
     }
   }
+  PutAll(out, codes);
 }
 
 // The vertices whose `across` is `edge`, sorted by `along`: clients build skirts from them in this order.
@@ -97,16 +105,13 @@ void PutEdge(ByteWriter& out, const std::vector<std::uint16_t>& across, int edge
   TERRACE_CHECK(indices.size() >= 2);  // cesium-native computes size - 1 of an unsigned
   std::sort(indices.begin(), indices.end(), [&](std::uint16_t a, std::uint16_t b) { return along[a] < along[b]; });
   out.Put(static_cast<std::uint32_t>(indices.size()));
-  for (std::uint16_t index : indices) out.Put(index);
+  PutAll(out, indices);
 }
 
 void PutNormals(ByteWriter& out, const std::vector<std::array<std::uint8_t, 2>>& normals) {
   out.Put(kOctVertexNormals);
   out.Put(static_cast<std::uint32_t>(2 * normals.size()));
-  for (const std::array<std::uint8_t, 2>& normal : normals) {
-    out.Put(normal[0]);
-    out.Put(normal[1]);
-  }
+  out.PutBytes({reinterpret_cast<const char*>(normals.data()), 2 * normals.size()});
 }
 
 void PutWaterMask(ByteWriter& out, const WaterMask& mask) {
@@ -126,7 +131,13 @@ void PutMetadata(ByteWriter& out, const std::string& json) {
 }  // namespace
 
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
+  return EncodeQuantizedMesh(tile, options, DecodePositions(tile));
+}
+
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options,
+                                const std::vector<geo::Vec3>& positions) {
   CheckPreconditions(tile, options);
+  TERRACE_CHECK(positions.size() == tile.u.size());
   VertexOrder order = OrderByFirstUse(tile.triangles, tile.u.size());
   QuantizedTile ordered;
   ordered.key = tile.key;
@@ -140,7 +151,7 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
 
   ByteWriter out;
   out.Reserve(kHeaderBytes + 64 + 9 * ordered.u.size() + 6 * ordered.triangles.size());
-  PutHeader(out, ordered);
+  PutHeader(out, ordered, Reordered(positions, order.old_index));
   out.Put(static_cast<std::uint32_t>(ordered.u.size()));
   PutZigZagDeltas(out, ordered.u);
   PutZigZagDeltas(out, ordered.v);

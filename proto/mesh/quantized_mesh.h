@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/geo/ellipsoid.h"
 #include "engine/geo/tile_key.h"
 #include "proto/mesh/water_mask.h"
 
@@ -42,6 +43,10 @@ struct QuantizedMeshOptions {
 // Renumbers the vertices in order of first use, as high-water-mark coding requires, and lists the edges. Computes
 // centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
 // at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
+//
+// `positions`: of the tile's vertices, DecodePositions (tile_geometry.h).
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options,
+                                const std::vector<geo::Vec3>& positions);
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
 
 // Decodes the mesh of a tile, without extensions. Nothing: `encoded` is not a complete quantized-mesh tile. Keeps

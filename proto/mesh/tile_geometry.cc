@@ -4,9 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <utility>
+#include <span>
 
 #include "engine/core/check.h"
+#include "engine/geo/sines.h"
+#include "proto/mesh/horizon_reach.h"
 
 namespace terrace::proto {
 namespace {
@@ -64,49 +66,41 @@ double FarthestFrom(geo::Vec3 center, const std::vector<geo::Vec3>& positions) {
   return std::sqrt(squared);
 }
 
-// Caches sines and cosines: thousands of vertices share a few hundred coordinates.
-template <typename Degrees>
-class Angles {
+// The different ones among coordinates: thousands of vertices share a few hundred. Those of different nodes of a
+// lattice have different slots, so each is found; others may occur twice.
+class DistinctCoordinates {
  public:
-  explicit Angles(Degrees degrees) : degrees_(std::move(degrees)), index_(kQuantizedMax + 1) {}
-
-  geo::SinCos At(std::uint16_t coordinate) {
-    std::uint16_t& index = index_[coordinate];
-    if (index == 0) {
-      known_.push_back(geo::RoundedSinCos(degrees_(coordinate)));
-      index = static_cast<std::uint16_t>(known_.size());
+  explicit DistinctCoordinates(std::span<const std::uint16_t> coordinates) {
+    constexpr unsigned kMaxCells = 256, kRange = kQuantizedMax + 1;
+    constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+    std::array<std::size_t, kMaxCells + 1> last;  // by slot
+    last.fill(kNone);
+    places_.reserve(coordinates.size());
+    for (const std::uint16_t coordinate : coordinates) {
+      std::size_t& place = last[(coordinate * kMaxCells + kRange / 2) / kRange];
+      if (place == kNone || values_[place] != coordinate) {
+        place = values_.size();
+        values_.push_back(coordinate);
+      }
+      places_.push_back(static_cast<std::uint32_t>(place));
     }
-    return known_[index - std::size_t{1}];
   }
 
+  // Of each coordinate that occurs.
+  template <typename Degrees>
+  std::vector<geo::SinCos> Angles(const Degrees& degrees) const {
+    std::vector<double> all;
+    all.reserve(values_.size());
+    for (const std::uint16_t value : values_) all.push_back(degrees(value));
+    return geo::RoundedSinCosOf(all);
+  }
+  // Where the angle of the coordinate k is.
+  std::size_t PlaceOf(std::size_t k) const { return places_[k]; }
+
  private:
-  const Degrees degrees_;
-  std::vector<std::uint16_t> index_;  // index of the known value, from 1 on; 0: not known yet
-  std::vector<geo::SinCos> known_;
+  std::vector<std::uint16_t> values_;
+  std::vector<std::uint32_t> places_;
 };
-
-geo::Vec3 Scaled(geo::Vec3 p, double shrink) {
-  return {p.x / (geo::kSemiMajorAxis - shrink), p.y / (geo::kSemiMajorAxis - shrink),
-          p.z / (geo::kSemiMinorAxis - shrink)};
-}
-
-// How far along `direction` (unit, scaled space) the tangent from `p` to the unit sphere meets it; not positive where
-// it does not. With a the angle between p and the direction, and b the angle from p to where the tangent touches:
-//
-//            H        |H| = 1 / cos(a + b)
-//           /|\       cos b = 1 / |p|, at least one: positions inside the sphere count as on it
-//         p/ | \      .
-//         /a |  \     .
-//     b_/.---+---.\_
-double TangentReach(geo::Vec3 p, geo::Vec3 direction) {
-  const double length = geo::Length(p);
-  const double cos_a = geo::Dot(p, direction) / length;
-  const double sin_a = geo::Length(geo::Cross(p, direction)) / length;
-  const double squared = std::max(1.0, length * length);
-  const double cos_b = 1 / std::sqrt(squared);
-  const double sin_b = std::sqrt(squared - 1) * cos_b;
-  return 1 / (cos_a * cos_b - sin_a * sin_b);
-}
 
 }  // namespace
 
@@ -126,11 +120,18 @@ std::vector<geo::Vec3> DecodePositions(const QuantizedTile& tile) {
 }
 
 void DecodeFurtherPositions(const QuantizedTile& tile, std::vector<geo::Vec3>& positions) {
+  const std::size_t first = positions.size();
+  const DistinctCoordinates u(std::span(tile.u).subspan(first)), v(std::span(tile.v).subspan(first));
+  const std::vector<geo::SinCos> longitudes = u.Angles([&](std::uint16_t at) { return LongitudeAt(tile.key, at); }),
+                                 latitudes = v.Angles([&](std::uint16_t at) { return LatitudeAt(tile.key, at); });
+  std::vector<double> radii_m;
+  radii_m.reserve(latitudes.size());
+  for (const geo::SinCos& latitude : latitudes) radii_m.push_back(geo::PrimeVerticalRadius(latitude));
   positions.reserve(tile.u.size());
-  Angles longitudes([&](std::uint16_t u) { return LongitudeAt(tile.key, u); });
-  Angles latitudes([&](std::uint16_t v) { return LatitudeAt(tile.key, v); });
-  for (std::size_t i = positions.size(); i < tile.u.size(); ++i) {
-    positions.push_back(geo::ToEcef(longitudes.At(tile.u[i]), latitudes.At(tile.v[i]), HeightAt(tile, tile.h[i])));
+  for (std::size_t i = first; i < tile.u.size(); ++i) {
+    const std::size_t parallel = v.PlaceOf(i - first);
+    positions.push_back(geo::ToEcef(longitudes[u.PlaceOf(i - first)], latitudes[parallel], radii_m[parallel],
+                                    HeightAt(tile, tile.h[i])));
   }
 }
 
@@ -153,16 +154,12 @@ geo::Vec3 HorizonOcclusionPoint(const std::vector<geo::Vec3>& positions, geo::Ve
   constexpr geo::Vec3 kNeverCulled{kNaN, kNaN, kNaN};
   const double shrink = std::max(0.0, -min_height);
   TERRACE_CHECK(shrink < geo::kSemiMinorAxis);
-  const geo::Vec3 ray = geo::Normalized(Scaled(direction, 0));
+  const geo::Vec3 ray = geo::Normalized(
+      {direction.x / geo::kSemiMajorAxis, direction.y / geo::kSemiMajorAxis, direction.z / geo::kSemiMinorAxis});
   double reach = 1;
-  for (const geo::Vec3& p : positions) {
-    const double plain = TangentReach(Scaled(p, 0), ray);
-    const double shrunk = shrink > 0 ? TangentReach(Scaled(p, shrink), ray) : plain;
-    // Also false for NaN, which a direction or position at the Earth's centre gives.
-    const bool exists = plain > 0 && plain <= kMaxHorizonMagnitude && shrunk > 0 && shrunk <= kMaxHorizonMagnitude;
-    if (!exists) return kNeverCulled;
-    reach = std::max({reach, plain, shrunk});
-  }
+  // Also false for NaN, which a direction or position at the Earth's centre gives.
+  if (!RaiseReach(positions, ray, 0, kMaxHorizonMagnitude, reach)) return kNeverCulled;
+  if (shrink > 0 && !RaiseReach(positions, ray, shrink, kMaxHorizonMagnitude, reach)) return kNeverCulled;
   return ray * (reach * (1 + kHorizonPad));
 }
 

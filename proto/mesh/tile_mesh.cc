@@ -49,8 +49,8 @@ QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh,
   tile.v.reserve(heights.size());
   tile.h.reserve(heights.size());
   for (std::size_t k = 0; k < heights.size(); ++k) {
-    const double units = scale.step > 0 ? std::floor((heights[k] - scale.min) / scale.step + 0.5) : 0;
-    TERRACE_CHECK(units >= 0 && units <= kQuantizedMax);
+    const double units = scale.step > 0 ? (heights[k] - scale.min) / scale.step + 0.5 : 0;
+    TERRACE_CHECK(units >= 0 && units < kQuantizedMax + 1);  // so the cast is its floor
     tile.u.push_back(QuantizedPosition(mesh.vertices[k].x, cells));
     tile.v.push_back(QuantizedPosition(mesh.vertices[k].y, cells));
     tile.h.push_back(static_cast<std::uint16_t>(units));

@@ -7,7 +7,6 @@
 #include "engine/geo/ellipsoid.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/oct_normal.h"
-#include "proto/mesh/tile_geometry.h"
 
 namespace terrace::proto {
 namespace {
@@ -41,21 +40,45 @@ double Limited(double central, double before, double after) {
   return central;
 }
 
-geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, geo::SinCos row, tin::SamplePosition p,
-                        bool is_on_edge) {
-  const double latitude = lattice.Latitude(p.y), step = lattice.lattice.StepDegrees();
-  if (latitude <= -90 || latitude >= 90) return frame.up;
+// Metres over the two steps of a central difference on one row. Computed once a row: a square root and a division each.
+class RowWidths {
+ public:
+  RowWidths(const LatticeView& lattice, const std::vector<geo::SinCos>& rows)
+      : lattice_(lattice), rows_(rows), step_(lattice.lattice.StepDegrees()), widths_(rows.size()) {}
+
+  struct Width {
+    double east = 0, north = 0;
+    bool is_pole = false;
+  };
+  const Width& At(int j) {
+    Width& width = widths_[static_cast<std::size_t>(j)];
+    if (width.north > 0) return width;
+    const double latitude = lattice_.Latitude(j);
+    const geo::SinCos& row = rows_[static_cast<std::size_t>(j)];
+    width = {2 * step_ * geo::MetresPerDegreeEast(row), 2 * step_ * geo::MetresPerDegreeNorth(row),
+             latitude <= -90 || latitude >= 90};
+    return width;
+  }
+
+ private:
+  const LatticeView& lattice_;
+  const std::vector<geo::SinCos>& rows_;
+  const double step_;
+  std::vector<Width> widths_;
+};
+
+geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, const RowWidths::Width& across,
+                        tin::SamplePosition p, bool is_on_edge) {
+  if (across.is_pole) return frame.up;
   const double rise_east =
       static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
   const double rise_north =
       static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
-  const double across_east = 2 * step * geo::MetresPerDegreeEast(row);
-  const double across_north = 2 * step * geo::MetresPerDegreeNorth(row);
-  double east = rise_east / across_east, north = rise_north / across_north;
+  double east = rise_east / across.east, north = rise_north / across.north;
   if (is_on_edge) {
     const double height = static_cast<double>(lattice.At(p.x, p.y));
-    const double from_west = 2 * (height - static_cast<double>(lattice.At(p.x - 1, p.y))) / across_east;
-    const double from_south = 2 * (height - static_cast<double>(lattice.At(p.x, p.y - 1))) / across_north;
+    const double from_west = 2 * (height - static_cast<double>(lattice.At(p.x - 1, p.y))) / across.east;
+    const double from_south = 2 * (height - static_cast<double>(lattice.At(p.x, p.y - 1))) / across.north;
     east = Limited(east, from_west, 2 * east - from_west);
     north = Limited(north, from_south, 2 * north - from_south);
   }
@@ -91,11 +114,12 @@ std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinM
   std::vector<geo::Vec3> normals;
   normals.reserve(mesh.vertices.size());
   const LatticeAngles angles(lattice);
+  RowWidths widths(lattice, angles.rows);
   for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
     const LocalFrame frame = FrameOf(angles.columns[p.x], angles.rows[p.y]);
     const bool is_on_edge = p.x == 0 || p.y == 0 || p.x == lattice.cells() || p.y == lattice.cells();
-    geo::Vec3 normal = LatticeNormal(lattice, frame, angles.rows[p.y], p, is_on_edge);
+    geo::Vec3 normal = LatticeNormal(lattice, frame, widths.At(p.y), p, is_on_edge);
     if (!is_on_edge) {
       const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
       if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;
@@ -117,10 +141,10 @@ std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>&
 }
 
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
-                                                     const QuantizedTile& tile) {
+                                                     const std::vector<geo::Vec3>& positions) {
   std::vector<std::array<std::uint8_t, 2>> encoded;
   encoded.reserve(mesh.vertices.size());
-  for (const geo::Vec3& normal : VertexNormals(lattice, mesh, DecodePositions(tile))) {
+  for (const geo::Vec3& normal : VertexNormals(lattice, mesh, positions)) {
     encoded.push_back(OctEncode(normal));
   }
   return encoded;

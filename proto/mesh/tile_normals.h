@@ -9,7 +9,6 @@
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "proto/lattice_view.h"
-#include "proto/mesh/quantized_mesh.h"
 
 namespace terrace::proto {
 
@@ -29,8 +28,8 @@ std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinM
 std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>& positions,
                          const std::vector<geo::Vec3>& normals);
 
-// VertexNormals oct-encoded, for the mesh that `tile` was quantized from.
+// VertexNormals oct-encoded.
 std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
-                                                     const QuantizedTile& tile);
+                                                     const std::vector<geo::Vec3>& positions);
 
 }  // namespace terrace::proto

@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Counts the instructions of a cold tile with valgrind, for one or more binaries. The count does not depend on other load.
 
-    tests/load/cold_instructions.py DEM SUFFIX TILES BINARY [BINARY...]     SUFFIX: .terrain or .glb
+    tests/load/cold_instructions.py [--warm] DEM SUFFIX TILES BINARY [BINARY...]     SUFFIX: .terrain or .glb
+
+--warm: of a tile whose refinement is in memory, because it was requested at an eighth of its default error before.
 
 Each binary serves the DEM with one worker and no caches, and gets requests for the same random tiles of its six deepest levels,
 with a fixed seed. Prints instructions a tile and the ratio to the first binary.
@@ -20,13 +22,13 @@ import time
 WARM_UP = 3  # tiles before the count begins
 
 
-def start(binary, dem, profile):
+def start(binary, dem, profile, is_warm):
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     process = subprocess.Popen(
         ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", binary, "serve", str(dem),
          "--listen", f"127.0.0.1:{port}", "--io-threads", "1", "--worker-threads", "1", "--cache-bytes", "0",
-         "--refinement-cache-bytes", "0", "--cache-dir", f"{profile}.cache",
+         *([] if is_warm else ["--refinement-cache-bytes", "0"]), "--cache-dir", f"{profile}.cache",
          "--request-deadline-s", "3600", "--log-level", "warn", "--access-log", "off"],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     return process, port
@@ -65,13 +67,15 @@ def control(process, *arguments):
                    stderr=subprocess.DEVNULL)
 
 
-def instructions(binary, dem, suffix, count, tiles):
+def instructions(binary, dem, suffix, count, tiles, is_warm):
     with tempfile.TemporaryDirectory() as folder:
-        process, port = start(binary, dem, f"{folder}/profile")
+        process, port = start(binary, dem, f"{folder}/profile", is_warm)
         try:
             layer = layer_of(process, port, dem.stem)
             tiles = tiles or draw(layer, count)
             urls = [f"/{dem.stem}/{z}/{x}/{y}{suffix}" for z, x, y in tiles]
+            for z, x, y in tiles if is_warm else []:
+                ask(port, f"/{dem.stem}/{z}/{x}/{y}.terrain?fraction=0.125")
             for url in urls[:WARM_UP]:
                 ask(port, url)
             control(process, "-i", "on")
@@ -88,12 +92,14 @@ def instructions(binary, dem, suffix, count, tiles):
 
 
 def main():
-    if len(sys.argv) < 5:
+    is_warm = sys.argv[1:2] == ["--warm"]
+    arguments = sys.argv[2:] if is_warm else sys.argv[1:]
+    if len(arguments) < 4:
         raise SystemExit(__doc__)
-    dem, suffix, count = pathlib.Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
+    dem, suffix, count = pathlib.Path(arguments[0]), arguments[1], int(arguments[2])
     first, tiles = None, None
-    for binary in sys.argv[4:]:
-        cost, tiles = instructions(binary, dem, suffix, count, tiles)
+    for binary in arguments[3:]:
+        cost, tiles = instructions(binary, dem, suffix, count, tiles, is_warm)
         first = first or cost
         print(f"{binary}: {cost:,.0f} instructions a tile, {cost / first:.3f} of the first, {len(tiles) - WARM_UP} tiles", flush=True)
 

@@ -7,6 +7,7 @@
 #include <functional>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/mesh/tile_geometry.h"
 #include "proto/mesh/tile_mesh.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 
@@ -37,7 +38,8 @@ tin::TinMesh Fan(std::uint16_t x, std::uint16_t y) {
 std::vector<geo::Vec3> NormalsOf(const SampledGround& ground, const tin::TinMesh& mesh) {
   const EdgeSteps steps{{1, 1, 1, 1}, {1, 1, 1, 1}};
   std::vector<geo::Vec3> normals;
-  for (const auto& [x, y] : TileNormals(ground.view(), mesh, QuantizeTile(ground.view(), mesh, steps))) {
+  for (const auto& [x, y] :
+       TileNormals(ground.view(), mesh, DecodePositions(QuantizeTile(ground.view(), mesh, steps)))) {
     const auto [nx, ny, nz] = DecodeOctNormal(x, y);
     normals.push_back({nx, ny, nz});
   }
@@ -81,8 +83,8 @@ TEST(TileNormals, AreEqualOnBothSidesOfAnEdge) {
   const tin::TinMesh left = Fan(9, 20), right = Fan(27, 3);
   const SampledGround a = ground_of(west), b = ground_of(east);
   const EdgeSteps steps{{1, 1, 1, 1}, {1, 1, 1, 1}};
-  const auto of_west = TileNormals(a.view(), left, QuantizeTile(a.view(), left, steps));
-  const auto of_east = TileNormals(b.view(), right, QuantizeTile(b.view(), right, steps));
+  const auto of_west = TileNormals(a.view(), left, DecodePositions(QuantizeTile(a.view(), left, steps)));
+  const auto of_east = TileNormals(b.view(), right, DecodePositions(QuantizeTile(b.view(), right, steps)));
   EXPECT_EQ(of_west[1], of_east[0]);
   EXPECT_EQ(of_west[2], of_east[3]);
 }

@@ -9,6 +9,7 @@
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/gltf/glb_tile.h"
+#include "proto/lattice_angles.h"
 #include "proto/mesh/grid_mesh.h"
 #include "proto/mesh/skirt.h"
 #include "proto/mesh/tile_normals.h"
@@ -114,8 +115,11 @@ Result<MeshedGlb> MeshGlb(const EncoderInput& input, const std::stop_token& stop
   const bool is_deepest = request.key.level >= dataset.source->finest_level();
   const double skirt_error_m =
       proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
-  return MeshGlb(dataset, input.lattice(), refined->refinement, error_m, skirt_error_m,
-                 proto::WidthOf(request.compression), stop);
+  proto::LatticeView lattice = input.lattice();
+  const proto::LatticeAngles angles(lattice);
+  lattice.angles = &angles;
+  return MeshGlb(dataset, lattice, refined->refinement, error_m, skirt_error_m, proto::WidthOf(request.compression),
+                 stop);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <utility>
 
+#include "proto/lattice_angles.h"
 #include "proto/mesh/tile_metadata.h"
 #include "proto/mesh/tile_normals.h"
 #include "proto/mesh/water_mask.h"
@@ -62,16 +63,18 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
 Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
   const auto start = std::chrono::steady_clock::now();
-  const proto::LatticeView lattice = input.lattice();
+  proto::LatticeView lattice = input.lattice();
+  const proto::LatticeAngles angles(lattice);
+  lattice.angles = &angles;
   Result<MeshedTile> measured =
       MeshTile(*dataset.source, lattice, refined->refinement, dataset.mesh_options, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
-  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->tile);
+  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->positions);
   const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
   if (!options) return tl::unexpected(options.error());
   LeaveOut(TrianglesInHoles(*dataset.source, request.key, measured->mesh), measured->mesh, lattice.cells(),
            measured->tile.triangles);
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options);
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options, measured->positions);
   encoded.times.refine += measured->replayed;
   encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "engine/geo/sines.h"
 #include "proto/mesh/quantized_mesh.h"
 
 namespace terrace::tiler {
@@ -28,8 +29,10 @@ double GridSagitta(int level, int divisions) {
 tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   const double step = lattice.lattice.StepDegrees();
   tin::Curvature curvature;
-  for (int j = 0; j <= lattice.cells(); ++j) {
-    const double east = geo::MetresPerDegreeEast(lattice.Latitude(j)) * step;
+  std::vector<double> latitudes;
+  for (int j = 0; j <= lattice.cells(); ++j) latitudes.push_back(lattice.Latitude(j));
+  for (const geo::SinCos& latitude : geo::RoundedSinCosOf(latitudes)) {
+    const double east = geo::MetresPerDegreeEast(latitude) * step;
     curvature.east_m2.push_back(east * east);
   }
   // Near the equator neighbouring rows differ by less than the rounding of their sines. Makes widths increase up to the

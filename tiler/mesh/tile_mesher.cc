@@ -54,7 +54,8 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
-  meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile));
+  meshed.positions = meter.positions();
+  meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile, meshed.positions));
   meshed.mesh = std::move(mesh);
   return meshed;
 }

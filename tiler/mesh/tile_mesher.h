@@ -3,9 +3,11 @@
 
 #include <chrono>
 #include <stop_token>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
+#include "engine/geo/ellipsoid.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
@@ -24,6 +26,7 @@ struct MeshOptions {
 struct MeshedTile {
   tin::TinMesh mesh;
   proto::QuantizedTile tile;
+  std::vector<geo::Vec3> positions;      // of its vertices, ECEF
   double max_error_m = 0;                // measured on the encoded integers
   double surface_error_m = 0;            // also between the lattice's samples
   std::chrono::microseconds replayed{};  // time until the mesh was replayed, before quantizing and measuring

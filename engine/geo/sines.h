@@ -1,0 +1,15 @@
+// RoundedSinCos of many angles, with SIMD. There is one nearest multiple of 2^-44, so results are those of single
+// angles on all instruction sets.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "engine/geo/sine.h"
+
+namespace terrace::geo {
+
+// One for each angle. About four times as fast as single calls. Precondition: |degrees| <= 2^20.
+std::vector<SinCos> RoundedSinCosOf(std::span<const double> degrees);
+
+}  // namespace terrace::geo
