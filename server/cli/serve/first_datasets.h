@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "engine/dem/dem_types.h"
+#include "engine/common/dem_types.h"
 #include "server/reload/dataset_slot.h"
 #include "tiler/tile_pipeline.h"
 
