@@ -50,7 +50,7 @@ Answer AnswerReady(const Handlers& from, const RequestContext& context) {
   const std::map<std::string, std::string> problems = from.process.problems();
   std::string text = problems.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : problems) {
-    if (dataset == kCacheTrouble) {
+    if (dataset == kCacheProblem) {
       // It names no file.
       text += fmt::format("cache_dir: {}; averages of sources are kept in memory as far as they fit\n", reason);
     } else if (dataset.empty()) {

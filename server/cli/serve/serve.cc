@@ -421,7 +421,7 @@ int Serve(const ServeArguments& arguments) {
     server->ReopenAccessLog();
     NotifyReady(served_text());
   };
-  hooks.tell = [&](const std::map<std::string, std::string>& problems) { server->SetProblems(problems); };
+  hooks.report = [&](const std::map<std::string, std::string>& problems) { server->SetProblems(problems); };
   reloader = std::make_unique<server::Reloader>(config, datasets, std::move(hooks));
   if (const Result<void> served = server->Replace(catalog_of(datasets), config); !served) {
     return FailToStart(served.error());
