@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "engine/core/escape_html.h"
 #include "engine/core/plain_number.h"
 #include "fly/report/map_plot.h"
 #include "fly/report/time_plot.h"
