@@ -14,12 +14,13 @@
 
 namespace terrace::archive {
 
-struct UnitSummary {
+// A finished file: of a unit, or of a whole archive in one file.
+struct UnitFile {
   std::uint64_t tiles = 0;
   std::uint64_t bytes = 0;  // of the file
   std::string xxh3;         // XXH3-128 of the file, 32 hexadecimal digits
 
-  friend bool operator==(const UnitSummary&, const UnitSummary&) = default;
+  friend bool operator==(const UnitFile&, const UnitFile&) = default;
 };
 
 // Used by one thread at a time. The same tiles make the same bytes, in whatever order they were added.
@@ -37,7 +38,7 @@ class TileWriter {
   // Writes the file and renames it. Call it once, last; the file is complete and on the disk afterwards. Without tiles
   // no file is written, and an old one is removed. kUnavailable: as Add.
   // kInvalidArgument: a tile was added twice.
-  virtual Result<UnitSummary> Finish() = 0;
+  virtual Result<UnitFile> Finish() = 0;
 };
 
 struct UnitOptions {
@@ -53,6 +54,6 @@ Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const s
 // Reads a finished file in full: every checksum, whether its tiles belong to the unit, and whether header and metadata
 // are those that a writer with these options writes. A bake that continues uses it. kNotFound: no file.
 // kInvalidArgument: the file is of another bake, or damaged: bake the unit again.
-Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
+Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
 
 }  // namespace terrace::archive

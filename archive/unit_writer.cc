@@ -31,7 +31,7 @@ class UnitWriter final : public TileWriter {
     return writer_.Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile, range);
   }
 
-  Result<UnitSummary> Finish() override { return writer_.Finish(UnitMetadata(options_.kind, options_.key)); }
+  Result<UnitFile> Finish() override { return writer_.Finish(UnitMetadata(options_.kind, options_.key)); }
 
  private:
   const std::string name_;
@@ -76,7 +76,7 @@ Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const s
   return std::make_unique<UnitWriter>(name, options, *std::move(writer));
 }
 
-Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {
+Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {
   const std::string path = place + "/" + UnitPath(name);
   const auto as_damaged = [](Error error) {
     if (error.code == ErrorCode::kUnavailable) error.code = ErrorCode::kInvalidArgument;
@@ -92,21 +92,21 @@ Result<UnitSummary> VerifyUnit(const std::string& place, const std::string& name
     return MakeError(ErrorCode::kInvalidArgument, "{} was baked from other sources or with other options", path);
   }
   const bool is_mercator = options.kind.format == tiler::TileFormat::kHeightPng;
-  UnitSummary summary;
+  UnitFile unit_file;
   const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const CheckedTile&) -> Result<void> {
     const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
     if (!key || UnitNameOf(*key) != name) {
       return MakeError(ErrorCode::kInvalidArgument, "{} has a tile of another unit", path);
     }
-    ++summary.tiles;
+    ++unit_file.tiles;
     return {};
   });
   if (!read) return as_damaged(read.error());
-  summary.bytes = (*file)->bytes();
+  unit_file.bytes = (*file)->bytes();
   const Result<std::string> hash = HashOfFile(path);
   if (!hash) return as_damaged(hash.error());
-  summary.xxh3 = *hash;
-  return summary;
+  unit_file.xxh3 = *hash;
+  return unit_file;
 }
 
 }  // namespace terrace::archive

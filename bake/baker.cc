@@ -188,19 +188,20 @@ class Run {
     const Target& to = targets_[target];
     const std::string& name = plan_.units[index].unit.name;
     UnitOutcome outcome = UnitOutcome::kKept;
-    auto summary = archive::VerifyUnit(to.place, name, {to.manifest.kind, key});
-    if (summary && summary->tiles != CountTiles(plan_.units[index].unit.tiles)) {
-      summary = MakeError(ErrorCode::kInvalidArgument, "the file lacks tiles");
+    auto unit_file = archive::VerifyUnit(to.place, name, {to.manifest.kind, key});
+    if (unit_file && unit_file->tiles != CountTiles(plan_.units[index].unit.tiles)) {
+      unit_file = MakeError(ErrorCode::kInvalidArgument, "the file lacks tiles");
     }
     const auto old = to.old_units.find(name);
-    if (!summary && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
+    if (!unit_file && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
       outcome = UnitOutcome::kCopied;
-      summary = CopyUnit(to.old_place, to.place, old->second);
+      unit_file = CopyUnit(to.old_place, to.place, old->second);
     }
-    if (!summary) return false;
-    counters_.passed += summary->tiles;
-    Report(index,
-           {target, {name, key, summary->tiles, summary->bytes, summary->xxh3}, outcome, SecondsSince(start), {}});
+    if (!unit_file) return false;
+    counters_.passed += unit_file->tiles;
+    Report(
+        index,
+        {target, {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3}, outcome, SecondsSince(start), {}});
     return true;
   }
 
@@ -249,14 +250,14 @@ class Run {
         output.writer = nullptr;  // removes its file
         continue;
       }
-      auto summary = output.writer->Finish();
+      auto unit_file = output.writer->Finish();
       output.writer = nullptr;
-      if (!summary) {
-        unit.error = summary.error();
+      if (!unit_file) {
+        unit.error = unit_file.error();
         continue;
       }
       Report(unit.index, {output.target,
-                          {name, output.key, summary->tiles, summary->bytes, summary->xxh3},
+                          {name, output.key, unit_file->tiles, unit_file->bytes, unit_file->xxh3},
                           UnitOutcome::kBaked,
                           SecondsSince(unit.start),
                           {}});

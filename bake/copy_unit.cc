@@ -9,7 +9,7 @@
 
 namespace terrace::bake {
 
-Result<archive::UnitSummary> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry) {
+Result<archive::UnitFile> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry) {
   const std::string source = from + "/" + archive::UnitPath(entry.name);
   const Result<std::unique_ptr<const archive::InputFile>> in = archive::InputFile::Open(source);
   if (!in) return tl::unexpected(in.error());
@@ -25,7 +25,7 @@ Result<archive::UnitSummary> CopyUnit(const std::string& from, const std::string
     return MakeError(ErrorCode::kInvalidArgument, "{}: is not the file that its manifest describes", source);
   }
   if (auto finished = out->Finish(); !finished) return tl::unexpected(finished.error());
-  return archive::UnitSummary{entry.tiles, entry.bytes, entry.xxh3};
+  return archive::UnitFile{entry.tiles, entry.bytes, entry.xxh3};
 }
 
 }  // namespace terrace::bake

@@ -19,7 +19,7 @@ using Clock = TileService::Clock;
 constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
 // A source may be replaced again while it is being opened. If opening still fails after this time, somebody has to
 // repair it, and requests do not wait.
-constexpr std::chrono::milliseconds kPassingTrouble{1'500};
+constexpr std::chrono::milliseconds kPassingProblem{1'500};
 
 asio::awaitable<void> Pause() {
   asio::steady_timer timer(co_await asio::this_coro::executor, kReplacePeriod);
@@ -206,7 +206,7 @@ std::map<std::string, std::string> TerrainApplication::problems() const {
   const std::string cache = parts_.cache_problem ? parts_.cache_problem() : std::string();
   const std::lock_guard lock(mutex_);
   std::map<std::string, std::string> all = problems_;
-  if (!cache.empty()) all.emplace(kCacheTrouble, cache);
+  if (!cache.empty()) all.emplace(kCacheProblem, cache);
   return all;
 }
 
@@ -233,10 +233,10 @@ TerrainApplication::HandlersPtr TerrainApplication::Current() const {
   return handlers_;
 }
 
-bool TerrainApplication::HasLastingTrouble(const std::string& dataset) const {
+bool TerrainApplication::HasLastingProblem(const std::string& dataset) const {
   const std::lock_guard lock(mutex_);
   const auto since = problem_since_.find(dataset);
-  return since != problem_since_.end() && Clock::now() - since->second >= kPassingTrouble;
+  return since != problem_since_.end() && Clock::now() - since->second >= kPassingProblem;
 }
 
 // Returns false if there is none in time, or if the server stops.
@@ -253,7 +253,7 @@ asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
 asio::awaitable<bool> TerrainApplication::NextCatalog(HandlersPtr now, std::string dataset,
                                                       Clock::time_point give_up) const {
   while (Current() == now) {
-    if (draining() || HasLastingTrouble(dataset) || Clock::now() >= give_up) co_return false;
+    if (draining() || HasLastingProblem(dataset) || Clock::now() >= give_up) co_return false;
     co_await Pause();
   }
   co_return true;

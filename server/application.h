@@ -36,7 +36,7 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_problem;            // the problem kCacheTrouble; "": there is none; may be empty
+  std::function<std::string()> cache_problem;            // the problem kCacheProblem; "": there is none; may be empty
   std::function<double(const std::string&)> share_done;  // of a pending dataset; may be empty
 };
 
@@ -71,7 +71,7 @@ class TerrainApplication final : public Application, public ProcessState {
 
   HandlersPtr Make(CatalogPtr catalog, config::Config config) const;
   HandlersPtr Current() const;
-  bool HasLastingTrouble(const std::string& dataset) const;
+  bool HasLastingProblem(const std::string& dataset) const;
 
   asio::awaitable<bool> FirstCatalog() const;
   asio::awaitable<bool> NextCatalog(HandlersPtr now, std::string dataset, TileService::Clock::time_point give_up) const;

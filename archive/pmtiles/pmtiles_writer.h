@@ -30,7 +30,7 @@ class PmtilesWriter {
   Result<void> Add(std::uint64_t tile_id, const tiler::EncodedTile& tile, const dem::HeightRange& range);
 
   // `metadata`: JSON. Without tiles removes the file. kInvalidArgument: a tile was added twice.
-  Result<UnitSummary> Finish(std::string_view metadata);
+  Result<UnitFile> Finish(std::string_view metadata);
 
  private:
   struct Waiting {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 
+#include "engine/core/escape_html.h"
 #include "engine/core/plain_number.h"
 #include "fly/report/map_plot.h"
 #include "fly/report/time_plot.h"
@@ -280,7 +281,7 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
   html += "<title>Flight over " + EscapeHtml(options.document.Text()) + "</title>" + kStyle + "</head><body><main>";
   fmt::format_to(
       std::back_inserter(html),
-      R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km way, {:.0f} s each &middot; {} x {} px, {}&deg;, refined above {} px</p>)",
+      R"(<h1>Flight report</h1><p class="sub">{} &middot; {} client{} &middot; {:.1f} km path, {:.0f} s each &middot; {} x {} px, {}&deg;, refined above {} px</p>)",
       EscapeHtml(options.document.Text()), options.clients, options.clients == 1 ? "" : "s",
       options.path.length_m() / 1000, options.duration_s, options.lens.width_px, options.lens.height_px,
       PlainNumber(options.lens.field_of_view), PlainNumber(options.select.max_error_px));

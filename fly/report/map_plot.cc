@@ -119,7 +119,7 @@ std::string MapOf(const std::vector<LoadedTile>& tiles, const std::vector<Geodet
                    ColorOfLevel(level, shallowest, deepest), level == shallowest ? "up to level " : "", level);
   }
   return fmt::format(
-      R"(<figure class="wide"><figcaption><b>The way over the tiles that were loaded</b><p>Each rectangle is a tile of )"
+      R"(<figure class="wide"><figcaption><b>The path over the tiles that were loaded</b><p>Each rectangle is a tile of )"
       R"(the first client or of others; the dot is the start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:.0f} {:.0f}" )"
       R"(role="img" aria-label="map">{}</svg></figure>)",
       legend, kWidth, kHeight, svg);

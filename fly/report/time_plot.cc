@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "engine/core/escape_html.h"
 #include "engine/core/plain_number.h"
 
 namespace terrace::fly {
@@ -147,29 +148,6 @@ double Highest(const std::vector<Series>& series, std::size_t count) {
 }
 
 }  // namespace
-
-std::string EscapeHtml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
-    }
-  }
-  return escaped;
-}
 
 double RoundUp(double value) {
   if (!(value > 0)) return 1;

@@ -38,8 +38,6 @@ struct BarPlot {
 
 std::string SvgOf(const BarPlot& plot);
 
-std::string EscapeHtml(const std::string& text);
-
 // A round number at or above `value`: 1, 2 or 5 times a power of ten.
 double RoundUp(double value);
 

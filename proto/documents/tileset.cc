@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/core/escape_html.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "proto/documents/implicit_tree.h"
@@ -190,23 +191,6 @@ Json Schema() {
   return {{"id", "terrace"}, {"classes", {{kTileClass, {{"properties", properties}}}}}};
 }
 
-// CesiumJS shows credits as HTML.
-std::string EscapeHtml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    if (c == '&') {
-      escaped += "&amp;";
-    } else if (c == '<') {
-      escaped += "&lt;";
-    } else if (c == '>') {
-      escaped += "&gt;";
-    } else {
-      escaped += c;
-    }
-  }
-  return escaped;
-}
-
 }  // namespace
 
 double GeometricError(int level) {
@@ -220,8 +204,9 @@ std::string EncodeTileset(const TilesetDescription& tileset) {
   json["asset"]["version"] = "1.1";
   if (!tileset.version.empty()) json["asset"]["tilesetVersion"] = tileset.version;
   if (!tileset.attribution.empty()) {
-    // The schema has no place for a credit; this is where CesiumJS looks for one.
-    json["asset"]["extras"]["cesium"]["credits"] = Json::array({{{"html", EscapeHtml(tileset.attribution)}}});
+    // The schema has no place for a credit; this is where CesiumJS looks for one, which it shows as HTML.
+    json["asset"]["extras"]["cesium"]["credits"] =
+        Json::array({{{"html", EscapeHtml(tileset.attribution, /*quotes=*/false)}}});
   }
   json["schema"] = Schema();
   json["geometricError"] = kNothingDrawn;

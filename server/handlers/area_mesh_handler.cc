@@ -80,9 +80,9 @@ asio::awaitable<Response> BuildArea(const Handlers& from, const RequestContext& 
                                     tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
                                     Response response) {
   Work<tiler::EncodedTile> work = [catalog = from.catalog, dataset, area, plan, coding,
-                                   asked =
+                                   requested_at =
                                        TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
-    const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
+    const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
     Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
     if (!mesh) return mesh;
     mesh->times.queue = queued;

@@ -122,9 +122,9 @@ asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& c
                                    std::shared_ptr<const GridQuery> query, tiler::Coding coding, Response response) {
   const DatasetView& view = from.catalog->datasets[dataset];
   Work<MadeGrid> work = [catalog = from.catalog, dataset, query, coding, most = from.max_mesh_samples,
-                         asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
+                         requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
-    made.reply.times.queue = tiler::MicrosecondsSince(asked);
+    made.reply.times.queue = tiler::MicrosecondsSince(requested_at);
     auto begun = TileService::Clock::now();
     const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
     if (!grid) return tl::unexpected(grid.error());

@@ -32,7 +32,7 @@
 namespace terrace::server {
 
 // The key of the statistics cache's folder among the problems. No dataset has such a name.
-inline constexpr const char* kCacheTrouble = "/cache_dir";
+inline constexpr const char* kCacheProblem = "/cache_dir";
 
 // A dataset that is configured and not open yet.
 struct PendingDataset {
@@ -47,7 +47,7 @@ class ProcessState {
   virtual ~ProcessState() = default;
   virtual bool draining() const = 0;
   virtual bool opening() const = 0;  // the first catalog has not been opened yet
-  // Problems by dataset; "" is the configuration, kCacheTrouble the cache folder.
+  // Problems by dataset; "" is the configuration, kCacheProblem the cache folder.
   virtual std::map<std::string, std::string> problems() const = 0;
   // The pending datasets of a catalog, in its order.
   virtual std::vector<PendingDataset> PendingOf(const Catalog& catalog) const = 0;

@@ -134,9 +134,9 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query, certified,
-                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
-    made.times.queue = tiler::MicrosecondsSince(asked);
+    made.times.queue = tiler::MicrosecondsSince(requested_at);
     const auto begun = TileService::Clock::now();
     const Result<tiler::PointHeights> heights = ReadSurface(*catalog->pipeline, dataset, *query, stop);
     if (!heights) return tl::unexpected(heights.error());

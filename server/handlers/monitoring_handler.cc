@@ -65,7 +65,7 @@ Answer AnswerReady(const Handlers& from, const RequestContext& context) {
   const bool is_opening = from.catalog->datasets.empty() && !pending.empty();
   std::string text = is_opening ? "opening\n" : problems.empty() && pending.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : problems) {
-    if (dataset == kCacheTrouble) {
+    if (dataset == kCacheProblem) {
       // It names no file.
       text += fmt::format("cache_dir: {}; averages of sources are kept in memory as far as they fit\n", reason);
     } else if (dataset.empty()) {

@@ -146,9 +146,9 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
   Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query,
-                          asked = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
-    made.times.queue = tiler::MicrosecondsSince(asked);
+    made.times.queue = tiler::MicrosecondsSince(requested_at);
     const auto begun = TileService::Clock::now();
     const tiler::TilePipeline& pipeline = *catalog->pipeline;
     if (query->from_ground) {

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "engine/core/escape_html.h"
 #include "server/api/caching.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
@@ -11,29 +12,6 @@
 
 namespace terrace::server {
 namespace {
-
-std::string EscapeHtml(std::string_view text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
 
 using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&,
                                       std::span<const PendingDataset>);

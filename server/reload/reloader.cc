@@ -139,7 +139,7 @@ void Reloader::Run() {
       next_look = now + kPeriod;
     }
     if (StepOpenings()) Publish();
-    TellTroubles();
+    ReportProblems();
     if (reload && hooks_.reloaded) hooks_.reloaded();
     lock.lock();
   }
@@ -244,16 +244,16 @@ void Reloader::Publish() {
   hooks_.publish(datasets, config_);
 }
 
-void Reloader::TellTroubles() {
+void Reloader::ReportProblems() {
   std::map<std::string, std::string> problems;
   if (!config_problem_.empty()) problems.emplace("", config_problem_);
   for (const DatasetSlot& slot : slots_) {
     if (std::string problem = slot.Problem(); !problem.empty())
       problems.emplace(slot.wanted().name, std::move(problem));
   }
-  if (problems == told_) return;
-  told_ = std::move(problems);
-  hooks_.tell(told_);
+  if (problems == reported_) return;
+  reported_ = std::move(problems);
+  hooks_.report(reported_);
 }
 
 }  // namespace terrace::server

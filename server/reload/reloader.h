@@ -34,7 +34,7 @@ class Reloader {
     // Called on the reloader's thread after a Reload was processed; changed datasets may not be open yet. May be empty.
     std::function<void()> reloaded = {};
     // Receives the problems by dataset; "" is the configuration. Called on the reloader's thread when they change.
-    std::function<void(const std::map<std::string, std::string>&)> tell;
+    std::function<void(const std::map<std::string, std::string>&)> report;
   };
 
   // `datasets`: the served datasets, opened from `config.datasets` in the same order.
@@ -61,7 +61,7 @@ class Reloader {
   void Apply(config::Config next);
   bool StepOpenings();
   void Publish();
-  void TellTroubles();
+  void ReportProblems();
   bool IsBusy() const;
 
   const Hooks hooks_;
@@ -74,7 +74,7 @@ class Reloader {
   std::string config_problem_;
   config::ConfigResult seen_;    // at the last check, valid or not
   bool config_settles_ = false;  // it had changed at the check before
-  std::map<std::string, std::string> told_;
+  std::map<std::string, std::string> reported_;
 
   std::mutex mutex_;
   std::condition_variable wake_;

@@ -54,8 +54,8 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   using Flights = decltype(flights_);
   const tiler::CacheKey key = KeyOf(*catalog, request);
   Flights::Build build = [this, catalog = std::move(catalog), request, key,
-                          asked = Clock::now()](std::stop_token stop) {
-    return BuildAndKeep(*catalog, request, key, asked, std::move(stop));
+                          requested_at = Clock::now()](std::stop_token stop) {
+    return BuildAndKeep(*catalog, request, key, requested_at, std::move(stop));
   };
   JobOrder order;
   order.client = client;
@@ -79,9 +79,9 @@ tiler::TilePtr TileService::Finish(const tiler::TileRequest& request, tiler::Enc
 }
 
 Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
-                                                 const tiler::CacheKey& key, Clock::time_point asked,
+                                                 const tiler::CacheKey& key, Clock::time_point requested_at,
                                                  std::stop_token stop) {
-  const std::chrono::microseconds queued = tiler::MicrosecondsSince(asked);
+  const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
   // An earlier flight may have ended between the look-up in the cache and the start of this one.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
   for (auto store = stores_.begin(); store != stores_.end(); ++store) {

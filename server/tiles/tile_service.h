@@ -105,7 +105,7 @@ class TileService {
   static JobOrder OrderOf(Length length, Clock::time_point deadline, std::uint64_t client);
   tiler::TilePtr Finish(const tiler::TileRequest& request, tiler::EncodedTile tile) const;
   Result<tiler::TilePtr> BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
-                                      const tiler::CacheKey& key, Clock::time_point asked, std::stop_token stop);
+                                      const tiler::CacheKey& key, Clock::time_point requested_at, std::stop_token stop);
 
   const BuildObserver observer_;
   const HeaderWriter write_head_;

@@ -110,14 +110,14 @@ TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {
   EXPECT_NE(found.error().message.find("units/7-100-50.pmtiles"), std::string::npos);
 }
 
-TEST_F(ArchiveTest, VerifiedUnitEqualsItsSummary) {
+TEST_F(ArchiveTest, VerifiedUnitEqualsItsFile) {
   Bake();
   for (const UnitEntry& unit : manifest_.units) {
-    const Result<UnitSummary> summary = VerifyUnit(Place(), unit.name, {manifest_.kind, unit.key});
-    ASSERT_TRUE(summary) << summary.error().message;
-    EXPECT_EQ(*summary, (UnitSummary{unit.tiles, unit.bytes, unit.xxh3}));
+    const Result<UnitFile> unit_file = VerifyUnit(Place(), unit.name, {manifest_.kind, unit.key});
+    ASSERT_TRUE(unit_file) << unit_file.error().message;
+    EXPECT_EQ(*unit_file, (UnitFile{unit.tiles, unit.bytes, unit.xxh3}));
     const auto refused = [&](const UnitOptions& options) {
-      const Result<UnitSummary> other = VerifyUnit(Place(), unit.name, options);
+      const Result<UnitFile> other = VerifyUnit(Place(), unit.name, options);
       return !other && other.error().code == ErrorCode::kInvalidArgument;
     };
     EXPECT_TRUE(refused({manifest_.kind, unit.key + 1}));

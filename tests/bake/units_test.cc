@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "bake/baker.h"
-#include "bake/catalogue.h"
+#include "bake/cell_list.h"
 
 namespace terrace::bake {
 namespace {
@@ -119,13 +119,13 @@ TEST(Shards, HaveEachUnitOnceAndSimilarNumbers) {
 
 TEST(Catalogue, RefusesWhatIsNoCell) {
   for (const char* text : {"", "\n\n", "N46E008\nN46", "X46E008", "N90E000", "S91E000", "N46E180", "N46E008x"}) {
-    EXPECT_FALSE(PlanCatalogue(text, 1, 0.5)) << text;
+    EXPECT_FALSE(PlanCells(text, 1, 0.5)) << text;
   }
-  EXPECT_TRUE(PlanCatalogue("N46E008\r\nS90W180\n", 1, 0.5));
+  EXPECT_TRUE(PlanCells("N46E008\r\nS90W180\n", 1, 0.5));
 }
 
 TEST(Catalogue, CellsHaveTheirTiles) {
-  const auto tiles = PlanCatalogue("N46E008\n", 1, 0.5);
+  const auto tiles = PlanCells("N46E008\n", 1, 0.5);
   ASSERT_TRUE(tiles);
   EXPECT_EQ(tiles->size(), 16U) << "level 15 for 21 m from west to east";
   const auto& deepest = tiles->back();

@@ -82,7 +82,7 @@ class SoundServer(unittest.TestCase):
         self.assertEqual(report["summary"]["clients_without_full_view"], 0)
 
     def test_explains_wrong_arguments(self):
-        for options, part in ((["--from", "1,2,3"], "exactly one way"), (["--circle", "1,2,3"], "--circle 1,2,3: give"),
+        for options, part in ((["--from", "1,2,3"], "exactly one path"), (["--circle", "1,2,3"], "--circle 1,2,3: give"),
                               (["--path", "/nowhere"], "cannot be read"), ([*WAY, "--require", "p98=1s"], "p98=1s"),
                               ([*WAY, "--header", "x"], "Name: value")):
             with self.subTest(options=options):

@@ -229,7 +229,7 @@ TEST_F(Limits, ATokensOwnRateHasABurstOfItsOwn) {
   EXPECT_LT(good, 10) << "the burst is twice the token's two a second";
 }
 
-TEST_F(Limits, NamesDatasetsInTroubleToThoseWhoMaySeeThem) {
+TEST_F(Limits, NamesDatasetsWithProblemsToThoseWhoMaySeeThem) {
   ServerOptions options;
   options.config.tokens = {{"everybody", config::TokenHash(kAll), {}, 0}};
   Start(options);

@@ -131,7 +131,7 @@ TEST_F(Replace, DoesNotWaitWhereNobodyOpensItAnew) {
 }
 
 // A source that is replaced again while it is being opened.
-TEST_F(Replace, WaitsOutATroubleThatPasses) {
+TEST_F(Replace, WaitsOutAProblemThatPasses) {
   std::atomic<int> told{0};
   options_.on_source_changed = [&] { ++told; };
   Start(CatalogOf(1, FindsItsSourceChanged()));
@@ -145,7 +145,7 @@ TEST_F(Replace, WaitsOutATroubleThatPasses) {
   reopening.join();
 }
 
-TEST_F(Replace, DoesNotWaitForADatasetInTrouble) {
+TEST_F(Replace, DoesNotWaitForADatasetWithAProblem) {
   std::atomic<int> told{0};
   options_.on_source_changed = [&] { ++told; };
   Start(CatalogOf(1, FindsItsSourceChanged()));

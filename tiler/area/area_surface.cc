@@ -36,7 +36,7 @@ class FlatTriangle {
 
   // The distance of a point from the plane along `up`. At a pole, a triangle can shrink to a line that no vertical
   // meets; then the distance from the line.
-  double Off(geo::Vec3 point, geo::Vec3 up) const {
+  double Distance(geo::Vec3 point, geo::Vec3 up) const {
     const double off = std::abs(geo::Dot(a_ - point, plane_) / geo::Dot(up, plane_));
     if (std::isfinite(off)) return off;
     return std::min(
@@ -112,7 +112,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: as a multiple of the sample's bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
-        const double off = flat.Off(Ecef(column, row, field.At(column, row)), Up(column, row));
+        const double off = flat.Distance(Ecef(column, row, field.At(column, row)), Up(column, row));
         error.max_m = std::max(error.max_m, off);
         const std::size_t k =
             static_cast<std::size_t>(row) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(column);

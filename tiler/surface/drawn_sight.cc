@@ -40,7 +40,7 @@ class Clearances {
     const double vertex = a > 0 ? std::clamp(-b / (2 * a), from, to) : from;
     for (const double s : {from, vertex, to}) {
       const double clearance_m = over.At(s);
-      if (clearance_m < least_) least_ = clearance_m, at_ = share(s);
+      if (clearance_m < min_) min_ = clearance_m, at_ = share(s);
     }
     if (over.At(from) < -dem::kSightTolerance) {
       blocked_at_ = std::min(blocked_at_, share(from));
@@ -57,23 +57,23 @@ class Clearances {
   dem::SightAnswer Answer() const {
     dem::SightAnswer answer;
     answer.has_gaps = has_gaps_;
-    if (std::isinf(least_)) return answer;
-    answer.clearance_m = least_, answer.clearance_at = at_;
+    if (std::isinf(min_)) return answer;
+    answer.clearance_m = min_, answer.clearance_at = at_;
     answer.is_visible = std::isinf(blocked_at_);
     if (!answer.is_visible) answer.blocked_at = blocked_at_;
     return answer;
   }
 
  private:
-  double least_ = std::numeric_limits<double>::infinity(), at_ = 0;
+  double min_ = std::numeric_limits<double>::infinity(), at_ = 0;
   double blocked_at_ = std::numeric_limits<double>::infinity();
   bool has_gaps_ = false;
 };
 
 // Follows rays over the meshes of tiles.
-class Walk {
+class MeshWalk {
  public:
-  Walk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
+  MeshWalk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
       : has_tile_(has_tile), level_(level), options_(options), mesh_of_(mesh_of) {}
 
   Result<dem::SightAnswer> Look(const dem::SightRay& ray, const std::stop_token& stop) {
@@ -217,7 +217,7 @@ Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, in
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,
                                                      const std::stop_token& stop) {
-  Walk walk(has_tile, level, options, mesh_of);
+  MeshWalk walk(has_tile, level, options, mesh_of);
   std::vector<dem::SightAnswer> answers;
   answers.reserve(rays.size());
   for (const dem::SightRay& ray : rays) {

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "archive/files/input_file.h"
-#include "bake/catalogue.h"
+#include "bake/cell_list.h"
 #include "bake/estimate.h"
 #include "bake/place.h"
 #include "engine/core/plain_number.h"
@@ -42,14 +42,14 @@ using Clock = std::chrono::steady_clock;
 int StopCode(const StopSignals& signals) { return 128 + signals.signal(); }
 
 // Only ranges of tiles are made: no raster is opened.
-int PlanFromCatalogue(const BakeArguments& arguments, const bake::BakeRequest& request) {
+int PlanFromCells(const BakeArguments& arguments, const bake::BakeRequest& request) {
   constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 30;
   const Result<std::string> cells = archive::ReadFile(arguments.catalogue, kMaxBytes);
   if (!cells) {
     return cli::Fail(cells.error().message + "; give a file with a cell such as N46E008 on each line", kExitFailure);
   }
   constexpr double kErrorFraction = 0.5;
-  auto tiles = bake::PlanCatalogue(*cells, arguments.arc_seconds, kErrorFraction);
+  auto tiles = bake::PlanCells(*cells, arguments.arc_seconds, kErrorFraction);
   if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
   const int deepest = static_cast<int>(tiles->size()) - 1;
   if (request.levels && (request.levels->first > 0 || request.levels->second > deepest)) {
@@ -375,7 +375,7 @@ int Bake(const BakeArguments& arguments) {
   if (!codings) return Fail(codings.error());
   const auto shard = ShardOf(arguments.shard);
   if (!shard) return Fail(shard.error());
-  if (!arguments.catalogue.empty()) return PlanFromCatalogue(arguments, *request);
+  if (!arguments.catalogue.empty()) return PlanFromCells(arguments, *request);
 
   std::vector<config::ConfigError> errors;
   const auto input = InputOf(arguments, errors);

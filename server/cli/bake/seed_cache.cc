@@ -56,27 +56,27 @@ class SeedWriter final : public archive::TileWriter {
       return MakeError(ErrorCode::kCancelled, "the cache is full");
     }
     seed_.bytes += tile.bytes.size() + kRecordOverheadBytes;
-    ++summary_.tiles;
-    summary_.bytes += tile.bytes.size();
+    ++unit_file_.tiles;
+    unit_file_.bytes += tile.bytes.size();
     seed_.store->Insert(seed_.KeyOf(bake::RequestOf(manifest_, key)), std::make_shared<const tiler::EncodedTile>(tile));
     return {};
   }
 
-  Result<archive::UnitSummary> Finish() override {
+  Result<archive::UnitFile> Finish() override {
     seed_.store->Flush();
     const tiler::StoreStats stats = seed_.store->stats();
     if (!stats.on || stats.dropped != dropped_before_) {
       return MakeError(ErrorCode::kUnavailable,
                        "the cache cannot be written; look at its disk, and run the same command again");
     }
-    return summary_;
+    return unit_file_;
   }
 
  private:
   Seed& seed_;
   const archive::Manifest manifest_;
   const std::uint64_t dropped_before_;
-  archive::UnitSummary summary_;
+  archive::UnitFile unit_file_;
 };
 
 std::uint64_t BytesOfFiles(const std::filesystem::path& folder) {

@@ -82,13 +82,13 @@ void AddFly(CLI::App& app, int& exit_code) {
   CLI::App* fly = app.add_subcommand("fly", "Flies over a served dataset as a client, and reports what it saw");
   fly->group(kCommands);
   fly->footer(
-      "Loads the tiles that cesium-native would load on this way, in real time, and prints a line each second.\n"
+      "Loads the tiles that cesium-native would load on this path, in real time, and prints a line each second.\n"
       "Exit status 1: a requirement of --require failed, or nothing could be loaded. docs/flying.md explains each "
       "number.\n\n"
       "Examples:\n"
       "  terrace fly http://127.0.0.1:8080/maui --circle -156.3,20.75,4500,20000 --report maui.html\n"
       "  terrace fly http://127.0.0.1:8080/alps --from 7.6,45.9,5000 --to 8.1,46.6,5000 --format 3dtiles\n"
-      "  terrace fly https://tiles.example.org/alps --path way.csv --clients 20 --require "
+      "  terrace fly https://tiles.example.org/alps --path path.csv --clients 20 --require "
       "full-view=2s,p99=50ms,holes=0");
   AddFlags(*fly, *arguments);
   fly->callback([arguments, &exit_code] { exit_code = RunFly(*arguments); });

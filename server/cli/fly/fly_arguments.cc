@@ -44,7 +44,7 @@ Result<fly::FlightPath> PathOf(const FlyArguments& arguments) {
   const int ways = !arguments.path.empty() + !arguments.from.empty() + !arguments.circle.empty();
   if (ways != 1 || arguments.from.empty() != arguments.to.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "fly needs exactly one way: --path FILE, --from and --to, or --circle LON,LAT,H,RADIUS");
+                     "fly needs exactly one path: --path FILE, --from and --to, or --circle LON,LAT,H,RADIUS");
   }
   if (!arguments.path.empty()) {
     std::ifstream file(arguments.path, std::ios::binary);
@@ -130,8 +130,8 @@ CLI::Option* AddNumber(CLI::App& command, const char* name, T& value, const char
   return command.add_option(name, value, text)->type_name(type)->check(CLI::Range(low, high).description(""));
 }
 
-void AddWayFlags(CLI::App& command, FlyArguments& a) {
-  const std::string group = "Way";
+void AddPathFlags(CLI::App& command, FlyArguments& a) {
+  const std::string group = "Flight path";
   command
       .add_option("--path", a.path,
                   "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a line; or "
@@ -151,7 +151,7 @@ void AddWayFlags(CLI::App& command, FlyArguments& a) {
       ->capture_default_str()
       ->group(group);
   AddNumber(command, "--duration", a.duration, "S", 0.0, 7 * 86400.0,
-            "Seconds of the flight; default: once along the way, at least 10")
+            "Seconds of the flight; default: once along the path, at least 10")
       ->group(group);
 }
 
@@ -162,7 +162,7 @@ void AddClientFlags(CLI::App& command, FlyArguments& a) {
       ->check(CLI::IsMember({"terrain", "3dtiles"}).description(""))
       ->capture_default_str()
       ->group(group);
-  AddNumber(command, "--clients", a.clients, "N", 1, 1000, "Clients that fly at a time, spread evenly over the way")
+  AddNumber(command, "--clients", a.clients, "N", 1, 1000, "Clients that fly at a time, spread evenly over the path")
       ->capture_default_str()
       ->group(group);
   AddNumber(command, "--sse", a.sse, "PX", 0.5, 1000.0, "Screen error from which a tile is refined")
@@ -218,7 +218,7 @@ void AddFlags(CLI::App& command, FlyArguments& arguments) {
   command.add_option("url", arguments.url, "URL of a dataset, or of its layer.json or tileset.json")
       ->required()
       ->type_name("URL");
-  AddWayFlags(command, arguments);
+  AddPathFlags(command, arguments);
   AddClientFlags(command, arguments);
   AddReportFlags(command, arguments);
 }

@@ -1,67 +1,36 @@
 // terrace serve: datasets from a config file and from the command line, over HTTP.
 #include <fmt/format.h>
-#include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <atomic>
-#include <chrono>
-#include <condition_variable>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <string_view>
-#include <thread>
+#include <system_error>
 #include <utility>
 #include <vector>
 
 #include "config/common/working_directory.h"
 #include "config/config.h"
-#include "config/config_watch.h"
 #include "config/options/options.h"
 #include "config/parse.h"
 #include "engine/gdal/gdal_runtime.h"
-#include "engine/statistics/cache_folder.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/open_baked.h"
-#include "server/cli/common/open_cache.h"
-#include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
-#include "server/cli/common/source_files.h"
 #include "server/cli/serve/check_start.h"
 #include "server/cli/serve/descriptor_plan.h"
-#include "server/cli/serve/first_datasets.h"
 #include "server/cli/serve/log.h"
+#include "server/cli/serve/serve_config.h"
+#include "server/cli/serve/serve_run.h"
 #include "server/cli/serve/service_manager.h"
-#include "server/memory_trimmer.h"
-#include "server/reload/reloader.h"
 #include "server/server.h"
-#include "server/store/baked_store.h"
-#include "server/store/disk_cache.h"
-#include "server/store/shared_cache.h"
-#include "server/tiles/catalog.h"
 #include "tiler/build_id.h"
-#include "tiler/tile_pipeline.h"
 
 namespace terrace::cli {
 namespace {
-
-struct ServeArguments {
-  std::filesystem::path directory;  // the working directory at the start; empty: it has no name
-  std::vector<std::string> dems;
-  std::string config_file, config_path;  // as given; absolute
-  bool print_config = false, check_config = false;
-  std::map<std::string, std::string> server_flags, dataset_flags;  // by option key
-};
 
 int Report(const std::vector<config::ConfigError>& errors, const std::string& file) {
   const bool in_flags = std::ranges::all_of(errors, [](const auto& error) { return error.path.starts_with("--"); });
@@ -72,152 +41,6 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
     std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
   }
   return kExitUsage;
-}
-
-// A file that can be read only once, or endlessly.
-bool IsPipe(const std::string& path) {
-  std::error_code ignored;
-  return std::filesystem::is_other(path, ignored);
-}
-
-// A dataset of an archive alone keeps the name that it was baked under, and so its URLs.
-Result<void> NameArchive(const std::string& place, config::DatasetConfig& dataset) {
-  if (!dataset.baked.empty()) {
-    return MakeError(ErrorCode::kInvalidArgument, "is an archive, and --baked names another; leave one out");
-  }
-  dataset.baked = place;
-  const Result<std::string> name = NameOfBaked(place);
-  if (!name) return tl::unexpected(name.error());
-  if (dataset.name.empty()) dataset.name = config::SanitizeDatasetName(*name);
-  return {};
-}
-
-// The DEMs of the command line are the last datasets of `config`. `dems`: the arguments as written. Each dataset is
-// named after its file, so two may have the same name.
-std::vector<config::ConfigError> FindSameNames(const config::Config& config, const std::vector<std::string>& dems) {
-  const std::size_t configured = config.datasets.size() - dems.size();
-  std::map<std::string_view, std::size_t> first_of;
-  std::vector<config::ConfigError> errors;
-  for (std::size_t i = 0; i < config.datasets.size(); ++i) {
-    const config::DatasetConfig& dataset = config.datasets[i];
-    const auto [first, is_new] = first_of.emplace(dataset.name, i);
-    if (is_new) continue;
-    const std::string& dem = dems[i - configured];
-    if (first->second < configured) {
-      errors.push_back({dem, fmt::format("would be dataset \"{}\", as one of the configuration is; {}", dataset.name,
-                                         dems.size() == 1 ? "give it another name with --name NAME"
-                                                          : "add it to the configuration with a name of its own")});
-    } else if (config.datasets[first->second].sources == dataset.sources) {
-      errors.push_back({dem, "is given twice; leave one out"});
-    } else {
-      errors.push_back({"", fmt::format("{} and {} would both be dataset \"{}\", as DEMs are named after their files; "
-                                        "rename one, or name both in a configuration (--config)",
-                                        dems[first->second - configured], dem, dataset.name)});
-    }
-  }
-  return errors;
-}
-
-// What an argument is that is no DEM: a configuration, a file of an archive, baked tiles; empty for everything else.
-// `path` is `written` as an absolute path.
-std::string ExplainOtherThanDem(const std::string& written, const std::string& path) {
-  const std::filesystem::path place(path);
-  std::error_code ignored;
-  if (place.filename() == "manifest.json" && IsArchive(place.parent_path().string())) {
-    const std::string folder = std::filesystem::path(written).parent_path().string();
-    return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
-                       folder.empty() ? "." : folder);
-  }
-  if (written.ends_with(".json")) {
-    return fmt::format("{} looks like a configuration: terrace serve --config {}", written, written);
-  }
-  for (const auto& [document, tiles] :
-       {std::pair{"layer.json", "0"}, {"tiles.json", "0"}, {"tileset.json", "3dtiles"}}) {
-    if (std::filesystem::exists(place / document, ignored) && std::filesystem::is_directory(place / tiles, ignored)) {
-      return fmt::format(
-          "{} has tiles of 'terrace bake --form folder', which any file server serves: docs/baking.md, \"A static "
-          "host\"; "
-          "terrace serve needs the chunks of a bake without --form",
-          written);
-    }
-  }
-  return {};
-}
-
-// Applies the file's options, then the flags, then adds a dataset per DEM of the command line. Collects all errors.
-config::Config MakeConfig(const ServeArguments& arguments, std::vector<config::ConfigError>& errors) {
-  config::Config config;
-  if (!arguments.config_file.empty()) {
-    config::ConfigResult loaded = config::LoadConfig(arguments.config_path);
-    if (loaded)
-      config = *std::move(loaded);
-    else
-      errors = std::move(loaded).error();
-  }
-  for (const auto& [key, text] : arguments.server_flags) {
-    config::SetServerOption(key, text, arguments.directory, config, errors);
-  }
-  for (const auto& [key, text] : arguments.dataset_flags) {
-    if (!arguments.dems.empty()) break;
-    errors.push_back({config::FlagOf(key),
-                      fmt::format("is for DEMs of the command line, of which there are none; for a dataset of the "
-                                  "configuration write \"{}\" there",
-                                  key)});
-  }
-  if (arguments.dems.size() > 1 && arguments.dataset_flags.contains("name")) {
-    errors.push_back({"--name", "names one dataset; give one DEM, or a config file with a name for each"});
-  }
-  config::DatasetConfig flags;  // checked once, however many DEMs they apply to
-  for (const auto& [key, text] : arguments.dataset_flags) {
-    config::SetDatasetOption(key, text, arguments.directory, flags, errors);
-  }
-  std::vector<std::string> taken;  // the DEMs that became datasets
-  for (const std::string& written : arguments.dems) {
-    if (written.empty()) {
-      errors.push_back({"", "a DEM on the command line has an empty name"});
-      continue;
-    }
-    const std::string dem = config::FromWorkingDirectory(arguments.directory, written);
-    if (std::string other = ExplainOtherThanDem(written, dem); !other.empty()) {
-      errors.push_back({"", std::move(other)});
-      continue;
-    }
-    if (std::filesystem::path(dem).is_relative()) {
-      errors.push_back({written, config::kNoWorkingDirectory});
-      continue;
-    }
-    taken.push_back(written);
-    config::DatasetConfig& dataset = config.datasets.emplace_back(flags);
-    if (IsArchive(dem)) {
-      if (const Result<void> named = NameArchive(dem, dataset); !named) {
-        errors.push_back({written, named.error().message});
-      }
-      continue;
-    }
-    if (dataset.name.empty()) dataset.name = DatasetNameOf(dem);
-    Result<config::SourceConfig> source = config::SourceAt(dem);
-    if (source)
-      dataset.sources = {*std::move(source)};
-    else
-      errors.push_back({written, source.error().message});
-  }
-  if (errors.empty()) errors = FindSameNames(config, taken);
-  if (errors.empty() && config.datasets.empty() && !arguments.print_config) {
-    errors.push_back(
-        {"", arguments.config_file.empty()
-                 ? "there is nothing to serve; name a DEM ('terrace serve dem.tif') or a config file (--config)"
-                 : "there is nothing to serve; it needs an entry in \"datasets\""});
-  }
-  return config;
-}
-
-// The configured datasets that are not among the served ones.
-std::vector<std::string> PendingOf(const config::Config& config, const std::vector<tiler::Dataset>& served) {
-  std::vector<std::string> pending;
-  for (const config::DatasetConfig& wanted : config.datasets) {
-    if (std::ranges::find(served, wanted.name, &tiler::Dataset::name) == served.end()) pending.push_back(wanted.name);
-  }
-  return pending;
 }
 
 // The configuration of the server: with the installed viewer, if the configuration asks for it.
@@ -235,43 +58,6 @@ config::Config WithViewer(config::Config config) {
   return config;
 }
 
-// The time that stopping may take beyond the delay and timeout of the drain.
-constexpr std::chrono::seconds kStopTime{1};
-
-// Limits the time that the process takes to stop. Jobs check their stop tokens, but a read from a dead mount never
-// returns, and its thread cannot be joined.
-class ShutdownWatchdog {
- public:
-  // Ends the process with status 1 after `limit`, whatever its threads do. Call once.
-  void Begin(std::chrono::milliseconds limit) {
-    thread_ = std::jthread([limit](const std::stop_token& stop) {
-      std::mutex mutex;
-      std::unique_lock lock(mutex);
-      std::condition_variable_any().wait_for(lock, stop, limit, [] { return false; });
-      if (stop.stop_requested()) return;
-      spdlog::error(
-          "stopped: threads that still worked {} s after the signal were cut off; look whether a source can be read",
-          std::chrono::duration<double>(limit).count());
-      spdlog::default_logger()->flush();
-      std::_Exit(kExitFailure);
-    });
-  }
-
- private:
-  std::jthread thread_;  // ends with this object
-};
-
-// Signals that the running server handles, except those that end it.
-const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
-
-// `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and threads that it starts.
-void MaskSignals(int how, const std::vector<int>& signals) {
-  sigset_t set;
-  ::sigemptyset(&set);
-  for (const int signal : signals) ::sigaddset(&set, signal);
-  ::pthread_sigmask(how, &set, nullptr);
-}
-
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
   if (const int exit_code = CheckStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
       exit_code != kExitOk)
@@ -281,12 +67,6 @@ int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
       "terrace: the configuration{}{} is fine: {} dataset{}; rasters were not opened, 'terrace info' does that\n",
       arguments.config_file.empty() ? "" : " ", arguments.config_file, count, count == 1 ? "" : "s");
   return FinishOutput(kExitOk);
-}
-
-// Exit code 1, also for kInvalidArgument: the command line was accepted.
-int FailToStart(const Error& error) {
-  std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
-  return kExitFailure;
 }
 
 int Serve(const ServeArguments& arguments) {
@@ -304,13 +84,10 @@ int Serve(const ServeArguments& arguments) {
   if (arguments.check_config) return CheckConfig(arguments, config);
   const Result<std::optional<int>> passed = TakeListenSocket();
   if (!passed) return FailToStart(passed.error());
-  // Until handlers are installed, these signals would end the process; log rotation may send them while sources are
-  // being opened.
-  MaskSignals(SIG_BLOCK, kAnsweredSignals);
-  tiler::BuildId();  // before GDAL or the system's resolver loads further libraries
+  BlockAnsweredSignals();  // log rotation may send them while sources are being opened
+  tiler::BuildId();        // before GDAL or the system's resolver loads further libraries
   server::ServerOptions options;
   options.config = WithViewer(config);
-  options.stop_on_signals = true;
   options.listen_socket = passed->value_or(-1);
   const bool tries_address = !passed->has_value();
   const Result<server::DescriptorBudget> budget = PlanDescriptors(config);
@@ -321,140 +98,11 @@ int Serve(const ServeArguments& arguments) {
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
 
-  ShutdownWatchdog watchdog;  // first, because it limits how long the others take to end
-  Result<server::DiskCache> disk;
-  if (!config.disk_cache.directory.empty()) disk = server::OpenDiskCache(config.disk_cache, budget->store_files);
-  if (!disk) return FailToStart(disk.error());
-  // Archives first: the disk cache then keeps no copies of their tiles.
-  const auto baked = std::make_shared<server::BakedStore>();
-  options.tile_stores.push_back(baked);
-  if (disk->tiles) options.tile_stores.push_back(std::move(disk->tiles));
-  if (!config.shared_cache.url.empty()) {
-    auto shared = server::OpenSharedCache(config.shared_cache, WorkerThreads(config));
-    if (!shared) return FailToStart(shared.error());
-    options.tile_stores.push_back(*std::move(shared));
+  ServeRun run(arguments, config, is_read_once);
+  if (const Result<void> started = run.Start(std::move(options), budget->store_files); !started) {
+    return FailToStart(started.error());
   }
-  options.refinements =
-      std::make_shared<tiler::RefinementCache>(config.refinement_cache_bytes, std::move(disk->refinements));
-  const auto refinements = options.refinements;
-  const dem::RasterCache cache = OpenCache(config);
-  options.cache_problem = [folder = cache.folder] { return folder ? folder->problem() : std::string(); };
-  const auto shares = std::make_shared<PreparedShares>();
-  options.share_done = [shares](const std::string& dataset) { return shares->Of(dataset); };
-  std::unique_ptr<server::Reloader> reloader;  // once there are datasets to watch
-  options.on_source_changed = config.watch ? std::function<void()>([&reloader] { reloader->Look(); }) : nullptr;
-  options.on_signal[SIGHUP] = [&reloader] {
-    NotifyReloading();
-    reloader->Reload();
-  };
-  std::stop_source stop_opening;
-  options.on_stop = [&watchdog, &stop_opening, limit = config.drain_delay + config.drain_timeout + kStopTime] {
-    watchdog.Begin(limit);
-    stop_opening.request_stop();
-    NotifyStopping();
-  };
-  const auto level = std::make_shared<std::atomic<config::LogLevel>>(config.log_level);  // the configured one
-  options.on_signal[SIGUSR1] = [] { SetLogLevel(config::LogLevel::kDebug); };
-  options.on_signal[SIGUSR2] = [level] { SetLogLevel(*level); };
-  // Listens before sources are opened; requests wait meanwhile. Later, those for datasets that are not open get 503.
-  auto started = server::Server::Start(nullptr, options);
-  if (!started) return FailToStart(started.error());
-  const std::unique_ptr<server::Server> server = *std::move(started);
-  NotifyOpening();
-
-  std::optional<FirstDatasets> first = OpenFirstDatasets(config, cache, stop_opening.get_token(), shares);
-  if (stop_opening.stop_requested()) return server->Wait() ? kExitOk : kExitFailure;
-  if (!first) return kExitFailure;
-  baked->Use(first->open);
-  const bool is_complete = first->pending.empty();
-  std::atomic<std::size_t> count = first->open.size(), pending = first->pending.size();
-  const auto catalog_of = [refinements](const std::vector<tiler::Dataset>& served, std::vector<std::string> waiting) {
-    return server::MakeCatalog(std::make_shared<const tiler::TilePipeline>(served, refinements), std::move(waiting));
-  };
-  const auto served_text = [&] {
-    const std::size_t served = count, waiting = pending;
-    return fmt::format("{} dataset{} at {}{}", served, served == 1 ? "" : "s", server->url(),
-                       waiting == 0 ? "" : fmt::format(", {} being prepared", waiting));
-  };
-  // When all datasets of the start are there.
-  const auto announce = [&] {
-    if (cache.folder) cache.folder->Trim();  // not before: what is wanted now stays
-    fmt::print("terrace: serving {}\n", served_text());
-    std::fflush(stdout);
-  };
-  config::ConfigWatch watch(arguments.config_path, [&arguments, config, is_read_once]() -> config::ConfigResult {
-    if (is_read_once) return config;
-    if (IsPipe(arguments.config_path)) {
-      return tl::unexpected(std::vector<config::ConfigError>{{"", "has become a pipe or device; make it a file"}});
-    }
-    std::vector<config::ConfigError> wrong;
-    config::Config loaded = MakeConfig(arguments, wrong);
-    if (!wrong.empty()) return tl::unexpected(std::move(wrong));
-    return loaded;
-  });
-  server::Reloader::Hooks hooks;
-  hooks.load = [&watch] { return watch.Load(); };
-  hooks.may_have_changed = [&watch] { return watch.MayHaveChanged(); };
-  hooks.open = [cache, shares](const config::DatasetConfig& wanted, std::stop_token stop) {
-    shares->Begin(wanted.name);
-    const auto tell = [&](double share) { shares->Raise(wanted.name, share); };
-    return OpenDataset(wanted, cache, TERRACE_VERSION, tell, std::move(stop));
-  };
-  // These belong to the reloader's thread. `is_untouched`: nothing was served yet, and the configuration is the first.
-  bool is_announced = is_complete, is_untouched = first->open.empty();
-  std::atomic<bool> has_failed = false;
-  hooks.publish = [&](const std::vector<tiler::Dataset>& served, const config::Config& now) {
-    if (level->exchange(now.log_level) != now.log_level) SetLogLevel(now.log_level);
-    refinements->SetCapacity(now.refinement_cache_bytes);
-    const std::vector<std::string> waiting = PendingOf(now, served);
-    if (const Result<void> replaced = server->Replace(catalog_of(served, waiting), now); !replaced) {
-      spdlog::error("the new configuration cannot be served: {}", replaced.error().message);
-    } else {
-      count = served.size();
-      pending = waiting.size();
-    }
-    is_untouched = false;
-    baked->Use(served);
-    std::vector<std::uint64_t> generations;
-    for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
-    refinements->Retain(generations);
-    if (!waiting.empty() || std::exchange(is_announced, true)) return;
-    announce();
-    NotifyReady(served_text());
-  };
-  hooks.reloaded = [&] {
-    server->ReopenAccessLog();
-    NotifyReady(served_text());
-  };
-  hooks.tell = [&](const std::map<std::string, std::string>& problems) {
-    server->SetProblems(problems);
-    const bool has_nothing = is_untouched && std::ranges::all_of(config.datasets, [&](const auto& dataset) {
-                               return problems.contains(dataset.name);
-                             });
-    if (!has_nothing) return;
-    for (const auto& [name, problem] : problems) PrintFault(name, problem);
-    has_failed = true;
-    server->RequestStop();
-  };
-  reloader = std::make_unique<server::Reloader>(config, std::move(first->slots), std::move(hooks));
-  if (const Result<void> served = server->Replace(catalog_of(first->open, first->pending), config); !served) {
-    return FailToStart(served.error());
-  }
-  first->open.clear();  // replaced files must not stay open
-  shares->GoToBackground();
-  if (is_complete) {
-    announce();
-  } else {
-    std::fprintf(stderr, "%sterrace: %s answers; being prepared: %s\n", ::isatty(STDERR_FILENO) ? "\r\033[K" : "",
-                 server->url().c_str(), fmt::format("{}", fmt::join(first->pending, ", ")).c_str());
-  }
-  reloader->Start(config.watch);
-  NotifyReady(served_text());
-  MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
-  const server::MemoryTrimmer trimmer;
-  const bool drained = server->Wait();
-  reloader->Stop();
-  return drained && !has_failed ? kExitOk : kExitFailure;
+  return run.ServeDatasets();
 }
 
 }  // namespace
@@ -471,9 +119,8 @@ void AddServe(CLI::App& app, int& exit_code) {
       "Each DEM becomes a dataset named after its file; a folder of DEMs becomes one dataset. An\n"
       "archive of 'terrace bake' becomes the dataset that was baked. Options of\n"
       "the command line override those of the configuration. The server prints one line with its\n"
-      "URL on stdout when all datasets are there; the log goes to stderr. SIGTERM or SIGINT ends the server after "
-      "open\n"
-      "requests are answered; a second signal ends it at once.");
+      "URL on stdout when all datasets are there; the log goes to stderr. SIGTERM or SIGINT ends the\n"
+      "server after open requests are answered; a second signal ends it at once.");
   command->add_option("DEM", arguments->dems,
                       "Rasters that GDAL can read, folders of them, or archives; each is one dataset");
   command->add_option("--config", arguments->config_file, "Configuration in JSON; docs/configuration.md describes it")

@@ -105,7 +105,7 @@ class ReloaderTest : public testing::Test {
       served_.clear();
       for (const tiler::Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
     };
-    hooks.tell = [this](const std::map<std::string, std::string>& problems) {
+    hooks.report = [this](const std::map<std::string, std::string>& problems) {
       const std::lock_guard lock(mutex_);
       problems_ = problems;
     };
@@ -176,7 +176,7 @@ TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {
   EXPECT_EQ(openings_, 0);
 }
 
-TEST_F(ReloaderTest, TellsTroublesAndMendsThem) {
+TEST_F(ReloaderTest, ReportsProblemsAndMendsThem) {
   Start();
   const auto before = Served();
   fails_ = true;
@@ -190,7 +190,7 @@ TEST_F(ReloaderTest, TellsTroublesAndMendsThem) {
   EXPECT_NE(Served(), before);
 }
 
-TEST_F(ReloaderTest, AWrongConfigurationIsATroubleAndNothingElse) {
+TEST_F(ReloaderTest, AWrongConfigurationIsAProblemAndNothingElse) {
   Start();
   const auto before = Served();
   Load(tl::unexpected(std::vector<config::ConfigError>{{"/listen", "is wrong"}, {"/viewer", "too"}}));

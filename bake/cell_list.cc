@@ -1,4 +1,4 @@
-#include "bake/catalogue.h"
+#include "bake/cell_list.h"
 
 #include <algorithm>
 #include <cmath>
@@ -22,7 +22,7 @@ double WidthFactor(double latitude) {
 
 }  // namespace
 
-Result<Pyramid> PlanCatalogue(std::string_view text, double arc_seconds, double error_fraction) {
+Result<Pyramid> PlanCells(std::string_view text, double arc_seconds, double error_fraction) {
   std::vector<dem::PlannedRaster> rasters;
   const double degrees = arc_seconds / 3600;
   std::size_t number = 0;

@@ -1,0 +1,24 @@
+#include "engine/core/escape_html.h"
+
+namespace terrace {
+
+std::string EscapeHtml(std::string_view text, bool quotes) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    if (c == '&') {
+      escaped += "&amp;";
+    } else if (c == '<') {
+      escaped += "&lt;";
+    } else if (c == '>') {
+      escaped += "&gt;";
+    } else if (c == '"' && quotes) {
+      escaped += "&quot;";
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+}  // namespace terrace
