@@ -4,13 +4,15 @@
     tests/load/cold_instructions.py DEM SUFFIX TILES BINARY [BINARY...]     SUFFIX: .terrain or .glb
 
 Each binary serves the DEM with one worker and no caches, and gets requests for the same random tiles of its six deepest levels,
-with a fixed seed. Prints instructions a tile and the ratio to the first binary.
+with a fixed seed. Prints instructions a tile and the ratio to the first binary. A BINARY may have options of `terrace serve` after
+its name: "build/release/server/cli/terrace --edits runway.geojson".
 """
 import http.client
 import json
 import pathlib
 import random
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -23,8 +25,9 @@ WARM_UP = 3  # tiles before the count begins
 def start(binary, dem, profile):
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
+    program, *options = shlex.split(str(binary))
     process = subprocess.Popen(
-        ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", binary, "serve", str(dem),
+        ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", program, "serve", str(dem), *options,
          "--listen", f"127.0.0.1:{port}", "--io-threads", "1", "--worker-threads", "1", "--cache-bytes", "0",
          "--refinement-cache-bytes", "0", "--cache-dir", f"{profile}.cache",
          "--request-deadline-s", "3600", "--log-level", "warn", "--access-log", "off"],

@@ -1,9 +1,9 @@
 // Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
 //
 // Branch and bound: a part of a ray that is higher above the largest height below it than the smallest clearance found
-// so far is skipped; others are halved until they are short. Then the cells along them are compared one by one, and
-// in those that may matter the clearance is a polynomial of the second
-// degree between the lines of the grid, and its minimum is exact.
+// so far is skipped; others are halved until they are short. Then the cells along them are compared one by one, first
+// with their largest corners, then with their surface. In those that may matter the clearance is a polynomial of the
+// second degree between the lines of the grid, and its minimum is exact.
 #pragma once
 
 #include <map>
@@ -70,7 +70,8 @@ class GridSight {
 
   Result<void> Probe(Scan& scan);
   Result<void> Halve(Scan& scan, double first, double last);
-  Result<void> Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size);
+  Result<void> Walk(Scan& scan, const SightBlock& block, const CellRange& cells, double turn, double first, double last,
+                    double size);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);
   void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
