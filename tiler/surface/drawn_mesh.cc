@@ -15,6 +15,15 @@ constexpr int kBoundedLevel = 4;
 
 double SideDegrees(const geo::TileKey& key) { return 180.0 / static_cast<double>(geo::TileRows(key.level)); }
 
+// Of a place in the tile, 0 .. 1.
+int BucketOf(double place, int side) { return std::clamp(static_cast<int>(place * side), 0, side - 1); }
+
+// Tiles: at least the distance from a parallel of any of its chords.
+double ChordAt(const geo::TileKey& key, double latitude) {
+  const double farthest = std::min(89.9, std::abs(latitude) + SideDegrees(key));
+  return geo::ToRadians(SideDegrees(key)) * std::tan(geo::ToRadians(farthest)) / 8;  // side^2 cos sin / 8 over side
+}
+
 }  // namespace
 
 struct DrawnMesh::PlumbLine {
@@ -29,6 +38,11 @@ struct DrawnMesh::Meeting {
   std::uint32_t triangle = 0;
 
   bool is_met() const { return inside >= -kSlack; }
+  void MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line, std::uint32_t other);
+  // The same of all triangles, or of the buckets around a position until no other can be as near. Of triangles that are
+  // not met, those farther than `reach_m` do not matter.
+  void MeetAll(const DrawnMesh& mesh, const PlumbLine& line);
+  void MeetAround(const DrawnMesh& mesh, const PlumbLine& line, const dem::GeoPosition& point, double reach_m);
 };
 
 DrawnMesh::DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles)
@@ -66,7 +80,8 @@ void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
     const auto [south, north] = std::minmax({places[triangle[0]][1], places[triangle[1]][1], places[triangle[2]][1]});
     const double width = east - west, height = north - south;
     const double grown = 1e-6 + std::min(1.0, width * side * (width + height * slope) / 4);
-    return Buckets{BucketOf(west - grown), BucketOf(south - grown), BucketOf(east + grown), BucketOf(north + grown)};
+    return Buckets{BucketOf(west - grown, side_), BucketOf(south - grown, side_), BucketOf(east + grown, side_),
+                   BucketOf(north + grown, side_)};
   };
   const auto entries = [&] {
     std::size_t count = 0;
@@ -104,19 +119,14 @@ std::array<double, 2> DrawnMesh::PlaceOf(const dem::GeoPosition& point) const {
 
 DrawnMesh::Bucket DrawnMesh::BucketAt(const dem::GeoPosition& point) const {
   const auto [u, v] = PlaceOf(point);
-  const int column = BucketOf(u), row = BucketOf(v);
+  const int column = BucketOf(u, side_), row = BucketOf(v, side_);
+  const auto index = static_cast<std::size_t>(row * side_ + column);
   const double side = SideDegrees(key_), step = side / side_;
   const double west = static_cast<double>(key_.x) * side - 180 + column * step;
   const double south = static_cast<double>(key_.y) * side - 90 + row * step;
-  return {west, south, west + step, south + step, TrianglesIn(column, row)};
-}
-
-int DrawnMesh::BucketOf(double place) const { return std::clamp(static_cast<int>(place * side_), 0, side_ - 1); }
-
-std::span<const std::uint32_t> DrawnMesh::TrianglesIn(int column, int row) const {
-  const auto index = static_cast<std::size_t>(row * side_ + column);
-  return std::span<const std::uint32_t>(bucket_triangles_)
-      .subspan(bucket_starts_[index], bucket_starts_[index + 1] - bucket_starts_[index]);
+  const std::span<const std::uint32_t> all(bucket_triangles_);
+  return {west, south, west + step, south + step,
+          all.subspan(bucket_starts_[index], bucket_starts_[index + 1] - bucket_starts_[index])};
 }
 
 DrawnMesh::PlumbLine DrawnMesh::LineAt(const dem::GeoPosition& point) const {
@@ -148,35 +158,6 @@ void DrawnMesh::Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& bes
   if (inside >= -kSlack && inside > best.inside) best = {inside, 0, met->height_m, triangle};
 }
 
-// Of triangles at one distance, as those around a vertex, the first counts.
-void DrawnMesh::MeetOrPass(const PlumbLine& line, std::uint32_t triangle, Meeting& best) const {
-  Meet(line, triangle, best);
-  if (best.is_met()) return;
-  const double distance_m = DistanceOf(line, triangle);
-  if (distance_m > best.distance_m || (distance_m == best.distance_m && triangle >= best.triangle)) return;
-  const std::optional<Crossing> passed = Cross(line, triangle);
-  if (!passed) return;
-  best.distance_m = distance_m, best.height_m = passed->height_m, best.triangle = triangle;
-}
-
-// Of a triangle that the line does not meet, in the plane across the line.
-double DrawnMesh::DistanceOf(const PlumbLine& line, std::uint32_t triangle) const {
-  std::array<geo::Vec3, 3> corners;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const geo::Vec3 from = positions_[triangles_[triangle][k]] - line.start;
-    corners[k] = from - line.up * geo::Dot(from, line.up);
-  }
-  double squared = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < 3; ++k) {
-    const geo::Vec3 start = corners[k], along = corners[(k + 1) % 3] - start;
-    const double length = geo::Dot(along, along);
-    const double share = length > 0 ? std::clamp(-geo::Dot(start, along) / length, 0.0, 1.0) : 0;
-    const geo::Vec3 nearest = start + along * share;
-    squared = std::min(squared, geo::Dot(nearest, nearest));
-  }
-  return std::sqrt(squared);
-}
-
 DrawnPoint DrawnMesh::PointOf(const Meeting& met) const {
   const bool is_beside = !met.is_met();
   if (IsInHole(met.triangle)) {
@@ -195,61 +176,111 @@ std::optional<DrawnPoint> DrawnMesh::AtBucket(const dem::GeoPosition& point) con
   return best.is_met() ? std::optional(PointOf(best)) : std::nullopt;
 }
 
-// Tiles: at least the distance from a parallel of any of its chords.
-double DrawnMesh::ChordAt(const dem::GeoPosition& point) const {
-  const double side = geo::ToRadians(SideDegrees(key_));
-  const double latitude = std::min(89.9, std::abs(point.latitude) + SideDegrees(key_));
-  return side * std::tan(geo::ToRadians(latitude)) / 8;  // side^2 cos sin / 8 over side
+// Whether a point is farther from the tile's northern and southern edge than any chord of these parallels is.
+bool DrawnMesh::IsFarFromParallels(const dem::GeoPosition& point) const {
+  const double v = PlaceOf(point)[1], chord = ChordAt(key_, point.latitude);
+  return v > chord + 1e-6 && v < 1 - chord - 1e-6;
 }
 
-// Goes from the point's bucket outwards. Triangles in no bucket so far lie beyond the square of these.
+namespace {
+
+// From the plumb line to a triangle that it does not meet, in the plane across the line.
+double DistanceTo(const std::array<geo::Vec3, 3>& triangle, const geo::Vec3& on_line, const geo::Vec3& up) {
+  std::array<geo::Vec3, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const geo::Vec3 from = triangle[k] - on_line;
+    corners[k] = from - up * geo::Dot(from, up);
+  }
+  double squared = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const geo::Vec3 start = corners[k], along = corners[(k + 1) % 3] - start;
+    const double length = geo::Dot(along, along);
+    const double share = length > 0 ? std::clamp(-geo::Dot(start, along) / length, 0.0, 1.0) : 0;
+    const geo::Vec3 nearest = start + along * share;
+    squared = std::min(squared, geo::Dot(nearest, nearest));
+  }
+  return std::sqrt(squared);
+}
+
+// A square of buckets around that of a place, `ring` to each side.
+struct Square {
+  int column, row, ring, side;  // `side`: buckets along the tile's edge
+
+  // At least the distance of places beyond it from the plumb line of the place, in metres: meridians are planes, and
+  // the radii of the ellipsoid are at least 6,300 km.
+  double DistanceBeyond(const geo::TileKey& key, const std::array<double, 2>& place, double latitude) const {
+    constexpr double kRadius = 6.3e6;
+    const double radians = geo::ToRadians(SideDegrees(key));
+    double nearest_m = std::numeric_limits<double>::infinity();
+    const auto add = [&](int at, double where, double radius) {
+      const double first = static_cast<double>(at - ring) / side, last = static_cast<double>(at + ring + 1) / side;
+      if (at - ring > 0) nearest_m = std::min(nearest_m, radius * std::sin((where - first) * radians));
+      if (at + ring + 1 < side) nearest_m = std::min(nearest_m, radius * std::sin((last - where) * radians));
+    };
+    add(column, place[0], kRadius * std::cos(geo::ToRadians(latitude)));
+    add(row, place[1], kRadius);
+    return nearest_m;
+  }
+};
+
+}  // namespace
+
+// Of triangles at one distance, as those around a vertex, the first counts.
+void DrawnMesh::Meeting::MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line, std::uint32_t other) {
+  mesh.Meet(line, other, *this);
+  if (is_met()) return;
+  const auto& [a, b, c] = mesh.triangles_[other];
+  const double away_m = DistanceTo({mesh.positions_[a], mesh.positions_[b], mesh.positions_[c]}, line.start, line.up);
+  if (away_m > distance_m || (away_m == distance_m && other >= triangle)) return;
+  const std::optional<Crossing> passed = mesh.Cross(line, other);
+  if (!passed) return;
+  distance_m = away_m, height_m = passed->height_m, triangle = other;
+}
+
+void DrawnMesh::Meeting::MeetAll(const DrawnMesh& mesh, const PlumbLine& line) {
+  for (std::uint32_t t = 0; t < mesh.triangles_.size(); ++t) MeetOrPass(mesh, line, t);
+}
+
+// Triangles in none of the square's buckets lie beyond it.
+void DrawnMesh::Meeting::MeetAround(const DrawnMesh& mesh, const PlumbLine& line, const dem::GeoPosition& point,
+                                    double reach_m) {
+  const std::array<double, 2> place = mesh.PlaceOf(point);
+  Square square{BucketOf(place[0], mesh.side_), BucketOf(place[1], mesh.side_), 0, mesh.side_};
+  const auto visit = [&](int column, int row) {
+    if (column < 0 || row < 0 || column >= mesh.side_ || row >= mesh.side_) return;
+    const auto bucket = static_cast<std::size_t>(row * mesh.side_ + column);
+    for (std::uint32_t i = mesh.bucket_starts_[bucket]; i < mesh.bucket_starts_[bucket + 1]; ++i) {
+      MeetOrPass(mesh, line, mesh.bucket_triangles_[i]);
+    }
+  };
+  visit(square.column, square.row);
+  for (square.ring = 1; square.ring < mesh.side_ && !is_met(); ++square.ring) {
+    const int west = square.column - square.ring, east = square.column + square.ring;
+    const int south = square.row - square.ring, north = square.row + square.ring;
+    for (int column = west; column <= east; ++column) visit(column, south), visit(column, north);
+    for (int row = south + 1; row < north; ++row) visit(west, row), visit(east, row);
+    if (std::min(distance_m, reach_m) < square.DistanceBeyond(mesh.key_, place, point.latitude) / 2) break;
+  }
+}
+
 DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   const PlumbLine line = LineAt(point);
-  const auto [u, v] = PlaceOf(point);
-  const double chord = ChordAt(point);
-  const bool is_far_from_parallels = v > chord + 1e-6 && v < 1 - chord - 1e-6;
-  // What is not drawn farther than this from all triangles is a hole.
+  const bool is_far_from_parallels = IsFarFromParallels(point);
+  // What is farther than this from all triangles is a hole.
   double reach_m = std::numeric_limits<double>::infinity();
-  if (lacks_holes_)
-    reach_m = is_far_from_parallels ? 0 : chord * geo::ToRadians(SideDegrees(key_)) * geo::kSemiMajorAxis;
+  if (lacks_holes_) {
+    const double side_m = geo::ToRadians(SideDegrees(key_)) * geo::kSemiMajorAxis;
+    reach_m = is_far_from_parallels ? 0 : ChordAt(key_, point.latitude) * side_m;
+  }
   Meeting best;
-  const auto visit = [&](int column, int row) {
-    if (column < 0 || row < 0 || column >= side_ || row >= side_) return;
-    for (const std::uint32_t triangle : TrianglesIn(column, row)) MeetOrPass(line, triangle, best);
-  };
   if (key_.level < kBoundedLevel) {
-    for (std::uint32_t t = 0; t < triangles_.size(); ++t) MeetOrPass(line, t, best);
+    best.MeetAll(*this, line);
   } else {
-    const int column = BucketOf(u), row = BucketOf(v);
-    visit(column, row);
-    for (int ring = 1; ring < side_ && !best.is_met(); ++ring) {
-      for (int x = column - ring; x <= column + ring; ++x) visit(x, row - ring), visit(x, row + ring);
-      for (int y = row - ring + 1; y < row + ring; ++y) visit(column - ring, y), visit(column + ring, y);
-      if (std::min(best.distance_m, reach_m) < DistanceBeyond(point, column, row, ring) / 2) break;
-    }
+    best.MeetAround(*this, line, point, reach_m);
   }
   const bool is_drawn = best.is_met() || (best.distance_m <= reach_m && std::isfinite(best.distance_m));
   return is_drawn ? PointOf(best) : DrawnPoint{kNone, {kNone, kNone, kNone}, !is_far_from_parallels};
-}
-
-// At least the distance of places beyond the square of buckets around one of them, in metres, from the plumb line:
-// meridians are planes, and the radii of the ellipsoid are at least 6,300 km.
-double DrawnMesh::DistanceBeyond(const dem::GeoPosition& point, int column, int row, int ring) const {
-  constexpr double kRadius = 6.3e6;
-  const double radians = geo::ToRadians(SideDegrees(key_)), side = side_;
-  const double cosine = std::cos(geo::ToRadians(point.latitude));
-  const auto [u, v] = PlaceOf(point);
-  double nearest_m = std::numeric_limits<double>::infinity();
-  const auto add = [&](int place, double at, double radius) {
-    if (place - ring > 0) nearest_m = std::min(nearest_m, radius * std::sin((at - (place - ring) / side) * radians));
-    if (place + ring + 1 < side_) {
-      nearest_m = std::min(nearest_m, radius * std::sin(((place + ring + 1) / side - at) * radians));
-    }
-  };
-  add(column, u, kRadius * cosine);
-  add(row, v, kRadius);
-  return nearest_m;
 }
 
 }  // namespace terrace::tiler

@@ -38,9 +38,10 @@ class DrawnMesh {
   // Where the plumb line through a position meets a triangle of the position's bucket; nothing if it meets none, which
   // is rare except near the tile's edge. Of several triangles, the one that it meets farthest inside counts.
   std::optional<DrawnPoint> AtBucket(const dem::GeoPosition& point) const;
-  // The same in the buckets around. A plumb line beside the mesh meets the plane of the nearest triangle. Such lines
-  // exist because a tile's northern and southern edges are parallels, and triangles end at chords of them: in the
-  // northern hemisphere they exceed the northern edge, and leave out a strip at the southern one.
+  // The same among all triangles, in time proportional to their number. A plumb line beside the mesh meets the plane of
+  // the nearest triangle. Such lines exist because a tile's northern and southern edges are parallels, and triangles
+  // end at chords of them: in the northern hemisphere they exceed the northern edge, and leave out a strip at the
+  // southern one.
   DrawnPoint Nearest(const dem::GeoPosition& point) const;
 
   // A part of the tile, and the triangles that may lie over it.
@@ -65,17 +66,12 @@ class DrawnMesh {
  private:
   struct Meeting;
   struct PlumbLine;
-  double ChordAt(const dem::GeoPosition& point) const;
+  bool IsFarFromParallels(const dem::GeoPosition& point) const;
   void FillBuckets(const std::vector<std::array<double, 2>>& places);
   std::array<double, 2> PlaceOf(const dem::GeoPosition& point) const;
   PlumbLine LineAt(const dem::GeoPosition& point) const;
   std::optional<Crossing> Cross(const PlumbLine& line, std::uint32_t triangle) const;
   void Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& best) const;
-  void MeetOrPass(const PlumbLine& line, std::uint32_t triangle, Meeting& best) const;
-  double DistanceOf(const PlumbLine& line, std::uint32_t triangle) const;
-  double DistanceBeyond(const dem::GeoPosition& point, int column, int row, int ring) const;
-  int BucketOf(double place) const;  // 0 .. 1 in the tile
-  std::span<const std::uint32_t> TrianglesIn(int column, int row) const;
   DrawnPoint PointOf(const Meeting& met) const;
 
   geo::TileKey key_;

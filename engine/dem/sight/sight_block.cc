@@ -24,7 +24,7 @@ float Larger(float a, float b) { return b > a ? b : a; }  // of a void and a hei
 // SightBlock::largest.
 std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_t width, std::int64_t height) {
   std::vector<float> across(heights.size()), largest(heights.size());
-  const auto lowest = [](float h) { return std::isnan(h) ? -std::numeric_limits<float>::infinity() : h; };
+  const auto lowest = [](float h) { return Larger(-std::numeric_limits<float>::infinity(), h); };
   for (std::int64_t row = 0; row < height; ++row) {
     const float* const from = &heights[static_cast<std::size_t>(row * width)];
     float* const to = &across[static_cast<std::size_t>(row * width)];
@@ -45,7 +45,7 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
-    : window_(source.window), heights_(source.Samples()), owned_(source.Bridged()) {
+    : window_(source.window), heights_(source.Samples()), owned_(source.smooth.empty() ? heights_ : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   relief_ = ReliefOf(heights_);
   // A cell's samples are those of its corners; a raster of one column has cells without width.
