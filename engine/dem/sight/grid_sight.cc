@@ -256,8 +256,9 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRang
   const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
   const double north = static_cast<double>(window.row) + bulge(on_y) + kSlack;
   const double slack_m = bulge(height_m) + kSlack;
-  // The surface is nowhere steeper than the block's relief in a sample.
-  const double beside_m = (bulge(on_x) + bulge(on_y)) * block.relief();
+  // The surface is nowhere steeper than all of its relief in a sample.
+  const double relief_m = grid_.heights().max - grid_.heights().min + 2 * SightBlocks::kMaxUndulation;
+  const double beside_m = (bulge(on_x) + bulge(on_y)) * relief_m;
   const double back_x = bulge(on_x) + kSlack, back_y = bulge(on_y) + kSlack;
   const SampleView samples{block.heights().data(),     window.columns,
                            cells.west - window.column, cells.north - window.row,

@@ -10,15 +10,6 @@ namespace {
 // Metres between positions at which undulations are read.
 constexpr double kUndulationStep = 240;
 
-double ReliefOf(const std::vector<float>& heights) {
-  float least = std::numeric_limits<float>::infinity(), most = -least;
-  for (const float h : heights) {
-    least = h < least ? h : least;
-    most = h > most ? h : most;
-  }
-  return most > least ? static_cast<double>(most) - static_cast<double>(least) : 0;
-}
-
 float Larger(float a, float b) { return b > a ? b : a; }  // of a void and a height: the height
 
 // SightBlock::largest.
@@ -47,7 +38,6 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
     : window_(source.window), heights_(source.Samples()), owned_(source.smooth.empty() ? heights_ : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
-  relief_ = ReliefOf(heights_);
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
   largest_ = LargestOfThree(heights_, width, height);
@@ -64,7 +54,8 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     return has;
   };
   for (const std::vector<float>* const heights : {&heights_, &owned_}) {
-    if (!has_voids(*heights)) continue;
+    // Without a smooth surface both have the same voids.
+    if ((heights == &owned_ && source.smooth.empty()) || !has_voids(*heights)) continue;
     for (std::int64_t y = 0; y < height; ++y) {
       for (std::int64_t x = 0; x < width; ++x) {
         if (!std::isnan((*heights)[static_cast<std::size_t>(y * width + x)])) continue;

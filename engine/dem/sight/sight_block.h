@@ -38,8 +38,6 @@ class SightBlock {
   // By sample, as heights(): the largest height of the 3 x 3 samples from it to the south-east, which are the corners
   // of 2 x 2 cells; voids do not count.
   const std::vector<float>& largest() const { return largest_; }
-  // The largest height less the smallest one; voids do not count.
-  double relief() const { return relief_; }
 
  private:
   struct Level {
@@ -49,7 +47,6 @@ class SightBlock {
 
   GridWindow window_;
   std::vector<float> heights_, owned_, largest_;
-  double relief_ = 0;
   std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
 };
 
