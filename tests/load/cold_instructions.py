@@ -86,7 +86,7 @@ def instructions(binary, dem, suffix, count, tiles):
             process.terminate()
             process.wait()
         totals = [int(found[1]) for file in pathlib.Path(folder).iterdir()
-                  if (found := re.search(r"^totals: (\d+)", file.read_text(errors="replace"), re.M))]
+                  if file.is_file() and (found := re.search(r"^totals: (\d+)", file.read_text(errors="replace"), re.M))]
     return max(totals) / (len(tiles) - WARM_UP), tiles
 
 
