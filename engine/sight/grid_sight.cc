@@ -25,6 +25,52 @@ constexpr int kRimParts = 16;
 
 double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
 
+// The samples of a block, cells among them without voids, and places of a ray over them.
+struct SampleView {
+  const float* heights;
+  std::int64_t stride, west, north, east, south;
+
+  std::int64_t ColumnOf(double x) const { return std::clamp(static_cast<std::int64_t>(x), west, east); }
+  std::int64_t RowOf(double y) const { return std::clamp(static_cast<std::int64_t>(y), north, south); }
+};
+struct RayPlace {
+  double x, y;  // samples from the block's first
+  double height_m;
+};
+
+// At least the clearance of a straight step of less than a sample. In a cell it is a polynomial of the second degree,
+// a t^2 + b t + c for t = 0 .. 1, which lies nowhere more than |a| / 4 below both of its ends; a is the cell's twist
+// times the way on both axes. The surface has no steps between cells, so each place is read in one of the two.
+double LeastClearance(const SampleView& samples, const RayPlace& from, const RayPlace& to) {
+  const double dx = to.x - from.x, dy = to.y - from.y, rise_m = to.height_m - from.height_m;
+  const std::int64_t column = samples.ColumnOf(from.x), row = samples.RowOf(from.y);
+  const std::int64_t to_column = samples.ColumnOf(to.x), to_row = samples.RowOf(to.y);
+  // Where it crosses a line of samples on each axis.
+  const double at_x = to_column == column ? 1 : (static_cast<double>(std::max(column, to_column)) - from.x) / dx;
+  const double at_y = to_row == row ? 1 : (static_cast<double>(std::max(row, to_row)) - from.y) / dy;
+  double least_m = std::numeric_limits<double>::infinity(), before_m = 0, before = -1;
+  const auto add = [&](std::int64_t cell_column, std::int64_t cell_row, double share) {
+    const float* const corner = samples.heights + cell_row * samples.stride + cell_column;
+    const double nw = corner[0], ne = corner[1], sw = corner[samples.stride], se = corner[samples.stride + 1];
+    const double twist = nw - ne - sw + se;
+    const double west = from.x - static_cast<double>(cell_column), north = from.y - static_cast<double>(cell_row);
+    const auto clearance = [&](double t) {
+      const double east_of = west + t * dx, south_of = north + t * dy;
+      return from.height_m + t * rise_m -
+             (nw + east_of * (ne - nw) + south_of * (sw - nw) + east_of * south_of * twist);
+    };
+    if (before < 0) before_m = clearance(0), before = 0;
+    const double after_m = clearance(share), way = share - before;
+    least_m = std::min(least_m, std::min(before_m, after_m) - std::abs(twist * dx * dy) * way * way / 4);
+    before_m = after_m, before = share;
+  };
+  const bool is_x_first = at_x <= at_y;
+  add(column, row, std::min(at_x, at_y));
+  if (before < 1) add(is_x_first ? to_column : column, is_x_first ? row : to_row, std::max(at_x, at_y));
+  if (before < 1) add(to_column, to_row, 1);
+  return least_m;
+}
+
 }  // namespace
 
 // One piece of a ray over the grid. `s`: 0 .. 1 along the piece.
@@ -182,7 +228,8 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   }
   const bool is_between = x.min >= 0 && y.min >= 0 && x.max <= grid_.columns() - 1 && y.max <= grid_.rows() - 1;
   if (within != nullptr && size <= kWalked && !bound.has_voids && is_between && blocks_.includes_undulations()) {
-    return Walk(scan, *within, static_cast<double>(cells.west - west), first, last, size);
+    return Walk(scan, *within, {west, cells.north, east, cells.south}, static_cast<double>(cells.west - west), first,
+                last, size);
   }
   const double length_m = (last - first) * scan.piece.length_m;
   if (size <= kMeasured && (blocks_.includes_undulations() || length_m <= kUndulationPart)) {
@@ -193,9 +240,11 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   return Halve(scan, middle, last);
 }
 
-// Steps of less than a sample lie in 2 x 2 cells. A step is measured unless it is above their largest corner.
-// `turn`: columns of whole turns around the Earth.
-Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size) {
+// Steps of less than a sample lie in 2 x 2 cells. A step is measured unless it is above their largest corner, or above
+// their surface. `cells`: below the part, none with a void, of the turn around the Earth that the block is in; `turn`:
+// columns from it to the part.
+Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRange& cells, double turn, double first,
+                             double last, double size) {
   // With A = |curvature| (last - first)^2, a step is at most (size + A) / count long, and its polynomial at most
   // A / (4 count^2) beside its chord.
   const double curvature = std::max(std::abs(scan.on_grid.x.curvature()), std::abs(scan.on_grid.y.curvature()));
@@ -207,6 +256,14 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, double turn, d
   const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
   const double north = static_cast<double>(window.row) + bulge(on_y) + kSlack;
   const double slack_m = bulge(height_m) + kSlack;
+  // The surface is nowhere steeper than all of its relief in a sample.
+  const double relief_m = grid_.heights().max - grid_.heights().min + 2 * SightBlocks::kMaxUndulation;
+  const double beside_m = (bulge(on_x) + bulge(on_y)) * relief_m;
+  const double back_x = bulge(on_x) + kSlack, back_y = bulge(on_y) + kSlack;
+  const SampleView samples{block.heights().data(),     window.columns,
+                           cells.west - window.column, cells.north - window.row,
+                           cells.east - window.column, cells.south - window.row};
+  const bool has_cells = window.columns > 1 && window.rows > 1;
   const float* const largest = block.largest().data();
   const auto stride = static_cast<std::size_t>(window.columns);
   double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
@@ -217,8 +274,12 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, double turn, d
     const auto column = static_cast<std::size_t>(std::max(std::min(x, next_x), 0.0));
     const auto row = static_cast<std::size_t>(std::max(std::min(y, next_y), 0.0));
     const auto highest = static_cast<double>(largest[row * stride + column]);
-    if (!scan.search.IsSettled(std::min(h, next_h) - highest, scan.ShareOf(s))) {
-      if (const Result<void> done = Measure(scan, s, next); !done) return done;
+    const auto is_settled = [&](double clearance_m) { return scan.search.IsSettled(clearance_m, scan.ShareOf(s)); };
+    if (!is_settled(std::min(h, next_h) - highest)) {
+      const RayPlace from{x + back_x, y + back_y, h}, to{next_x + back_x, next_y + back_y, next_h};
+      if (!has_cells || !is_settled(LeastClearance(samples, from, to) - beside_m)) {
+        if (const Result<void> done = Measure(scan, s, next); !done) return done;
+      }
     }
     s = next, x = next_x, y = next_y, h = next_h;
   }

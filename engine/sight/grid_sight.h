@@ -1,8 +1,9 @@
 // Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
 //
 // Branch and bound. A part of a ray is skipped if its clearance above the largest height below it is not less than the
-// smallest clearance found so far. Other parts are halved until they are short; then the cells along them are compared
-// one by one. Within a cell the clearance is a polynomial of the second degree, so its minimum is exact.
+// smallest clearance found so far. Other parts are halved until they are short. Then the cells along them are compared
+// one by one, first with their largest corners, then with their surface. Within a cell that may have the minimum, the
+// clearance between lines of the grid is a polynomial of the second degree, so its minimum is exact.
 #pragma once
 
 #include <map>
@@ -69,7 +70,8 @@ class GridSight {
 
   Result<void> Probe(Scan& scan);
   Result<void> Halve(Scan& scan, double first, double last);
-  Result<void> Walk(Scan& scan, const SightBlock& block, double turn, double first, double last, double size);
+  Result<void> Walk(Scan& scan, const SightBlock& block, const CellRange& cells, double turn, double first, double last,
+                    double size);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);
   void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,

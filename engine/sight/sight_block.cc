@@ -15,7 +15,7 @@ float Larger(float a, float b) { return b > a ? b : a; }  // of a void and a hei
 // SightBlock::largest.
 std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_t width, std::int64_t height) {
   std::vector<float> across(heights.size()), largest(heights.size());
-  const auto lowest = [](float h) { return std::isnan(h) ? -std::numeric_limits<float>::infinity() : h; };
+  const auto lowest = [](float h) { return Larger(-std::numeric_limits<float>::infinity(), h); };
   for (std::int64_t row = 0; row < height; ++row) {
     const float* const from = &heights[static_cast<std::size_t>(row * width)];
     float* const to = &across[static_cast<std::size_t>(row * width)];
@@ -36,7 +36,7 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
-    : window_(source.window), heights_(source.Samples()), owned_(source.Bridged()) {
+    : window_(source.window), heights_(source.Samples()), owned_(source.smooth.empty() ? heights_ : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
@@ -54,7 +54,8 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     return has;
   };
   for (const std::vector<float>* const heights : {&heights_, &owned_}) {
-    if (!has_voids(*heights)) continue;
+    // Without a smooth surface both have the same voids.
+    if ((heights == &owned_ && source.smooth.empty()) || !has_voids(*heights)) continue;
     for (std::int64_t y = 0; y < height; ++y) {
       for (std::int64_t x = 0; x < width; ++x) {
         if (!std::isnan((*heights)[static_cast<std::size_t>(y * width + x)])) continue;

@@ -37,6 +37,7 @@ class Course {
       : start_(geo::ToEcef(ray.from.longitude, ray.from.latitude, ray.from.height_m)),
         way_(geo::ToEcef(ray.to.longitude, ray.to.latitude, ray.to.height_m) - start_),
         length_m_(geo::Length(way_)) {
+    if (options.refraction == 0) return;
     const SightPoint middle = ToGeodetic(start_ + way_ * 0.5);
     // The Gaussian radius of curvature.
     const double prime = geo::PrimeVerticalRadius(middle.latitude);

@@ -34,6 +34,23 @@ DATASETS = [
      (-156.5, 20.6, -156.2, 20.8), 12, 10),
     ("earth", ["etopo5_global_10min.tif"], {"floor": 0}, (-180, -89, 180, 89), 1, 500),
 ]
+# Edits of the sample: a cliff, a runway with deeper levels, a hole.
+EDITED = ("edited", [str(SOURCE_DIR / "config/samples/jacksboro.tif")], {"edits": ["edits.geojson"]}, (-84.2508, 36.2993, -84.2472, 36.3012), 17, 0.3)
+
+
+def ring(west, south, east, north):
+    return [[[west, south], [east, south], [east, north], [west, north], [west, south]]]
+
+
+def edits():
+    boxes = {"offset": (-84.2498, 36.2999, -84.2480, 36.3006), "precision": (-84.2506, 36.2994, -84.2474, 36.3011),
+             "hole": (-84.2500, 36.2996, -84.2494, 36.3002)}
+    terrain = {"offset": {"metres": 30, "blend_m": 20}, "precision": {"error_m": 0.3, "blend_m": 40}, "hole": {}}
+    return {"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": {"terrain": {"op": op, **terrain[op]}}, "geometry": {"type": "Polygon", "coordinates": ring(*box)}}
+        for op, box in boxes.items()]}
+
+
 A, F = 6378137.0, 1 / 298.257223563
 E2 = F * (2 - F)
 
@@ -189,7 +206,8 @@ class Served(unittest.TestCase):
         cls.folder = pathlib.Path(tempfile.mkdtemp())
         cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
         write_hgt(cls.folder / "N46E007.hgt")
-        cls.datasets = [("hills", None, {}, (7.1, 46.1, 7.4, 46.4), 11, 20)]
+        (cls.folder / "edits.geojson").write_text(json.dumps(edits()))
+        cls.datasets = [("hills", None, {}, (7.1, 46.1, 7.4, 46.4), 11, 20), EDITED]
         if DATA.is_dir():
             cls.datasets += DATASETS
         else:
@@ -240,7 +258,7 @@ class Served(unittest.TestCase):
                 query += "&compression=none" if mesh_format == "glb" else ""
                 body = json.dumps({"locations": "|".join(f"{lat!r},{lon!r}" for lat, lon in points)}).encode()
                 results = json.loads(self.get(f"/{name}/heights?{query}", body))["results"]
-                meshes, worst, beside = {}, 0, 0
+                meshes, worst, beside, in_holes = {}, 0, 0, 0
                 for (latitude, longitude), result in zip(points, results):
                     tile = result["tile"]
                     if tile not in meshes:
@@ -253,6 +271,10 @@ class Served(unittest.TestCase):
                         decoded = decode_glb(data) if mesh_format == "glb" else decode_terrain(data, z, x, y)
                         meshes[tile] = Mesh(*decoded, tile_box)
                     heights = meshes[tile].heights_at(longitude, latitude)
+                    if result["elevation"] is None:
+                        self.assertEqual(heights, [], (latitude, longitude))
+                        in_holes += 1
+                        continue
                     if not heights:
                         beside += 1
                         continue
@@ -261,9 +283,10 @@ class Served(unittest.TestCase):
                     worst = max(worst, difference)
                     self.assertAlmostEqual(math.hypot(*result["normal"]), 1, places=5)
                 print(f"{name} {mesh_format}: {len(points)} points in {len(meshes)} tiles, worst {1000 * worst:.3f} mm, "
-                      f"{beside} beside all triangles")
+                      f"{beside} beside all triangles, {in_holes} in holes, deepest level {max(int(tile.split('/')[0]) for tile in meshes)}")
                 self.assertLess(worst, 1e-3)
                 self.assertLess(beside, POINTS / 100)
+                self.assertEqual(in_holes > POINTS / 100, name == "edited")
 
     def test_terrain(self):
         self.check("terrain")

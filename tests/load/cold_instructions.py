@@ -6,13 +6,15 @@
 --warm: of a tile whose refinement is in memory, because it was requested at an eighth of its default error before.
 
 Each binary serves the DEM with one worker and no caches, and gets requests for the same random tiles of its six deepest levels,
-with a fixed seed. Prints instructions a tile and the ratio to the first binary.
+with a fixed seed. Prints instructions a tile and the ratio to the first binary. A BINARY may have options of `terrace serve` after
+its name: "build/release/server/cli/terrace --edits runway.geojson".
 """
 import http.client
 import json
 import pathlib
 import random
 import re
+import shlex
 import socket
 import subprocess
 import sys
@@ -25,8 +27,9 @@ WARM_UP = 3  # tiles before the count begins
 def start(binary, dem, profile, is_warm):
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
+    program, *options = shlex.split(str(binary))
     process = subprocess.Popen(
-        ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", binary, "serve", str(dem),
+        ["valgrind", "--tool=callgrind", f"--callgrind-out-file={profile}", "--instr-atstart=no", program, "serve", str(dem), *options,
          "--listen", f"127.0.0.1:{port}", "--io-threads", "1", "--worker-threads", "1", "--cache-bytes", "0",
          *([] if is_warm else ["--refinement-cache-bytes", "0"]), "--cache-dir", f"{profile}.cache",
          "--request-deadline-s", "3600", "--log-level", "warn", "--access-log", "off"],
@@ -87,7 +90,7 @@ def instructions(binary, dem, suffix, count, tiles, is_warm):
             process.terminate()
             process.wait()
         totals = [int(found[1]) for file in pathlib.Path(folder).iterdir()
-                  if (found := re.search(r"^totals: (\d+)", file.read_text(errors="replace"), re.M))]
+                  if file.is_file() and (found := re.search(r"^totals: (\d+)", file.read_text(errors="replace"), re.M))]
     return max(totals) / (len(tiles) - WARM_UP), tiles
 
 

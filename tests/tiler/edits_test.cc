@@ -124,39 +124,40 @@ const dem::DemSource& SourceOf(const TilePipeline& pipeline) { return *pipeline.
 
 constexpr std::array kSteps = {-8, 0, 8, 20};
 constexpr std::array kLevels = {9, 11, 12};
+constexpr std::array kMeshes = {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
+                                MeshOptions{tin::Criterion::kDelaunay, true}};
 
-// All common edges of 5 x 5 tiles: positions, heights and normals.
+using TilesByPlace = std::map<std::pair<std::int64_t, std::int64_t>, FetchedTile>;
+
+// Compares all common edges: positions, heights and normals. Returns their number.
+int ExpectEqualEdges(const TilesByPlace& tiles, const std::string& where) {
+  int compared = 0;
+  for (const auto& [at, tile] : tiles) {
+    for (const bool is_east : {true, false}) {
+      const auto next = tiles.find({at.first + (is_east ? 1 : 0), at.second + (is_east ? 0 : 1)});
+      if (next == tiles.end()) continue;
+      EXPECT_EQ(EdgeOf(tile, is_east, 32767), EdgeOf(next->second, is_east, 0)) << where;
+      ++compared;
+    }
+  }
+  return compared;
+}
+
+// Of 5 x 5 tiles.
 TEST_F(Edits, LeaveEdgesOfNeighboursEqual) {
-  const std::array<MeshOptions, 3> meshes = {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
-                                             MeshOptions{tin::Criterion::kDelaunay, true}};
   for (const auto& [kind, feature] : Kinds()) {
-    for (const MeshOptions& mesh : meshes) {
+    for (const MeshOptions& mesh : kMeshes) {
       const TilePipeline pipeline = Open({feature}, mesh);
       for (const int level : kLevels) {
         for (const int step : kSteps) {
-          std::map<std::pair<int, int>, FetchedTile> tiles;
+          TilesByPlace tiles;
           for (int dy = -2; dy <= 2; ++dy) {
             for (int dx = -2; dx <= 2; ++dx) {
               const geo::TileKey key = TileAt(level, dx, dy);
               if (SourceOf(pipeline).IsAvailable(key)) tiles[{dx, dy}] = FetchTile(pipeline, RequestFor(key, step));
             }
           }
-          ASSERT_GE(tiles.size(), 4u);
-          int compared = 0;
-          for (const auto& [at, tile] : tiles) {
-            const auto& [dx, dy] = at;
-            if (const auto east = tiles.find({dx + 1, dy}); east != tiles.end()) {
-              ASSERT_EQ(EdgeOf(tile, true, 32767), EdgeOf(east->second, true, 0))
-                  << kind << " " << level << " " << step;
-              ++compared;
-            }
-            if (const auto north = tiles.find({dx, dy + 1}); north != tiles.end()) {
-              ASSERT_EQ(EdgeOf(tile, false, 32767), EdgeOf(north->second, false, 0))
-                  << kind << " " << level << " " << step;
-              ++compared;
-            }
-          }
-          EXPECT_GE(compared, 4);
+          ASSERT_TRUE(ExpectEqualEdges(tiles, fmt::format("{} {} {}", kind, level, step)) >= 4 && !HasFailure());
         }
       }
     }
@@ -194,8 +195,7 @@ double LeastInFormat(const dem::DemSource& source, const geo::TileKey& key, cons
 
 // The share of nodes of the tile for which the edits ask more, each measured by an independent decoder.
 TEST_F(Edits, KeepThePrecisionAtEverySample) {
-  for (const MeshOptions& mesh : {MeshOptions{}, MeshOptions{tin::Criterion::kDataDependent, false},
-                                  MeshOptions{tin::Criterion::kDelaunay, true}}) {
+  for (const MeshOptions& mesh : kMeshes) {
     for (const char* kind : {"precision", "factor"}) {
       const TilePipeline pipeline = Open({Kinds().at(kind)}, mesh);
       std::size_t limited = 0, exceeded = 0;
@@ -257,7 +257,37 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
   EXPECT_GT(on_edges, 100u);
 }
 
-// Below the deepest level of the sources: edges of neighbours, the precision at every sample, and all four children.
+// Of up to 60 tiles of a level below the sources' deepest: common edges, and the precision at every sample.
+void ExpectEdgesAndPrecision(const TilePipeline& pipeline, int level, int step) {
+  const dem::DemSource& source = SourceOf(pipeline);
+  TilesByPlace tiles;
+  for (const geo::TileRange& range : source.Available(level)) {
+    for (std::int64_t y = range.start_y; y <= range.end_y && tiles.size() < 60; ++y) {
+      for (std::int64_t x = range.start_x; x <= range.end_x; ++x)
+        tiles[{x, y}] = FetchTile(pipeline, RequestFor({level, x, y}, step));
+    }
+  }
+  EXPECT_GE(ExpectEqualEdges(tiles, fmt::format("{} {}", level, step)), 4) << level;
+  std::size_t limited = 0;
+  for (const auto& [at, tile] : tiles) {
+    const geo::TileKey key{level, at.first, at.second};
+    const auto heights = source.Read(key);
+    ASSERT_TRUE(heights.has_value());
+    const dem::MeshDemands demands = source.DemandsOf(key);
+    const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
+    for (std::size_t k = 0; k < demands.caps.size(); ++k) {
+      const auto allowed = static_cast<double>(demands.caps[k]);
+      if (allowed > 0.25) continue;
+      ++limited;
+      EXPECT_LE(errors[k], std::max(allowed, LeastInFormat(source, key, tile, *heights, k)) + 0x1p-11)
+          << geo::ToString(key) << " step " << step;
+    }
+  }
+  EXPECT_GT(limited, 30u) << level;
+}
+
+// Below the deepest level of the sources: edges of neighbours at four errors, with all kinds of meshes, and the
+// precision.
 TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   const std::string small = fmt::format(R"({{"type":"Polygon","coordinates":[[{},{},{},{},{}]]}})",
                                         Position(-0.0011, -0.0004), Position(0.0010, -0.0002), Position(0.0009, 0.0005),
@@ -269,40 +299,11 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   const int finest = SourceOf(plain).max_level(), deepest = source.max_level();
   ASSERT_EQ(source.finest_level(), finest);
   ASSERT_GT(deepest, finest + 1);
-  for (int level = finest + 1; level <= deepest; ++level) {
-    std::map<std::pair<std::int64_t, std::int64_t>, FetchedTile> tiles;
-    for (const geo::TileRange& range : source.Available(level)) {
-      for (std::int64_t y = range.start_y; y <= range.end_y && tiles.size() < 60; ++y) {
-        for (std::int64_t x = range.start_x; x <= range.end_x; ++x)
-          tiles[{x, y}] = FetchTile(pipeline, RequestFor({level, x, y}, 0));
-      }
+  for (const MeshOptions& mesh : kMeshes) {
+    const TilePipeline meshed = Open(features, mesh);
+    for (int level = finest + 1; level <= deepest; ++level) {
+      for (const int step : kSteps) ExpectEdgesAndPrecision(meshed, level, step);
     }
-    int compared = 0;
-    std::size_t limited = 0;
-    for (const auto& [at, tile] : tiles) {
-      if (const auto east = tiles.find({at.first + 1, at.second}); east != tiles.end()) {
-        EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(east->second, true, 0)) << level;
-        ++compared;
-      }
-      if (const auto north = tiles.find({at.first, at.second + 1}); north != tiles.end()) {
-        EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(north->second, false, 0)) << level;
-        ++compared;
-      }
-      const geo::TileKey key{level, at.first, at.second};
-      const auto heights = source.Read(key);
-      ASSERT_TRUE(heights.has_value());
-      const dem::MeshDemands demands = source.DemandsOf(key);
-      const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
-      for (std::size_t k = 0; k < demands.caps.size(); ++k) {
-        const auto allowed = static_cast<double>(demands.caps[k]);
-        if (allowed > 0.25) continue;
-        ++limited;
-        EXPECT_LE(errors[k], std::max(allowed, LeastInFormat(source, key, tile, *heights, k)) + 0x1p-11)
-            << geo::ToString(key);
-      }
-    }
-    EXPECT_GE(compared, 4) << level;
-    EXPECT_GT(limited, 30u) << level;
   }
   // Elsewhere the deepest tiles stay as they are, whatever a request asks for.
   const geo::TileKey beside = TileAt(finest, -4, 3);

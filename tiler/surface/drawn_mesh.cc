@@ -10,8 +10,19 @@ namespace {
 
 // Barycentric coordinates: a point this far outside counts as inside, so that no point falls between two triangles.
 constexpr double kSlack = 1e-9;
+// Tiles of at most 11 degrees: the plumb lines of a tile are nearly parallel.
+constexpr int kBoundedLevel = 4;
 
 double SideDegrees(const geo::TileKey& key) { return 180.0 / static_cast<double>(geo::TileRows(key.level)); }
+
+// Of a place in the tile, 0 .. 1.
+int BucketOf(double place, int side) { return std::clamp(static_cast<int>(place * side), 0, side - 1); }
+
+// Tiles: at least the distance from a parallel of any of its chords.
+double ChordAt(const geo::TileKey& key, double latitude) {
+  const double farthest = std::min(89.9, std::abs(latitude) + SideDegrees(key));
+  return geo::ToRadians(SideDegrees(key)) * std::tan(geo::ToRadians(farthest)) / 8;  // side^2 cos sin / 8 over side
+}
 
 }  // namespace
 
@@ -21,10 +32,17 @@ struct DrawnMesh::PlumbLine {
 
 // The triangle that the line meets farthest inside, or passes nearest by.
 struct DrawnMesh::Meeting {
-  double inside = -std::numeric_limits<double>::infinity();      // the smallest barycentric coordinate
-  double distance_m = -std::numeric_limits<double>::infinity();  // to the nearest edge; negative outside
+  double inside = -std::numeric_limits<double>::infinity();     // the smallest barycentric coordinate
+  double distance_m = std::numeric_limits<double>::infinity();  // across the line; 0 inside
   double height_m = 0;
   std::uint32_t triangle = 0;
+
+  bool is_met() const { return inside >= -kSlack; }
+  void MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line, std::uint32_t other);
+  // The same of all triangles, or of the buckets around a position until no other can be as near. Of triangles that are
+  // not met, those farther than `reach_m` do not matter.
+  void MeetAll(const DrawnMesh& mesh, const PlumbLine& line);
+  void MeetAround(const DrawnMesh& mesh, const PlumbLine& line, const dem::GeoPosition& point, double reach_m);
 };
 
 DrawnMesh::DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles)
@@ -57,13 +75,13 @@ void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
   struct Buckets {
     int west, south, east, north;
   };
-  const auto bucket = [this](double place) { return std::clamp(static_cast<int>(place * side_), 0, side_ - 1); };
   const auto buckets_of = [&](const std::array<std::uint32_t, 3>& triangle) {
     const auto [west, east] = std::minmax({places[triangle[0]][0], places[triangle[1]][0], places[triangle[2]][0]});
     const auto [south, north] = std::minmax({places[triangle[0]][1], places[triangle[1]][1], places[triangle[2]][1]});
     const double width = east - west, height = north - south;
     const double grown = 1e-6 + std::min(1.0, width * side * (width + height * slope) / 4);
-    return Buckets{bucket(west - grown), bucket(south - grown), bucket(east + grown), bucket(north + grown)};
+    return Buckets{BucketOf(west - grown, side_), BucketOf(south - grown, side_), BucketOf(east + grown, side_),
+                   BucketOf(north + grown, side_)};
   };
   const auto entries = [&] {
     std::size_t count = 0;
@@ -101,8 +119,7 @@ std::array<double, 2> DrawnMesh::PlaceOf(const dem::GeoPosition& point) const {
 
 DrawnMesh::Bucket DrawnMesh::BucketAt(const dem::GeoPosition& point) const {
   const auto [u, v] = PlaceOf(point);
-  const auto bucket = [this](double place) { return std::clamp(static_cast<int>(place * side_), 0, side_ - 1); };
-  const int column = bucket(u), row = bucket(v);
+  const int column = BucketOf(u, side_), row = BucketOf(v, side_);
   const auto index = static_cast<std::size_t>(row * side_ + column);
   const double side = SideDegrees(key_), step = side / side_;
   const double west = static_cast<double>(key_.x) * side - 180 + column * step;
@@ -138,20 +155,11 @@ void DrawnMesh::Meet(const PlumbLine& line, std::uint32_t triangle, Meeting& bes
   const std::optional<Crossing> met = Cross(line, triangle);
   if (!met) return;
   const double inside = std::min({met->inside[0], met->inside[1], met->inside[2]});
-  if (inside >= -kSlack) {
-    if (inside > best.inside) best = {inside, 0, met->height_m, triangle};
-    return;
-  }
-  if (best.inside >= -kSlack) return;
-  const auto& [a, b, c] = triangles_[triangle];
-  const geo::Vec3 ab = positions_[b] - positions_[a], ac = positions_[c] - positions_[a];
-  const double longest = std::max({geo::Length(ab), geo::Length(ac), geo::Length(ac - ab)});
-  const double distance_m = inside * geo::Length(geo::Cross(ab, ac)) / longest;
-  if (distance_m > best.distance_m) best = {inside, distance_m, met->height_m, triangle};
+  if (inside >= -kSlack && inside > best.inside) best = {inside, 0, met->height_m, triangle};
 }
 
 DrawnPoint DrawnMesh::PointOf(const Meeting& met) const {
-  const bool is_beside = met.inside < -kSlack;
+  const bool is_beside = !met.is_met();
   if (IsInHole(met.triangle)) {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     return {kNone, {kNone, kNone, kNone}, is_beside};
@@ -165,27 +173,114 @@ std::optional<DrawnPoint> DrawnMesh::AtBucket(const dem::GeoPosition& point) con
   const PlumbLine line = LineAt(point);
   Meeting best;
   for (const std::uint32_t triangle : BucketAt(point).triangles) Meet(line, triangle, best);
-  return best.inside < -kSlack ? std::nullopt : std::optional(PointOf(best));
+  return best.is_met() ? std::optional(PointOf(best)) : std::nullopt;
 }
 
 // Whether a point is farther from the tile's northern and southern edge than any chord of these parallels is.
 bool DrawnMesh::IsFarFromParallels(const dem::GeoPosition& point) const {
-  const double v = PlaceOf(point)[1], side = geo::ToRadians(SideDegrees(key_));
-  const double latitude = std::min(89.9, std::abs(point.latitude) + SideDegrees(key_));
-  const double chord = side * std::tan(geo::ToRadians(latitude)) / 8;  // in tiles: side^2 cos sin / 8 over side
+  const double v = PlaceOf(point)[1], chord = ChordAt(key_, point.latitude);
   return v > chord + 1e-6 && v < 1 - chord - 1e-6;
 }
 
-DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
-  const PlumbLine line = LineAt(point);
-  Meeting best;
-  for (std::uint32_t t = 0; t < triangles_.size(); ++t) Meet(line, t, best);
-  DrawnPoint nearest = PointOf(best);
-  if (lacks_holes_ && nearest.is_beside && IsFarFromParallels(point)) {
-    constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-    return {kNone, {kNone, kNone, kNone}, false};
+namespace {
+
+// From the plumb line to a triangle that it does not meet, in the plane across the line.
+double DistanceTo(const std::array<geo::Vec3, 3>& triangle, const geo::Vec3& on_line, const geo::Vec3& up) {
+  std::array<geo::Vec3, 3> corners;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const geo::Vec3 from = triangle[k] - on_line;
+    corners[k] = from - up * geo::Dot(from, up);
   }
-  return nearest;
+  double squared = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < 3; ++k) {
+    const geo::Vec3 start = corners[k], along = corners[(k + 1) % 3] - start;
+    const double length = geo::Dot(along, along);
+    const double share = length > 0 ? std::clamp(-geo::Dot(start, along) / length, 0.0, 1.0) : 0;
+    const geo::Vec3 nearest = start + along * share;
+    squared = std::min(squared, geo::Dot(nearest, nearest));
+  }
+  return std::sqrt(squared);
+}
+
+// A square of buckets around that of a place, `ring` to each side.
+struct Square {
+  int column, row, ring, side;  // `side`: buckets along the tile's edge
+
+  // At least the distance of places beyond it from the plumb line of the place, in metres: meridians are planes, and
+  // the radii of the ellipsoid are at least 6,300 km.
+  double DistanceBeyond(const geo::TileKey& key, const std::array<double, 2>& place, double latitude) const {
+    constexpr double kRadius = 6.3e6;
+    const double radians = geo::ToRadians(SideDegrees(key));
+    double nearest_m = std::numeric_limits<double>::infinity();
+    const auto add = [&](int at, double where, double radius) {
+      const double first = static_cast<double>(at - ring) / side, last = static_cast<double>(at + ring + 1) / side;
+      if (at - ring > 0) nearest_m = std::min(nearest_m, radius * std::sin((where - first) * radians));
+      if (at + ring + 1 < side) nearest_m = std::min(nearest_m, radius * std::sin((last - where) * radians));
+    };
+    add(column, place[0], kRadius * std::cos(geo::ToRadians(latitude)));
+    add(row, place[1], kRadius);
+    return nearest_m;
+  }
+};
+
+}  // namespace
+
+// Of triangles at one distance, as those around a vertex, the first counts.
+void DrawnMesh::Meeting::MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line, std::uint32_t other) {
+  mesh.Meet(line, other, *this);
+  if (is_met()) return;
+  const auto& [a, b, c] = mesh.triangles_[other];
+  const double away_m = DistanceTo({mesh.positions_[a], mesh.positions_[b], mesh.positions_[c]}, line.start, line.up);
+  if (away_m > distance_m || (away_m == distance_m && other >= triangle)) return;
+  const std::optional<Crossing> passed = mesh.Cross(line, other);
+  if (!passed) return;
+  distance_m = away_m, height_m = passed->height_m, triangle = other;
+}
+
+void DrawnMesh::Meeting::MeetAll(const DrawnMesh& mesh, const PlumbLine& line) {
+  for (std::uint32_t t = 0; t < mesh.triangles_.size(); ++t) MeetOrPass(mesh, line, t);
+}
+
+// Triangles in none of the square's buckets lie beyond it.
+void DrawnMesh::Meeting::MeetAround(const DrawnMesh& mesh, const PlumbLine& line, const dem::GeoPosition& point,
+                                    double reach_m) {
+  const std::array<double, 2> place = mesh.PlaceOf(point);
+  Square square{BucketOf(place[0], mesh.side_), BucketOf(place[1], mesh.side_), 0, mesh.side_};
+  const auto visit = [&](int column, int row) {
+    if (column < 0 || row < 0 || column >= mesh.side_ || row >= mesh.side_) return;
+    const auto bucket = static_cast<std::size_t>(row * mesh.side_ + column);
+    for (std::uint32_t i = mesh.bucket_starts_[bucket]; i < mesh.bucket_starts_[bucket + 1]; ++i) {
+      MeetOrPass(mesh, line, mesh.bucket_triangles_[i]);
+    }
+  };
+  visit(square.column, square.row);
+  for (square.ring = 1; square.ring < mesh.side_ && !is_met(); ++square.ring) {
+    const int west = square.column - square.ring, east = square.column + square.ring;
+    const int south = square.row - square.ring, north = square.row + square.ring;
+    for (int column = west; column <= east; ++column) visit(column, south), visit(column, north);
+    for (int row = south + 1; row < north; ++row) visit(west, row), visit(east, row);
+    if (std::min(distance_m, reach_m) < square.DistanceBeyond(mesh.key_, place, point.latitude) / 2) break;
+  }
+}
+
+DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  const PlumbLine line = LineAt(point);
+  const bool is_far_from_parallels = IsFarFromParallels(point);
+  // What is farther than this from all triangles is a hole.
+  double reach_m = std::numeric_limits<double>::infinity();
+  if (lacks_holes_) {
+    const double side_m = geo::ToRadians(SideDegrees(key_)) * geo::kSemiMajorAxis;
+    reach_m = is_far_from_parallels ? 0 : ChordAt(key_, point.latitude) * side_m;
+  }
+  Meeting best;
+  if (key_.level < kBoundedLevel) {
+    best.MeetAll(*this, line);
+  } else {
+    best.MeetAround(*this, line, point, reach_m);
+  }
+  const bool is_drawn = best.is_met() || (best.distance_m <= reach_m && std::isfinite(best.distance_m));
+  return is_drawn ? PointOf(best) : DrawnPoint{kNone, {kNone, kNone, kNone}, !is_far_from_parallels};
 }
 
 }  // namespace terrace::tiler

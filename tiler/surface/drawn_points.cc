@@ -102,7 +102,7 @@ Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::sp
     if (const Result<void> ready = made(own); !ready) return tl::unexpected(ready.error());
     std::optional<DrawnPoint> drawn = meshes[own]->AtBucket(points[i]);
     if (!drawn) {
-      // All triangles are examined.
+      // On shallow levels all triangles are examined.
       if (stop.stop_requested()) return Stopped();
       drawn = meshes[own]->Nearest(points[i]);
     }

@@ -36,6 +36,7 @@
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/progress.h"
+#include "server/cli/mesh/mesh_area.h"
 #include "server/cli/mesh/mesh_color.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
@@ -100,10 +101,30 @@ struct MeshArguments {
   int threads = 1;
   bool compact = false, json = false;
   ColorArguments color;
+  AreaOptions area;
 };
+
+// Returns what is wrong with the arguments about areas; nothing if they are valid.
+std::string ComplainAboutArea(const MeshArguments& arguments) {
+  if (!arguments.area.IsUsed()) {
+    return IsOfAreas(arguments.coordinates)
+               ? "--coordinates " + arguments.coordinates + " belongs to --edits and --bbox"
+               : "";
+  }
+  const bool is_plain = arguments.max_error > 0 && arguments.criterion != kDataDependent && !arguments.compact &&
+                        arguments.threads == 1 && !arguments.color.IsUsed();
+  if (!is_plain) {
+    return "--edits, --vertical and --bbox make the mesh of a served area, whose one goal is a --max-error above 0; "
+           "leave out --points, --rms, --criterion, --compact, --threads and colours";
+  }
+  if (!arguments.coordinates.empty() && !IsOfAreas(arguments.coordinates))
+    return "--coordinates must be enu, ecef or geographic with --edits, --vertical or --bbox";
+  return {};
+}
 
 // Returns what is wrong with the arguments; nothing if they are valid.
 std::string Complain(const MeshArguments& arguments) {
+  if (std::string about_area = ComplainAboutArea(arguments); !about_area.empty()) return about_area;
   const int goals = (arguments.max_error >= 0) + (arguments.points > 0) + (arguments.rms >= 0);
   if (goals != 1) return "mesh needs exactly one goal: --max-error METRES, --points N or --rms METRES";
   if (arguments.criterion != kDataDependent && (!arguments.measure.empty() || arguments.qthresh >= 0))
@@ -217,6 +238,10 @@ int Mesh(const MeshArguments& arguments) {
   spdlog::set_level(spdlog::level::err);
   if (const std::string complaint = Complain(arguments); !complaint.empty()) return Fail(complaint, kExitUsage);
   if (const auto allowed = dem::AllowVrts(); !allowed) return Fail(allowed.error().message, kExitFailure);
+  if (arguments.area.IsUsed()) {
+    return MeshArea({arguments.dem, arguments.nodata, arguments.out, arguments.coordinates, arguments.max_error,
+                     arguments.area, arguments.json});
+  }
   if (arguments.color.IsUsed()) {
     tin::ExtendedGoal goal;
     if (arguments.max_error >= 0) goal.max_error = arguments.max_error;
@@ -297,6 +322,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       "  terrace mesh alps.tif --out alps.obj --max-error 5\n"
       "  terrace mesh alps.tif --out alps.glb --points 50000 --json\n"
       "  terrace mesh alps.tif --out alps.glb --max-error 10 --color photo.tif\n"
+      "  terrace mesh alps.tif --out alps.glb --max-error 1 --edits runway.geojson --bbox 8.2,46.2,8.3,46.3\n"
       "  terrace mesh photo.png --image --out photo.glb --points 4000\n\n"
       "The printed errors are measured at every valid sample of the finished mesh. Voids do not count;\n"
       "triangles span them, and their number is printed. Triangles are counter-clockwise in the x and y\n"
@@ -321,9 +347,10 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command
       ->add_option("--coordinates", arguments->coordinates,
                    "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS; "
-                   "by default crs if the raster has one")
-      ->check(OneOf({"pixel", "crs"}))
-      ->type_name("pixel|crs");
+                   "by default crs if the raster has one. With --edits or --bbox: enu, metres east, north and up of "
+                   "the middle; ecef; geographic, degrees and metres")
+      ->check(OneOf({"pixel", "crs", "enu", "ecef", "geographic"}))
+      ->type_name("NAME");
   AddCriterionOptions(*command, *arguments);
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh is the same with any number")
       ->check(NumberFrom(1, 256, "a number from 1 to 256"))
@@ -332,6 +359,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
   command->add_flag("--compact", arguments->compact,
                     "Drops vertices that the error bound does not need; with --max-error only");
   AddColorOptions(*command, arguments->color);
+  AddAreaOptions(*command, arguments->area);
   command->add_flag("--json", arguments->json, "Prints the statistics as JSON");
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Mesh(*arguments)); });
 }

@@ -30,6 +30,11 @@ Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
   return written ? file_.Commit() : written;
 }
 
+Result<void> MeshOutput::Write(const std::string& bytes) {
+  file_.stream() << bytes;
+  return file_.Commit();
+}
+
 std::string TextOfVoids(std::size_t voids) {
   return voids == 0 ? "" : fmt::format(" and across {} void{}", voids, voids == 1 ? "" : "s");
 }

@@ -25,6 +25,8 @@ class MeshOutput {
   Result<void> Write(std::vector<proto::MeshVertex> vertices,
                      const std::vector<std::array<std::uint32_t, 3>>& triangles, const proto::GridPlacement& placement,
                      const std::vector<proto::VertexColor>& colors = {});
+  // The same of a file that was encoded before.
+  Result<void> Write(const std::string& bytes);
 
  private:
   MeshOutput(proto::MeshFileFormat format, OutputFile file) : format_(format), file_(std::move(file)) {}

@@ -2,11 +2,14 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <random>
 #include <string>
 #include <utility>
 #include <vector>
@@ -158,6 +161,122 @@ TEST(DrawnMesh, KeepsBucketsSmall) {
   }
   const DrawnMesh mesh({0, 0, 0}, std::move(drawn));
   EXPECT_LT(mesh.bytes(), kTriangles * 200u);
+}
+
+// Triangles of a rough grid over a tile; `keeps` says which of its cells have theirs.
+template <typename Keeps>
+DrawnTriangles RoughGrid(const geo::TileKey& key, const Keeps& keeps) {
+  constexpr int kCells = 40;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> height(0, 400), shift(-0.2, 0.2);
+  const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
+  DrawnTriangles drawn;
+  for (int row = 0; row <= kCells; ++row) {
+    for (int column = 0; column <= kCells; ++column) {
+      const bool is_rim = row % kCells == 0 || column % kCells == 0;
+      const double u = (column + (is_rim ? 0 : shift(random))) / kCells;
+      const double v = (row + (is_rim ? 0 : shift(random))) / kCells;
+      drawn.positions.push_back(geo::ToEcef((static_cast<double>(key.x) + u) * side - 180,
+                                            (static_cast<double>(key.y) + v) * side - 90, height(random)));
+      drawn.places.push_back({u, v});
+      if (row == kCells || column == kCells || !keeps(column, row)) continue;
+      const auto at = static_cast<std::uint32_t>(row * (kCells + 1) + column);
+      drawn.triangles.push_back({at, at + 1, at + kCells + 2});
+      drawn.triangles.push_back({at, at + kCells + 2, at + kCells + 1});
+    }
+  }
+  return drawn;
+}
+
+// Distance and height of the plane of a triangle, in the plane of east and north at a point.
+struct Flat {
+  double distance_m, height_m;
+};
+Flat FlatAt(const dem::GeoPosition& point, const std::array<geo::Vec3, 3>& corners) {
+  const geo::Vec3 start = geo::ToEcef(point.longitude, point.latitude, 0);
+  const geo::Vec3 up = geo::SurfaceNormal(point.longitude, point.latitude),
+                  meridian = geo::SurfaceNormal(point.longitude, 0);
+  const geo::Vec3 east{-meridian.y, meridian.x, 0}, north = geo::Cross(up, east);
+  std::array<std::array<double, 3>, 3> at{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const geo::Vec3 d = corners[k] - start;
+    at[k] = {geo::Dot(d, east), geo::Dot(d, north), geo::Dot(d, up)};
+  }
+  double distance_m = std::numeric_limits<double>::infinity(), area = 0, height_m = 0;
+  bool is_inside = true;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto& [x, y, z] = at[k];
+    const auto& [x2, y2, z2] = at[(k + 1) % 3];
+    const double part = x * y2 - x2 * y;  // of the triangle with the third corner at the point
+    is_inside &= part >= 0;
+    area += part, height_m += part * at[(k + 2) % 3][2];
+    const auto distance_at = [&, x = x, y = y, x2 = x2, y2 = y2](double share) {
+      return std::hypot(x + share * (x2 - x), y + share * (y2 - y));
+    };
+    double low = 0, high = 1;  // of the nearest place of the side
+    for (int step = 0; step < 60; ++step) {
+      const double a = low + (high - low) / 3, b = high - (high - low) / 3;
+      if (distance_at(a) < distance_at(b)) {
+        high = b;
+      } else {
+        low = a;
+      }
+    }
+    distance_m = std::min(distance_m, distance_at(low));
+  }
+  return {is_inside ? 0 : distance_m, height_m / area};
+}
+
+TEST(DrawnMesh, FindsTheNearestTriangle) {
+  const geo::TileKey key{12, 1090, 2870};
+  const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
+  const DrawnTriangles drawn =
+      RoughGrid(key, [](int column, int row) { return (column / 3 * 7 + row / 2 * 5) % 4 == 0; });
+  const DrawnMesh mesh(key, drawn);
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> place(0, 1);
+  std::size_t beside = 0;
+  for (int i = 0; i < 60; ++i) {
+    const dem::GeoPosition point{(static_cast<double>(key.x) + place(random)) * side - 180,
+                                 (static_cast<double>(key.y) + place(random)) * side - 90};
+    std::vector<Flat> flats;
+    double nearest_m = std::numeric_limits<double>::infinity();
+    for (const auto& [a, b, c] : drawn.triangles) {
+      flats.push_back(FlatAt(point, {drawn.positions[a], drawn.positions[b], drawn.positions[c]}));
+      nearest_m = std::min(nearest_m, flats.back().distance_m);
+    }
+    const DrawnPoint found = mesh.Nearest(point);
+    EXPECT_EQ(found.is_beside, nearest_m > 0) << i;
+    beside += found.is_beside ? 1 : 0;
+    // Of triangles around one vertex any is the nearest.
+    const bool is_nearest = std::any_of(flats.begin(), flats.end(), [&](const Flat& flat) {
+      return flat.distance_m <= nearest_m + 1e-5 && std::abs(flat.height_m - found.height_m) < 1e-6;
+    });
+    EXPECT_TRUE(is_nearest) << i << ": " << found.height_m << " m";
+  }
+  EXPECT_GT(beside, 20u);
+  EXPECT_LT(beside, 55u);
+}
+
+// As DrawnByBytes makes them of tiles of archives, whose triangles in holes are not stored.
+TEST(DrawnMesh, IsAHoleWhereNoTriangleIsNear) {
+  const geo::TileKey key{12, 1090, 2870};
+  const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
+  const auto at = [&](double u, double v) {
+    return dem::GeoPosition{(static_cast<double>(key.x) + u) * side - 180,
+                            (static_cast<double>(key.y) + v) * side - 90};
+  };
+  DrawnTriangles half = RoughGrid(key, [](int, int row) { return row >= 20; }), none;
+  half.lacks_holes = none.lacks_holes = true;
+  const DrawnMesh northern(key, std::move(half)), empty(key, std::move(none));
+  EXPECT_FALSE(std::isnan(northern.Nearest(at(0.3, 0.9)).height_m));
+  for (const DrawnMesh* mesh : {&northern, &empty}) {
+    for (const double v : {0.0, 1e-7, 0.2}) {
+      const DrawnPoint point = mesh->Nearest(at(0.3, v));
+      EXPECT_TRUE(std::isnan(point.height_m) && std::isnan(point.normal.x)) << v;
+      EXPECT_EQ(point.is_beside, v < 0.1) << v;  // the tile to the south may have a triangle there
+    }
+  }
 }
 
 }  // namespace
