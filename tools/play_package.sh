@@ -1,14 +1,13 @@
 #!/usr/bin/env bash
 # Installs the Debian package in a bare Debian 12, runs it as its unit does, upgrades, removes and purges it, and prints what stays.
 #
-#   tools/play_package.sh BASE FOLDER DEB [--browser]     as root
+#   tools/play_package.sh BASE FOLDER DEB     as root
 #       BASE: a tar of a debootstrap root with package sources. FOLDER: where it is unpacked, below which all happens; it is emptied.
-#       --browser: tests/e2e/viewer_test.mjs looks at the page of the installed server, too
 #
 # Port 8080 must be free. systemd does not run there: the command of ExecStart is started as the unit's user.
 set -euo pipefail
 export LC_ALL=C
-base=$(realpath "$1") deb=$(realpath "$3") tools=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+base=$(realpath "$1") deb=$(realpath "$3")
 mkdir -p "$2"
 folder=$(realpath "$2") root=$(realpath "$2")/root server=""
 die() { echo "play_package: $*" >&2; exit 1; }
@@ -59,7 +58,6 @@ done
 for path in /readyz / /earth/layer.json /earth/0/0/0.terrain /jacksboro/9/272/359.terrain; do
   curl -sf -o /dev/null -w "  %{http_code} %{size_download} bytes %{content_type} $path\n" "http://127.0.0.1:8080$path" || { cat "$folder/server.log" >&2; die "$path failed"; }
 done
-if [[ ${4:-} == --browser ]]; then TERRACE_URL=http://127.0.0.1:8080 node --test "$tools/../tests/e2e/viewer_test.mjs" | grep -E '^# (pass|fail)'; fi
 kill -TERM "$(pgrep -P "$(pgrep -P "$server")")"  # the child of unshare
 code=0
 wait "$server" || code=$?
