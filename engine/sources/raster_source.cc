@@ -337,7 +337,7 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
                                                   statistics.table.Coarse(kMaxCoarse),
                                                   !statistics.coarse.grids.empty(),
                                                   std::move(prepared.cache_file),
-                                                  std::move(prepared.shape),
+                                                  std::move(prepared.key),
                                                   {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
 }
 
@@ -352,12 +352,12 @@ StatisticsPages::Statistics RasterSource::statistics() const {
 }
 
 Result<RasterStatistics> RasterSource::ReadStatistics() const {
-  if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
+  if (auto known = LoadStatistics(paging_->cache_file, paging_->key)) return std::move(known->statistics);
   LogSource(SourceLog::Level::kWarn, info_.path, "{} is gone or damaged; the source is prepared anew",
             paging_->cache_file);
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
-  auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
+  auto prepared = PrepareRaster(**handle, paging_->key.layout, info_.path, files(), paging_->prepare);
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!prepared) return tl::unexpected(prepared.error());
   // The next time would cost as much.

@@ -138,7 +138,7 @@ class RasterSource {
     RangeTable ranges;  // of coarse blocks
     bool has_coarse_averages;
     std::string cache_file;
-    StatisticsShape shape;
+    StatisticsKey key;
     PrepareOptions prepare;
   };
   std::unique_ptr<const Paging> paging_;
