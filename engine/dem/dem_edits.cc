@@ -229,7 +229,7 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
   return heights;
 }
 
-// Where there is no height, an edit whose share is 1 makes one, but above the ellipsoid alone.
+// Where there is no height, an edit whose weight is 1 makes one, but above the ellipsoid alone.
 Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                          std::span<float> heights, const std::stop_token& stop) const {
   std::vector<std::size_t> edited;
