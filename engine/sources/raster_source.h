@@ -115,6 +115,12 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
+  // Steps of Open, in this order.
+  Result<void> FindLayout(GDALDataset& dataset, const std::string& path, const SourceOptions& options);
+  Result<PreparedRaster> Prepare(GDALDataset& dataset, const std::string& path, const PrepareOptions& options,
+                                 std::string& overviews_unused);
+  void FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared);
+  void LogOpened(GDALDataset& dataset, bool has_ragged_voids) const;
   void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
   Result<RasterStatistics> ReadStatistics() const;
   void LoseCache(const Error& error) const;
