@@ -39,6 +39,16 @@ int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
   return MercatorFactor(grid.depth, spacing);
 }
 
+void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, GridTrace& trace) {
+  if (std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
+    trace.heights.assign(heights.begin(), heights.end());
+    return;
+  }
+  for (std::size_t n = 0; n < wanted.size(); ++n) {
+    trace.heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
+  }
+}
+
 // Rows from each sample to the nearest void in its column, at most `most` + 1. One void row lies above and below all.
 std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t columns, std::int64_t rows, int most) {
   std::vector<int> steps(heights.size());
@@ -390,13 +400,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   };
   if (!has_holes && weights.empty()) {
     FillRows(samples, window, cells, wanted, undulations, heights);
-    if (trace != nullptr && std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
-      trace->heights.assign(heights.begin(), heights.end());
-    } else if (trace != nullptr) {
-      for (std::size_t n = 0; n < wanted.size(); ++n) {
-        trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
-      }
-    }
+    if (trace != nullptr) TraceWanted(heights, wanted, *trace);
   } else {
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;
