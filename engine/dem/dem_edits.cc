@@ -344,9 +344,9 @@ std::optional<std::uint64_t> DemSource::Impl::KnownHash(const HashKey& key) cons
 }
 
 void DemSource::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
-  constexpr std::size_t kMost = std::size_t{1} << 18;
+  constexpr std::size_t kMaxHashes = std::size_t{1} << 18;
   const std::lock_guard lock(hashes_mutex);
-  if (hashes.size() >= kMost) hashes.clear();
+  if (hashes.size() >= kMaxHashes) hashes.clear();
   hashes.emplace(key, hash);
 }
 

@@ -266,8 +266,8 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   info_ = Describe(dataset, path, georeference_, layout_);
   info_.needs_averages = NeedsAverages(layout_);
   info_.is_in_folder = averages_ != nullptr;
-  if (averages_) info_.least_kept_factor = averages_->least_factor();
-  if (memory_averages_) info_.least_kept_factor = memory_averages_->least_factor();
+  if (averages_) info_.min_kept_factor = averages_->min_factor();
+  if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
   info_.found_voids = prepared.detected.text;
   info_.datum_in_use = vertical_.name;
   if (vertical_.geoid) info_.vertical_operation = vertical_.geoid->description();
@@ -316,7 +316,7 @@ void StatisticsPages::Add(const void* raster, Statistics statistics) {
   pages_.push_front({raster, std::move(statistics), bytes});
   by_raster_.emplace(raster, pages_.begin());
   paged_ += bytes;
-  while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
+  while (paged_ > max_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
 }
 
 void StatisticsPages::Forget(const void* raster) {

@@ -37,7 +37,7 @@ class StatisticsPages {
  public:
   using Statistics = std::shared_ptr<const RasterStatistics>;
 
-  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), most_paged_(paged_bytes) {}
+  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), max_paged_(paged_bytes) {}
 
   // Whether statistics of this size fit the first budget. If so, they are charged to it.
   bool Admit(std::size_t bytes);
@@ -59,7 +59,7 @@ class StatisticsPages {
 
   mutable std::mutex mutex_;
   std::size_t kept_left_;  // guarded by mutex_, as are these
-  const std::size_t most_paged_;
+  const std::size_t max_paged_;
   std::size_t paged_ = 0;
   std::list<Page> pages_;  // most recently used first
   std::unordered_map<const void*, std::list<Page>::iterator> by_raster_;
