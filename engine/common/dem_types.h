@@ -140,7 +140,7 @@ struct RasterInfo {
   std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
   std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;   // large, and without overviews
-  int least_kept_factor = 0;     // smallest factor of stored averages; 0: none
+  int min_kept_factor = 0;       // smallest factor of stored averages; 0: none
   bool is_in_folder = false;     // averages are in the statistics cache; false: in memory
   double seconds_to_open = 0;
 };

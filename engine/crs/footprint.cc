@@ -85,8 +85,8 @@ GeoBounds Footprint::Bounds() const { return {west, south, east > 180 ? east - 3
 Footprint Footprint::Padded() const {
   // Between two points of the outline, the edge deviates by less than a 64th of its chord, which is a 4096th of the
   // side.
-  constexpr double kShare = 0.01, kLeast = 1e-6;
-  const double x = (east - west) * kShare + kLeast, y = (north - south) * kShare + kLeast;
+  constexpr double kShare = 0.01, kMinMargin = 1e-6;
+  const double x = (east - west) * kShare + kMinMargin, y = (north - south) * kShare + kMinMargin;
   return Normalized({west - x, south - y, east + x, north + y});
 }
 

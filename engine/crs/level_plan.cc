@@ -98,8 +98,8 @@ double SamplesPerCell(const geo::Lattice& lattice, const SourceSpacing& spacing)
 }
 
 int AveragingFactor(double samples_per_cell) {
-  constexpr int kMost = 22;  // one block then contains the largest raster (raster_file.cc, kMaxSide)
-  return 1 << std::clamp(geo::NearestOctave(samples_per_cell), 0, kMost);
+  constexpr int kMaxOctave = 22;  // one block then contains the largest raster (raster_file.cc, kMaxSide)
+  return 1 << std::clamp(geo::NearestOctave(samples_per_cell), 0, kMaxOctave);
 }
 
 std::vector<geo::Lattice> PlanLattices(const SourceSpacing& finest, int max_level) {

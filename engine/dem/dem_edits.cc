@@ -66,6 +66,63 @@ std::optional<double> FlatHeightOf(FlatHeight kind, std::vector<float> heights) 
 
 }  // namespace
 
+Result<std::string> DemSource::Impl::ResolveEdit(Edit& edit, const DemOptions& options,
+                                                 std::map<std::string, std::size_t>& opened) {
+  if (!Meets(edit.reach, info.bounds)) {
+    const bool is_swapped = Meets(Swapped(edit.reach), info.bounds);
+    return fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}", info.bounds.south,
+                       info.bounds.north, info.bounds.west, info.bounds.east,
+                       is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "");
+  }
+  if (edit.datum == EditDatum::kOrthometric) {
+    if (auto wrong = AddUndulations(edit); !wrong || !wrong->empty()) return wrong;
+  }
+  if (edit.op == EditOp::kFlatten && edit.flat != FlatHeight::kGiven) return AddFlatHeight(edit, options.stop);
+  if (edit.op == EditOp::kReplace) return OpenReplacement(edit, options, opened);
+  return std::string();
+}
+
+Result<std::string> DemSource::Impl::AddFlatHeight(Edit& edit, const std::stop_token& stop) const {
+  const std::vector<GeoPosition> inside = PositionsInside(edit);
+  auto heights = PointsUnedited(inside, HeightDatum::kEllipsoid, stop);
+  if (!heights) return tl::unexpected(std::move(heights).error());
+  for (std::size_t k = 0; k < inside.size() && edit.undulations != nullptr; ++k) {
+    const PlanPoint at{edit.plane.X(inside[k].longitude), edit.plane.Y(inside[k].latitude)};
+    (*heights)[k] -= static_cast<float>(edit.undulations->At(at));
+  }
+  const auto height = FlatHeightOf(edit.flat, *std::move(heights));
+  if (!height) return "there are no heights inside it to take the mean or median of; give a height";
+  edit.height_m = *height;
+  Complete(edit);
+  return std::string();
+}
+
+Result<std::string> DemSource::Impl::OpenReplacement(Edit& edit, const DemOptions& options,
+                                                     std::map<std::string, std::size_t>& opened) {
+  const auto [known, is_new] = opened.emplace(edit.source, replacements.size());
+  if (is_new) {
+    DemOptions of_replacement;
+    of_replacement.source = options.source;
+    of_replacement.cache = options.cache;
+    of_replacement.stop = options.stop;
+    auto source = DemSource::Open(edit.source, of_replacement);
+    if (!source) {
+      opened.erase(known);
+      return fmt::format("its source: {}", source.error().message);
+    }
+    replacements.push_back(*std::move(source));
+  }
+  edit.replacement = known->second;
+  const DemSource& source = *replacements[edit.replacement];
+  edit.low_m = source.info().heights.min;
+  edit.high_m = source.info().heights.max;
+  ContentHasher hasher;
+  hasher.Add(edit.hash);
+  hasher.Add(source.fingerprint());
+  edit.hash = hasher.Hash();
+  return std::string();
+}
+
 // Faults are collected: of files, of features, and of features and the sources together.
 Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
   unedited_fingerprint = fingerprint;
@@ -78,62 +135,9 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
   std::map<std::string, std::size_t> opened;
   for (Edit& edit : read) {
     if (options.stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
-    if (!Meets(edit.reach, info.bounds)) {
-      const bool is_swapped = Meets(Swapped(edit.reach), info.bounds);
-      faults.push_back(
-          FaultOf(edit, fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}",
-                                    info.bounds.south, info.bounds.north, info.bounds.west, info.bounds.east,
-                                    is_swapped ? "; are the axes swapped? GeoJSON has [longitude, latitude]" : "")));
-      continue;
-    }
-    if (edit.datum == EditDatum::kOrthometric) {
-      auto wrong = AddUndulations(edit);
-      if (!wrong) return tl::unexpected(std::move(wrong).error());
-      if (!wrong->empty()) {
-        faults.push_back(FaultOf(edit, *std::move(wrong)));
-        continue;
-      }
-    }
-    if (edit.op == EditOp::kFlatten && edit.flat != FlatHeight::kGiven) {
-      const std::vector<GeoPosition> inside = PositionsInside(edit);
-      auto heights = PointsUnedited(inside, HeightDatum::kEllipsoid, options.stop);
-      if (!heights) return tl::unexpected(std::move(heights).error());
-      for (std::size_t k = 0; k < inside.size() && edit.undulations != nullptr; ++k) {
-        const PlanPoint at{edit.plane.X(inside[k].longitude), edit.plane.Y(inside[k].latitude)};
-        (*heights)[k] -= static_cast<float>(edit.undulations->At(at));
-      }
-      const auto height = FlatHeightOf(edit.flat, *std::move(heights));
-      if (!height) {
-        faults.push_back(FaultOf(edit, "there are no heights inside it to take the mean or median of; give a height"));
-        continue;
-      }
-      edit.height_m = *height;
-      Complete(edit);
-    }
-    if (edit.op == EditOp::kReplace) {
-      const auto [known, is_new] = opened.emplace(edit.source, replacements.size());
-      if (is_new) {
-        DemOptions of_replacement;
-        of_replacement.source = options.source;
-        of_replacement.cache = options.cache;
-        of_replacement.stop = options.stop;
-        auto source = DemSource::Open(edit.source, of_replacement);
-        if (!source) {
-          opened.erase(known);
-          faults.push_back(FaultOf(edit, fmt::format("its source: {}", source.error().message)));
-          continue;
-        }
-        replacements.push_back(*std::move(source));
-      }
-      edit.replacement = known->second;
-      const DemSource& source = *replacements[edit.replacement];
-      edit.low_m = source.info().heights.min;
-      edit.high_m = source.info().heights.max;
-      ContentHasher hasher;
-      hasher.Add(edit.hash);
-      hasher.Add(source.fingerprint());
-      edit.hash = hasher.Hash();
-    }
+    auto wrong = ResolveEdit(edit, options, opened);
+    if (!wrong) return tl::unexpected(std::move(wrong).error());
+    if (!wrong->empty()) faults.push_back(FaultOf(edit, *std::move(wrong)));
   }
   if (const auto changed = edit_files.FirstChanged()) return tl::unexpected(ChangedError(*changed));
   if (!faults.empty()) return MakeError(ErrorCode::kInvalidArgument, "edits: {}", TextOf(faults));
@@ -229,7 +233,7 @@ Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindo
   return heights;
 }
 
-// Where there is no height, an edit whose share is 1 makes one, but above the ellipsoid alone.
+// Where there is no height, an edit whose weight is 1 makes one, but above the ellipsoid alone.
 Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                          std::span<float> heights, const std::stop_token& stop) const {
   std::vector<std::size_t> edited;
@@ -340,9 +344,9 @@ std::optional<std::uint64_t> DemSource::Impl::KnownHash(const HashKey& key) cons
 }
 
 void DemSource::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
-  constexpr std::size_t kMost = std::size_t{1} << 18;
+  constexpr std::size_t kMaxHashes = std::size_t{1} << 18;
   const std::lock_guard lock(hashes_mutex);
-  if (hashes.size() >= kMost) hashes.clear();
+  if (hashes.size() >= kMaxHashes) hashes.clear();
   hashes.emplace(key, hash);
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -56,8 +57,16 @@ class DemSource::Impl {
   // Defined in dem_edits.cc. ApplyEdits takes heights above the ellipsoid; `error_m`: as for EditSet::Apply.
   Result<void> OpenEdits(const DemOptions& options);
   void AddDeeperLevels(double error_fraction);
-  // Of an edit with orthometric heights. Returns what is wrong with it; empty: nothing.
+  // These complete an edit with what the sources tell, and return what is wrong with it; empty: nothing. `opened`: the
+  // replacements by path, as indexes.
+  Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
+  // Of an edit with orthometric heights.
   Result<std::string> AddUndulations(Edit& edit) const;
+  // Of a flatten without a height.
+  Result<std::string> AddFlatHeight(Edit& edit, const std::stop_token& stop) const;
+  // Of a replace.
+  Result<std::string> OpenReplacement(Edit& edit, const DemOptions& options,
+                                      std::map<std::string, std::size_t>& opened);
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;

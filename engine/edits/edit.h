@@ -114,7 +114,7 @@ struct Edit {
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
   // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
-  double ShareAt(double distance_m) const {
+  double WeightAt(double distance_m) const {
     const double beyond = distance_m - half_width_m;
     if (beyond <= 0) return 1;
     if (beyond >= blend_m) return 0;

@@ -54,16 +54,16 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
       }
       // A distance changes by at most the length of a move, and each point of the cell is within half a diagonal of a
       // node.
-      const double high_share = edit.ShareAt(std::max(nearest - diagonal_m / 2, 0.0));
-      const double low_share = edit.ShareAt(furthest + diagonal_m / 2);
-      if (high_share <= 0) continue;
+      const double high_weight = edit.WeightAt(std::max(nearest - diagonal_m / 2, 0.0));
+      const double low_weight = edit.WeightAt(furthest + diagonal_m / 2);
+      if (high_weight <= 0) continue;
       double& error = cells_[Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i)];
       const double before = error < 0 ? before_ : error;
       const double tau = edit.op == EditOp::kReplace ? tau_m : TargetError(edit, diagonal_m, furthest + diagonal_m / 2);
       const bool one_way = edit.op == EditOp::kCarve || edit.op == EditOp::kRaise;
-      const double kept = one_way || edit.op == EditOp::kOffset ? 1 : 1 - low_share;
-      error = kept * before + (high_share - low_share) * difference + high_share * tau;
-      if (one_way && is_above && is_below) error += high_share * difference;
+      const double kept = one_way || edit.op == EditOp::kOffset ? 1 : 1 - low_weight;
+      error = kept * before + (high_weight - low_weight) * difference + high_weight * tau;
+      if (one_way && is_above && is_below) error += high_weight * difference;
     }
   }
 }

@@ -1,9 +1,9 @@
 // The certified error of edited heights (docs/decisions/0022-edits.md).
 //
 // Let S be the surface that is bilinear between nodes of heights s, h a sample of the sources, and e a bound of |S - h|
-// in a cell. An edit with the share w and the target t makes s' = s + w (t - s) of nodes and of samples alike. With the
-// share between w0 and w1 in the cell, d the largest |t - s| at its nodes, and tau a bound of the distance between the
-// target and its bilinear surface,
+// in a cell. An edit with the weight w and the target t makes s' = s + w (t - s) of nodes and of samples alike. With
+// the weight between w0 and w1 in the cell, d the largest |t - s| at its nodes, and tau a bound of the distance between
+// the target and its bilinear surface,
 //   S' - h' = (1 - w)(S - h) + bilinear((w_node - w)(t - s)) + w (bilinear(t) - t)
 //   |S' - h'| <= (1 - w0) e + (w1 - w0) d + w1 tau.
 // For an offset t - s is constant. For carving and raising max(0, +-(s - t)) takes the place of t - s; where it changes
@@ -23,7 +23,7 @@ namespace terrace::dem {
 struct EditedNode {
   EditPlace place;
   double height = 0;  // before the edit
-  double target = 0;  // NaN: unknown, the share is 0
+  double target = 0;  // NaN: unknown, the weight is 0
 };
 
 class EditError {

@@ -40,16 +40,16 @@ struct EmptyBox {
 thread_local EmptyBox last_empty;
 
 // The edited height. `target`: NaN where a replacement has none.
-double Edited(EditOp op, double height, double target, double share) {
+double Edited(EditOp op, double height, double target, double weight) {
   switch (op) {
     case EditOp::kOffset:
-      return height + share * target;
+      return height + weight * target;
     case EditOp::kCarve:
-      return height - share * std::max(height - target, 0.0);
+      return height - weight * std::max(height - target, 0.0);
     case EditOp::kRaise:
-      return height + share * std::max(target - height, 0.0);
+      return height + weight * std::max(target - height, 0.0);
     default:
-      return share == 1 ? target : height + share * (target - height);
+      return weight == 1 ? target : height + weight * (target - height);
   }
 }
 
@@ -104,20 +104,20 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
         for (int i = part.first_column; i <= part.last_column; ++i) {
           const double x = edit.plane.X(axes.longitude(i));
           const EditPlace place = row.At(x);
-          const double share = edit.ShareAt(place.distance_m);
+          const double weight = edit.WeightAt(place.distance_m);
           const std::size_t at = static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i);
           double target = std::numeric_limits<double>::quiet_NaN();
           if (edit.op == EditOp::kOffset) {
             target = edit.offset_m;
           } else if (edit.op == EditOp::kReplace) {
             target = static_cast<double>(other->heights[at]);
-          } else if (share > 0) {
+          } else if (weight > 0) {
             target = TargetAt(edit, {x, y}, place);
           }
           if (errors)
             nodes[Area(columns, j - part.first_row) + static_cast<std::size_t>(i - part.first_column)] = {
                 place, values[at], target};
-          if (share > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, share);
+          if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
         }
       }
       if (errors) {
@@ -150,8 +150,8 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
     }
     if (row == rows.end()) row = rows.emplace(index, EditRow(edit, point.y)).first;
     const EditPlace place = row->second.At(point.x);
-    const double share = edit.ShareAt(place.distance_m);
-    if (share <= 0) continue;
+    const double weight = edit.WeightAt(place.distance_m);
+    if (weight <= 0) continue;
     if (edit.op == EditOp::kHole) {
       height = std::numeric_limits<double>::quiet_NaN();
       continue;
@@ -159,7 +159,7 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
     const double target = edit.op == EditOp::kOffset    ? edit.offset_m
                           : edit.op == EditOp::kReplace ? replaced(edit)
                                                         : TargetAt(edit, point, place);
-    if (!std::isnan(target)) height = Edited(edit.op, height, target, share);
+    if (!std::isnan(target)) height = Edited(edit.op, height, target, weight);
   }
   return std::isnan(height) ? height : static_cast<double>(RoundHeight(height));
 }
@@ -247,8 +247,8 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
       for (int j = part.first_row; j <= part.last_row; ++j) {
         const EditRow row(edit, edit.plane.Y(axes->latitude(j)));
         for (int i = part.first_column; i <= part.last_column; ++i) {
-          const double share = edit.ShareAt(row.At(edit.plane.X(axes->longitude(i))).distance_m);
-          if (share <= 0) continue;
+          const double weight = edit.WeightAt(row.At(edit.plane.X(axes->longitude(i))).distance_m);
+          if (weight <= 0) continue;
           const std::size_t at = static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i);
           if (edit.op == EditOp::kHole) {
             demands.hole[at] = 1;
@@ -259,10 +259,10 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
             demands.caps.assign(nodes, std::numeric_limits<float>::infinity());
           }
           // Between the edge and the end of the blend both change geometrically.
-          const double weight = std::exp2(share * std::log2(1 / edit.factor));
-          demands.weights[at] = std::max(demands.weights[at], static_cast<float>(weight));
+          const double error_weight = std::exp2(weight * std::log2(1 / edit.factor));
+          demands.weights[at] = std::max(demands.weights[at], static_cast<float>(error_weight));
           if (edit.error_m < coarsest) {
-            const double cap = edit.error_m * std::exp2((1 - share) * std::log2(coarsest / edit.error_m));
+            const double cap = edit.error_m * std::exp2((1 - weight) * std::log2(coarsest / edit.error_m));
             demands.caps[at] = std::min(demands.caps[at], static_cast<float>(cap));
           }
         }

@@ -21,10 +21,10 @@ std::string EditFault::Text() const {
 }
 
 std::string TextOf(const std::vector<EditFault>& faults) {
-  constexpr std::size_t kMost = 20;
+  constexpr std::size_t kMaxFaults = 20;
   std::string text;
-  for (std::size_t i = 0; i < std::min(faults.size(), kMost); ++i) text += (i > 0 ? "\n" : "") + faults[i].Text();
-  if (faults.size() > kMost) text += fmt::format("\nand {} more", faults.size() - kMost);
+  for (std::size_t i = 0; i < std::min(faults.size(), kMaxFaults); ++i) text += (i > 0 ? "\n" : "") + faults[i].Text();
+  if (faults.size() > kMaxFaults) text += fmt::format("\nand {} more", faults.size() - kMaxFaults);
   return text;
 }
 

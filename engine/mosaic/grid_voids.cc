@@ -91,7 +91,7 @@ class Joints {
     }
   }
 
-  std::size_t looks() const { return looks_; }
+  std::size_t examinations() const { return examinations_; }
 
   bool IsClosed(std::size_t member, std::uint32_t region) { return is_open_[RootOf(first_[member] + region)] == 0; }
 
@@ -102,7 +102,7 @@ class Joints {
     const bool is_row = dx == 0;
     std::int64_t same = 0;
     const auto own = self.RegionAt(x, y, is_row, same);
-    ++looks_;
+    ++examinations_;
     if (!own) return same;
     const std::size_t region = first_[self.index] + *own;
     // Another member may have a sample or a hole there: then the raster grid's void does not continue.
@@ -111,7 +111,7 @@ class Joints {
       for (const Placed& other : around_) {
         std::int64_t there = other.Before(column, row, is_row);
         if (other.Has(column, row)) {
-          ++looks_;
+          ++examinations_;
           is_covered = true;
           const auto met = other.RegionAt(column, row, is_row, there);
           if (met) {
@@ -151,8 +151,8 @@ class Joints {
   std::vector<std::size_t> first_;    // region of each member
   std::vector<std::size_t> parents_;  // of regions, up to their roots
   std::vector<std::uint8_t> is_open_;
-  std::vector<Placed> around_;  // the current member
-  std::size_t looks_ = 0;       // number of look-ups of voids
+  std::vector<Placed> around_;    // the current member
+  std::size_t examinations_ = 0;  // number of look-ups of voids
 };
 
 }  // namespace
@@ -162,7 +162,7 @@ GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& ind
   // A single raster's regions are sufficient, unless its first column is adjacent to the last.
   Joints joints(members, index, turn);
   for (std::size_t i = 0; i < members.size(); ++i) joints.Add(i);
-  looks_ = joints.looks();
+  examinations_ = joints.examinations();
   for (std::size_t i = 0; i < members.size(); ++i) {
     const RimVoids& voids = members[i].raster->rim_voids();
     for (std::uint32_t region = 0; region < voids.regions(); ++region) {

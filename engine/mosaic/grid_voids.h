@@ -34,7 +34,7 @@ class GridVoids {
   }
 
   // How often the constructor examined voids of a member: once for each change along the rims of members. For tests.
-  std::size_t looks() const { return looks_; }
+  std::size_t examinations() const { return examinations_; }
 
  private:
   // Sets `last_column` to the last column of the row for which the result is the same.
@@ -42,7 +42,7 @@ class GridVoids {
               std::int64_t& last_column) const;
 
   std::int64_t turn_ = 0;
-  std::size_t looks_ = 0;
+  std::size_t examinations_ = 0;
   std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: 1 if part of a hole
   std::vector<geo::TileRange> shared_;             // boxes of pixels around them
 };

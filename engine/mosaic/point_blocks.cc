@@ -18,12 +18,12 @@ std::size_t ChargeOf(const PointBlock& block) { return block.bytes() + kOverhead
 
 void PointBlock::Compact() {
   if (has_voids() || bridged.empty()) return;
-  constexpr float kLeast = std::numeric_limits<std::int16_t>::min(), kMost = std::numeric_limits<std::int16_t>::max();
+  constexpr float kMin = std::numeric_limits<std::int16_t>::min(), kMax = std::numeric_limits<std::int16_t>::max();
   const float first = bridged.front();
   bool is_level = true, is_whole = true;
   for (const float sample : bridged) {
     is_level &= sample == first;
-    is_whole &= sample >= kLeast && sample <= kMost && sample == std::trunc(sample);
+    is_whole &= sample >= kMin && sample <= kMax && sample == std::trunc(sample);
   }
   if (is_level) {
     level = first;

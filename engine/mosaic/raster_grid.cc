@@ -39,6 +39,16 @@ int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
   return MercatorFactor(grid.depth, spacing);
 }
 
+void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, GridTrace& trace) {
+  if (std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
+    trace.heights.assign(heights.begin(), heights.end());
+    return;
+  }
+  for (std::size_t n = 0; n < wanted.size(); ++n) {
+    trace.heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
+  }
+}
+
 // Rows from each sample to the nearest void in its column, at most `most` + 1. One void row lies above and below all.
 std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t columns, std::int64_t rows, int most) {
   std::vector<int> steps(heights.size());
@@ -63,16 +73,16 @@ std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t colu
 // `wide` exceeds `core` by length / step samples on every side, or ends where the raster ends.
 std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const GridWindow& wide,
                                   const GridWindow& core, double column_step, double row_step, double length) {
-  const int most_columns = static_cast<int>(std::ceil(length / column_step));
-  const int most_rows = static_cast<int>(std::ceil(length / row_step));
-  const std::vector<int> rows = RowsToVoid(wide_heights, wide.columns, wide.rows, most_rows);
+  const int max_columns = static_cast<int>(std::ceil(length / column_step));
+  const int max_rows = static_cast<int>(std::ceil(length / row_step));
+  const std::vector<int> rows = RowsToVoid(wide_heights, wide.columns, wide.rows, max_rows);
   std::vector<float> weights;
   weights.reserve(static_cast<std::size_t>(core.columns * core.rows));
   for (std::int64_t r = core.row - wide.row; r < core.row - wide.row + core.rows; ++r) {
     const int* const row = rows.data() + r * wide.columns;
     for (std::int64_t c = core.column - wide.column; c < core.column - wide.column + core.columns; ++c) {
       double nearest = length * length;
-      for (int dx = -most_columns; dx <= most_columns; ++dx) {
+      for (int dx = -max_columns; dx <= max_columns; ++dx) {
         const std::int64_t column = c + dx;
         const double x = dx * column_step;
         const double y = column < 0 || column >= wide.columns ? 0 : row[column] * row_step;
@@ -384,19 +394,13 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     if (weights.empty()) return;
     // All samples have weights, so this is plain bilinear interpolation. Nodes with weight 0 are left to the grids
     // below, because they would hide the floor.
-    constexpr double kLeast = 0x1p-10;
+    constexpr double kMinWeight = 0x1p-10;
     const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
-    weights[node] = static_cast<float>(std::max(kLeast, std::nearbyint(weight * 1024) / 1024));
+    weights[node] = static_cast<float>(std::max(kMinWeight, std::nearbyint(weight * 1024) / 1024));
   };
   if (!has_holes && weights.empty()) {
     FillRows(samples, window, cells, wanted, undulations, heights);
-    if (trace != nullptr && std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
-      trace->heights.assign(heights.begin(), heights.end());
-    } else if (trace != nullptr) {
-      for (std::size_t n = 0; n < wanted.size(); ++n) {
-        trace->heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
-      }
-    }
+    if (trace != nullptr) TraceWanted(heights, wanted, *trace);
   } else {
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;

@@ -24,7 +24,7 @@ constexpr std::uint32_t kOverviewReading = 2;
 constexpr std::uint32_t kNodataDetection = 2;
 
 // A hash of everything that the statistics of a raster depend on and that is known in advance.
-std::uint64_t KeyOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
+std::uint64_t HashOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
   ByteWriter writer;
   writer.PutBytes(path);
   writer.Put(files.fingerprint());
@@ -58,7 +58,7 @@ class Preparer {
         path_(path),
         files_(files),
         options_(options),
-        shape_{layout, KeyOf(layout, options.find_voids, path, files), {}},
+        key_{layout, HashOf(layout, options.find_voids, path, files), {}},
         chunks_(layout.width, layout.height) {
     if (options.cache.folder) {
       cache_file_ = StatisticsPath(options.cache.folder->path(), path, layout.rules.extra_nodata, options.find_voids,
@@ -81,10 +81,10 @@ class Preparer {
     }
     auto statistics = ReadStatistics();
     if (statistics && LacksChunks()) statistics = ReadStatistics();
-    if (statistics && options_.find_voids && !shape_.detected.any())
+    if (statistics && options_.find_voids && !key_.detected.any())
       statistics = WithoutFoundVoids(*std::move(statistics));
     if (!statistics) return Named(statistics.error());
-    prepared_.detected = shape_.detected;
+    prepared_.detected = key_.detected;
     prepared_.statistics = *std::move(statistics);
     FinishCache();
     return std::move(prepared_);
@@ -96,13 +96,13 @@ class Preparer {
   }
 
   bool Load() {
-    auto known = LoadStatistics(cache_file_, shape_);
+    auto known = LoadStatistics(cache_file_, key_);
     if (!known) return false;
     prepared_.detected = std::move(known->detected);
     prepared_.statistics = std::move(known->statistics);
     prepared_.averages = std::move(known->averages);
     prepared_.cache_file = cache_file_;
-    prepared_.shape = shape_;
+    prepared_.key = key_;
     prepared_.preparation.from_cache = true;
     prepared_.use->Succeed();
     return true;
@@ -121,10 +121,10 @@ class Preparer {
 
   // kCancelled: stopped.
   Result<void> OpenWriter() {
-    auto writer = StatisticsCacheWriter::Open(options_.cache.folder, cache_file_, shape_, options_.stop);
+    auto writer = StatisticsCacheWriter::Open(options_.cache.folder, cache_file_, key_, options_.stop);
     if (writer) {
       writer_ = *std::move(writer);
-      if (writer_) shape_ = writer_->shape();
+      if (writer_) key_ = writer_->key();
       return {};
     }
     if (writer.error().code == ErrorCode::kCancelled) return tl::unexpected(writer.error());
@@ -134,7 +134,7 @@ class Preparer {
 
   // One pass through the raster, continued after the chunks of an earlier run.
   Result<RasterStatistics> ReadStatistics() {
-    const RasterLayout layout = shape_.EffectiveLayout();
+    const RasterLayout layout = key_.EffectiveLayout();
     StatisticsAssembler assembler(layout);
     averages_.reset();  // before others take their place
     if (options_.cache.memory) averages_ = MemoryAverages::Make(layout, options_.cache.memory);
@@ -176,16 +176,16 @@ class Preparer {
 
   // The statistics, or those of another pass if nodata was detected.
   Result<RasterStatistics> WithoutFoundVoids(RasterStatistics statistics) {
-    const SampleRules& rules = shape_.layout.rules;
-    const bool has_collar = statistics.zeros.IsCollar(shape_.layout.width, shape_.layout.height);
+    const SampleRules& rules = key_.layout.rules;
+    const bool has_collar = statistics.zeros.IsCollar(key_.layout.width, key_.layout.height);
     if (!MayHideVoids(rules, statistics.lowest, statistics.highest, statistics.voids > 0, has_collar))
       return statistics;
-    auto detected = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, shape_.layout.coast_step_m, options_.stop);
+    auto detected = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, key_.layout.coast_step_m, options_.stop);
     if (!detected) return tl::unexpected(detected.error());
     if (!detected->any()) return statistics;
-    shape_.detected = *std::move(detected);
+    key_.detected = *std::move(detected);
     if (writer_) {
-      if (auto restarted = writer_->Restart(shape_.detected); !restarted) GiveUpCache(restarted.error());
+      if (auto restarted = writer_->Restart(key_.detected); !restarted) GiveUpCache(restarted.error());
     }
     return ReadStatistics();
   }
@@ -197,10 +197,10 @@ class Preparer {
     if (writer_) {
       if (auto finished = writer_->Finish(prepared_.statistics); !finished) GiveUpCache(finished.error());
     }
-    if (auto known = writer_ ? LoadStatistics(cache_file_, shape_) : std::nullopt) {
+    if (auto known = writer_ ? LoadStatistics(cache_file_, key_) : std::nullopt) {
       prepared_.averages = std::move(known->averages);
       prepared_.cache_file = cache_file_;
-      prepared_.shape = shape_;
+      prepared_.key = key_;
       prepared_.use->Succeed();
     } else if (averages_are_whole_) {
       prepared_.memory_averages = std::move(averages_);
@@ -211,7 +211,7 @@ class Preparer {
   const std::string& path_;
   const StampedFiles& files_;
   const PrepareOptions& options_;
-  StatisticsShape shape_;
+  StatisticsKey key_;
   const ChunkGrid chunks_;
   std::string cache_file_;  // its path; empty: none
   std::optional<StatisticsCacheWriter> writer_;

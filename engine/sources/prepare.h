@@ -42,7 +42,7 @@ struct PreparedRaster {
   std::shared_ptr<const MemoryAverages> memory_averages;  // if the file is not stored; null: none
   std::string cache_file;                                 // empty: not stored
   std::shared_ptr<const CacheFolder::Use> use;            // of the cache file, stored or not; null: no cache folder
-  StatisticsShape shape;                                  // of the cache file
+  StatisticsKey key;                                      // of the cache file
   Preparation preparation;
 };
 

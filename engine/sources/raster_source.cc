@@ -206,74 +206,92 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   if (!spacing) return tl::unexpected(spacing.error());
 
   std::unique_ptr<RasterSource> source(new RasterSource(path, *std::move(files), *std::move(georeference)));
-  auto vertical = ResolveVertical(options.vertical, source->georeference_, CentreOf(source->georeference_));
+  source->spacing_ = *spacing;
+  if (auto found = source->FindLayout(**dataset, path, options); !found) return tl::unexpected(found.error());
+  const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
+  std::string overviews_unused;
+  auto prepared = source->Prepare(**dataset, path, prepare, overviews_unused);
+  if (!prepared) return tl::unexpected(prepared.error());
+  source->averages_ = prepared->averages;
+  source->memory_averages_ = prepared->memory_averages;
+  source->use_ = prepared->use;
+  source->preparation_ = prepared->preparation;
+  source->footprint_ = Footprint::Of(source->georeference_);
+  source->FillInfo(**dataset, path, *prepared);
+  source->info_.overviews_unused = std::move(overviews_unused);
+  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  source->LogOpened(**dataset, prepared->statistics.rim_voids.is_everything());
+  if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
+  source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
+  return source;
+}
+
+Result<void> RasterSource::FindLayout(GDALDataset& dataset, const std::string& path, const SourceOptions& options) {
+  auto vertical = ResolveVertical(options.vertical, georeference_, CentreOf(georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
-  source->vertical_ = *std::move(vertical);
+  vertical_ = *std::move(vertical);
   // If the file names no unit, the configured vertical reference system does.
-  const std::string& stated = source->georeference_.vertical_unit();
-  const auto& geoid = source->vertical_.geoid;
-  source->layout_ =
-      RasterLayout::Of(**dataset, source->georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
-  if (const double scale = source->layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
+  const std::string& stated = georeference_.vertical_unit();
+  const auto& geoid = vertical_.geoid;
+  layout_ = RasterLayout::Of(dataset, georeference_, stated.empty() && geoid != nullptr ? geoid->unit() : stated);
+  if (const double scale = layout_.rules.scale; !std::isfinite(scale) || scale == 0) {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "{}: states a scale of {}, by which no sample has a height; correct it with `gdal_translate -a_scale "
         "1 -a_offset 0 in out`",
         path, scale);
   }
-  source->layout_.coast_step_m = ZeroEdges::CoastStep(spacing->finer);
-  source->layout_.rules.extra_nodata = options.nodata;
-  std::string overviews_unused = DropMisleadingOverviews(**dataset, source->layout_);
-  const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
-  auto prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+  layout_.coast_step_m = ZeroEdges::CoastStep(spacing_.finer);
+  layout_.rules.extra_nodata = options.nodata;
+  return {};
+}
+
+Result<PreparedRaster> RasterSource::Prepare(GDALDataset& dataset, const std::string& path,
+                                             const PrepareOptions& options, std::string& overviews_unused) {
+  overviews_unused = DropMisleadingOverviews(dataset, layout_);
+  auto prepared = PrepareRaster(dataset, layout_, path, files(), options);
   if (prepared && !prepared->detected.any()) {
-    const std::string why = DropMisleadingOverviews(**dataset, prepared->statistics, source->layout_);
+    const std::string why = DropMisleadingOverviews(dataset, prepared->statistics, layout_);
     if (!why.empty()) {
       overviews_unused = why;
-      prepared = PrepareRaster(**dataset, source->layout_, path, source->files(), prepare);
+      prepared = PrepareRaster(dataset, layout_, path, files(), options);
     }
   }
-  if (!prepared) return tl::unexpected(prepared.error());
-  source->layout_ = WithDetectedNodata(std::move(source->layout_), prepared->detected);
-  source->averages_ = prepared->averages;
-  source->memory_averages_ = prepared->memory_averages;
-  source->use_ = prepared->use;
-  source->preparation_ = prepared->preparation;
-  const RasterStatistics& statistics = prepared->statistics;
-  const std::string& found_voids = prepared->detected.text;
+  if (prepared) layout_ = WithDetectedNodata(std::move(layout_), prepared->detected);
+  return prepared;
+}
 
-  source->footprint_ = Footprint::Of(source->georeference_);
-  source->spacing_ = *spacing;
-  source->info_ = Describe(**dataset, path, source->georeference_, source->layout_);
-  source->info_.overviews_unused = std::move(overviews_unused);
-  source->info_.needs_averages = NeedsAverages(source->layout_);
-  source->info_.is_in_folder = source->averages_ != nullptr;
-  if (source->averages_) source->info_.least_kept_factor = source->averages_->least_factor();
-  if (source->memory_averages_) source->info_.least_kept_factor = source->memory_averages_->least_factor();
-  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  source->info_.found_voids = found_voids;
-  source->info_.datum_in_use = source->vertical_.name;
-  if (source->vertical_.geoid) source->info_.vertical_operation = source->vertical_.geoid->description();
-  source->info_.spacing_m = spacing->finer;
-  source->info_.bounds = source->footprint_.Bounds();
-  source->info_.heights = {statistics.lowest, statistics.highest};
-  source->info_.heights_doubted = DoubtsOf(source->info_.heights);
-  source->info_.valid_samples = statistics.valid;
-  source->info_.void_samples = statistics.voids;
-  source->info_.hole_samples = statistics.hole_samples;
-  LogWhatMatters(**dataset, source->info_, source->georeference_, source->layout_);
-  LogVertical(path, source->vertical_, source->layout_.rules.unit);
-  if (!found_voids.empty()) {
-    LogSource(SourceLog::Level::kWarn, path,
-              "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", found_voids);
+void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared) {
+  const RasterStatistics& statistics = prepared.statistics;
+  info_ = Describe(dataset, path, georeference_, layout_);
+  info_.needs_averages = NeedsAverages(layout_);
+  info_.is_in_folder = averages_ != nullptr;
+  if (averages_) info_.min_kept_factor = averages_->min_factor();
+  if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
+  info_.found_voids = prepared.detected.text;
+  info_.datum_in_use = vertical_.name;
+  if (vertical_.geoid) info_.vertical_operation = vertical_.geoid->description();
+  info_.spacing_m = spacing_.finer;
+  info_.bounds = footprint_.Bounds();
+  info_.heights = {statistics.lowest, statistics.highest};
+  info_.heights_doubted = DoubtsOf(info_.heights);
+  info_.valid_samples = statistics.valid;
+  info_.void_samples = statistics.voids;
+  info_.hole_samples = statistics.hole_samples;
+}
+
+void RasterSource::LogOpened(GDALDataset& dataset, bool has_ragged_voids) const {
+  LogWhatMatters(dataset, info_, georeference_, layout_);
+  LogVertical(info_.path, vertical_, layout_.rules.unit);
+  if (!info_.found_voids.empty()) {
+    LogSource(SourceLog::Level::kWarn, info_.path,
+              "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", info_.found_voids);
   }
-  if (statistics.rim_voids.is_everything()) {
+  if (has_ragged_voids) {
     spdlog::warn(
-        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over", path);
+        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over",
+        info_.path);
   }
-  if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
-  source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
-  return source;
 }
 
 bool StatisticsPages::Admit(std::size_t bytes) {
@@ -298,7 +316,7 @@ void StatisticsPages::Add(const void* raster, Statistics statistics) {
   pages_.push_front({raster, std::move(statistics), bytes});
   by_raster_.emplace(raster, pages_.begin());
   paged_ += bytes;
-  while (paged_ > most_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
+  while (paged_ > max_paged_ && pages_.size() > 1) Remove(std::prev(pages_.end()));
 }
 
 void StatisticsPages::Forget(const void* raster) {
@@ -337,7 +355,7 @@ void RasterSource::KeepStatistics(PreparedRaster prepared, const PrepareOptions&
                                                   statistics.table.Coarse(kMaxCoarse),
                                                   !statistics.coarse.grids.empty(),
                                                   std::move(prepared.cache_file),
-                                                  std::move(prepared.shape),
+                                                  std::move(prepared.key),
                                                   {{prepare.cache.folder, nullptr}, prepare.find_voids, {}, {}}});
 }
 
@@ -352,12 +370,12 @@ StatisticsPages::Statistics RasterSource::statistics() const {
 }
 
 Result<RasterStatistics> RasterSource::ReadStatistics() const {
-  if (auto known = LoadStatistics(paging_->cache_file, paging_->shape)) return std::move(known->statistics);
+  if (auto known = LoadStatistics(paging_->cache_file, paging_->key)) return std::move(known->statistics);
   LogSource(SourceLog::Level::kWarn, info_.path, "{} is gone or damaged; the source is prepared anew",
             paging_->cache_file);
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
-  auto prepared = PrepareRaster(**handle, paging_->shape.layout, info_.path, files(), paging_->prepare);
+  auto prepared = PrepareRaster(**handle, paging_->key.layout, info_.path, files(), paging_->prepare);
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!prepared) return tl::unexpected(prepared.error());
   // The next read would take as long.

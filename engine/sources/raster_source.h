@@ -37,7 +37,7 @@ class StatisticsPages {
  public:
   using Statistics = std::shared_ptr<const RasterStatistics>;
 
-  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), most_paged_(paged_bytes) {}
+  StatisticsPages(std::size_t kept_bytes, std::size_t paged_bytes) : kept_left_(kept_bytes), max_paged_(paged_bytes) {}
 
   // Whether statistics of this size fit the first budget. If so, they are charged to it.
   bool Admit(std::size_t bytes);
@@ -59,7 +59,7 @@ class StatisticsPages {
 
   mutable std::mutex mutex_;
   std::size_t kept_left_;  // guarded by mutex_, as are these
-  const std::size_t most_paged_;
+  const std::size_t max_paged_;
   std::size_t paged_ = 0;
   std::list<Page> pages_;  // most recently used first
   std::unordered_map<const void*, std::list<Page>::iterator> by_raster_;
@@ -117,6 +117,12 @@ class RasterSource {
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }
 
  private:
+  // Steps of Open, in this order.
+  Result<void> FindLayout(GDALDataset& dataset, const std::string& path, const SourceOptions& options);
+  Result<PreparedRaster> Prepare(GDALDataset& dataset, const std::string& path, const PrepareOptions& options,
+                                 std::string& overviews_unused);
+  void FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared);
+  void LogOpened(GDALDataset& dataset, bool has_ragged_voids) const;
   void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
   Result<RasterStatistics> ReadStatistics() const;
   void LoseCache(const Error& error) const;
@@ -140,7 +146,7 @@ class RasterSource {
     RangeTable ranges;  // of coarse blocks
     bool has_coarse_averages;
     std::string cache_file;
-    StatisticsShape shape;
+    StatisticsKey key;
     PrepareOptions prepare;
   };
   std::unique_ptr<const Paging> paging_;

@@ -29,7 +29,7 @@ class CachedAverages {
   // Removes the file, unless another one has replaced it.
   void Discard() const;
 
-  int least_factor() const { return static_cast<int>(factors_ & (~factors_ + 1)); }
+  int min_factor() const { return static_cast<int>(factors_ & (~factors_ + 1)); }
 
   // Bytes read so far.
   std::uint64_t bytes_read() const { return bytes_read_; }

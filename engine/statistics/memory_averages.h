@@ -27,7 +27,7 @@ class MemoryAverages {
   bool Has(int factor) const;
   // The same values as ReadGrid. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
-  int least_factor() const { return levels_.front().factor; }
+  int min_factor() const { return levels_.front().factor; }
   std::size_t bytes() const { return bytes_; }
 
  private:

@@ -73,11 +73,11 @@ RimVoids::Stretch RimVoids::StretchAt(std::int64_t column, std::int64_t row) con
   return stretch;
 }
 
-RimVoidFinder::RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs)
+RimVoidFinder::RimVoidFinder(int columns, int rows, Hole hole, std::size_t max_runs)
     : columns_(columns),
       rows_(rows),
       hole_(std::move(hole)),
-      most_runs_(most_runs),
+      max_runs_(max_runs),
       band_(static_cast<std::size_t>(ChunkGrid::kSide)) {}
 
 std::uint32_t RimVoidFinder::NewRegion() {
@@ -133,7 +133,7 @@ void RimVoidFinder::Add(const Chunk& chunk, const ChunkStatistics& chunk_statist
   } else {
     for (const VoidRun& run : chunk_statistics.voids) AddRun(run.row, chunk.col + run.first, chunk.col + run.last);
   }
-  if (band_runs_ > most_runs_) GiveUp();
+  if (band_runs_ > max_runs_) GiveUp();
 }
 
 void RimVoidFinder::SweepRow(std::int32_t row, std::vector<Run>& runs) {
@@ -160,7 +160,7 @@ void RimVoidFinder::Sweep() {
   for (int r = 0; r < rows; ++r) SweepRow(top_ + r, band_[static_cast<std::size_t>(r)]);
   band_runs_ = 0;
   Settle();
-  if (rim_.size() + open_.size() > most_runs_) return GiveUp();
+  if (rim_.size() + open_.size() > max_runs_) return GiveUp();
   if (parents_.size() > kManyRegions) Renumber();
 }
 

@@ -79,7 +79,7 @@ class RimVoidFinder {
   // `columns`: those in use. The first column is part of the rim even if the raster wraps around the Earth. Calls
   // `hole` for each run of a hole with row, first sample, last sample, and the number of samples of the hole.
   using Hole = std::function<void(std::int32_t, std::int32_t, std::int32_t, std::int64_t)>;
-  RimVoidFinder(int columns, int rows, Hole hole, std::size_t most_runs = kMaxRuns);
+  RimVoidFinder(int columns, int rows, Hole hole, std::size_t max_runs = kMaxRuns);
 
   // Adds all chunks in the order of ChunkGrid.
   void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
@@ -102,7 +102,7 @@ class RimVoidFinder {
 
   const int columns_, rows_;
   const Hole hole_;
-  const std::size_t most_runs_;
+  const std::size_t max_runs_;
   std::int32_t top_ = 0;                // first row of the current row of chunks
   std::vector<std::vector<Run>> band_;  // its runs, by row
   std::size_t band_runs_ = 0;

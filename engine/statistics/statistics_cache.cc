@@ -34,13 +34,13 @@ constexpr std::uint64_t kMaxHeaderBytes = 1 << 16;  // a few numbers and a line 
 
 std::uint64_t HashOf(std::string_view bytes) { return XXH3_64bits(bytes.data(), bytes.size()); }
 
-std::string HeaderOf(const StatisticsShape& shape) {
-  const std::string detected = EncodeDetectedNodata(shape.detected);
+std::string HeaderOf(const StatisticsKey& key) {
+  const std::string detected = EncodeDetectedNodata(key.detected);
   ByteWriter writer;
   writer.Put(CacheFolder::kMagic);
   writer.Put(kCacheVersion);
-  writer.Put(static_cast<std::uint32_t>(shape.kept_factors()));
-  writer.Put(shape.key);
+  writer.Put(static_cast<std::uint32_t>(key.kept_factors()));
+  writer.Put(key.hash);
   writer.Put<std::uint32_t>(ChunkGrid::kSide);
   writer.Put<std::uint32_t>(kLargestDirect);
   writer.Put(static_cast<std::uint32_t>(detected.size()));
@@ -51,9 +51,9 @@ std::string HeaderOf(const StatisticsShape& shape) {
   return bytes + sum.Take();
 }
 
-// Whether a file begins with the header of this shape. If so, sets the detected nodata of `shape`.
+// Whether a file begins with the header of `key`. If so, sets its detected nodata.
 enum class HeaderState { kDamaged, kOther, kSame };
-HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
+HeaderState ReadHeader(int file, StatisticsKey& key, std::uint64_t& bytes) {
   const std::uint64_t size = SizeOf(file);
   const auto front = ReadAt(file, 0, kHeaderBytes, size);
   if (!front) return HeaderState::kDamaged;
@@ -67,10 +67,10 @@ HeaderState ReadHeader(int file, StatisticsShape& shape, std::uint64_t& bytes) {
   }
   auto detected = DecodeDetectedNodata(checked.substr(kHeaderBytes));
   if (!detected) return HeaderState::kOther;
-  StatisticsShape found = shape;
+  StatisticsKey found = key;
   found.detected = *std::move(detected);
   if (HeaderOf(found) != *header) return HeaderState::kOther;
-  shape = std::move(found);
+  key = std::move(found);
   return HeaderState::kSame;
 }
 
@@ -130,7 +130,7 @@ RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detec
   return layout;
 }
 
-std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsShape& wanted) {
+std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsKey& wanted) {
   OpenFile file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file.is_open()) return std::nullopt;
   const std::uint64_t size = SizeOf(file.get());
@@ -139,9 +139,9 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
               what);
     return std::nullopt;
   };
-  StatisticsShape shape = wanted;
+  StatisticsKey key = wanted;
   std::uint64_t header_bytes = 0;
-  switch (ReadHeader(file.get(), shape, header_bytes)) {
+  switch (ReadHeader(file.get(), key, header_bytes)) {
     case HeaderState::kDamaged:
       return damaged("its header");
     case HeaderState::kOther:
@@ -151,7 +151,7 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
     case HeaderState::kSame:
       break;
   }
-  const RasterLayout layout = shape.EffectiveLayout();
+  const RasterLayout layout = key.EffectiveLayout();
   if (size < kFooterBytes) return damaged("its end");
   const auto footer = ReadAt(file.get(), size - kFooterBytes, kFooterBytes, size);
   if (!footer) return damaged("its end");
@@ -167,7 +167,7 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
   auto statistics = DecodeStatistics(whole.GetBytes(whole.remaining()), layout);
   if (!statistics) return damaged("its statistics");
   Touch(file.get());
-  CachedStatistics cached{std::move(shape.detected), *std::move(statistics), nullptr};
+  CachedStatistics cached{std::move(key.detected), *std::move(statistics), nullptr};
   if (KeptFactors(layout) != 0) {
     cached.averages = std::make_shared<const CachedAverages>(file, path, layout, std::move(offsets));
   }
@@ -175,17 +175,17 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
 }
 
 StatisticsCacheWriter::StatisticsCacheWriter(std::shared_ptr<CacheFolder> folder, OpenFile file, std::string path,
-                                             const StatisticsShape& shape)
+                                             const StatisticsKey& key)
     : folder_(std::move(folder)),
       file_(std::move(file)),
       path_(std::move(path)),
-      shape_(shape),
-      layout_(shape.EffectiveLayout()),
+      key_(key),
+      layout_(key.EffectiveLayout()),
       chunks_(layout_.width, layout_.height) {}
 
 Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::shared_ptr<CacheFolder> folder,
                                                                          const std::string& path,
-                                                                         const StatisticsShape& shape,
+                                                                         const StatisticsKey& key,
                                                                          const std::stop_token& stop) {
   std::error_code failed;
   std::filesystem::create_directories(folder->path(), failed);
@@ -205,30 +205,30 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::sh
     }
     // The previous owner of the lock may have renamed or removed the file.
     if (const auto opened = IdentityOf(file.get()); !opened || opened != IdentityOf(partial)) continue;
-    if (waiting && LoadStatistics(path, shape)) {
+    if (waiting && LoadStatistics(path, key)) {
       ::unlink(partial.c_str());
       return std::nullopt;
     }
-    StatisticsCacheWriter writer(std::move(folder), std::move(file), path, shape);
+    StatisticsCacheWriter writer(std::move(folder), std::move(file), path, key);
     if (auto begun = writer.Begin(); !begun) return tl::unexpected(begun.error());
     return std::optional(std::move(writer));
   }
 }
 
 Result<void> StatisticsCacheWriter::Begin() {
-  if (ReadHeader(file_.get(), shape_, end_) != HeaderState::kSame) return Restart(shape_.detected);
-  layout_ = shape_.EffectiveLayout();
+  if (ReadHeader(file_.get(), key_, end_) != HeaderState::kSame) return Restart(key_.detected);
+  layout_ = key_.EffectiveLayout();
   return {};
 }
 
 Result<void> StatisticsCacheWriter::Restart(const DetectedNodata& detected) {
-  shape_.detected = detected;
-  layout_ = shape_.EffectiveLayout();
+  key_.detected = detected;
+  layout_ = key_.EffectiveLayout();
   offsets_.clear();
   end_ = 0;
   folder_->Release(std::exchange(reserved_, 0));
   if (auto cut = Cut(); !cut) return cut;
-  return Write(HeaderOf(shape_));
+  return Write(HeaderOf(key_));
 }
 
 Result<void> StatisticsCacheWriter::Cut() {

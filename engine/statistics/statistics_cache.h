@@ -24,10 +24,10 @@ namespace terrace::dem {
 // The layout with the rules for detected nodata. If any nodata was detected, overviews are left out.
 RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detected);
 
-// The raster and rules that a cache file belongs to.
-struct StatisticsShape {
+// Identifies a cache file: the raster and the rules that it belongs to.
+struct StatisticsKey {
   RasterLayout layout;      // without the rules for detected nodata
-  std::uint64_t key = 0;    // hash of the raster's files and of all options that the statistics depend on
+  std::uint64_t hash = 0;   // of the raster's files and of all options that the statistics depend on
   DetectedNodata detected;  // stored in the file
 
   RasterLayout EffectiveLayout() const { return WithDetectedNodata(layout, detected); }
@@ -41,8 +41,8 @@ struct CachedStatistics {
 };
 
 // Nothing if there is no file, or one of another raster or other rules. Reports a damaged file in the log. Ignores
-// `shape.detected`; the file has its own.
-std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsShape& shape);
+// `key.detected`; the file has its own.
+std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsKey& key);
 
 // Writes a cache file, as `path`.partial until it is finished. Locked: one process at a time.
 class StatisticsCacheWriter {
@@ -50,10 +50,10 @@ class StatisticsCacheWriter {
   // Waits while another process writes the file; returns nothing if that one has finished it. kUnavailable: the folder
   // is not writable, or files in use take its budget. kCancelled: stopped.
   static Result<std::optional<StatisticsCacheWriter>> Open(std::shared_ptr<CacheFolder> folder, const std::string& path,
-                                                           const StatisticsShape& shape, const std::stop_token& stop);
+                                                           const StatisticsKey& key, const std::stop_token& stop);
 
   // Includes the detected nodata of an interrupted run.
-  const StatisticsShape& shape() const { return shape_; }
+  const StatisticsKey& key() const { return key_; }
 
   // Calls `keep` for every chunk of an interrupted run, in order. Call it once, before the first Add.
   Result<void> Resume(const std::function<void(const ChunkStatistics&)>& keep);
@@ -68,8 +68,7 @@ class StatisticsCacheWriter {
   Result<void> Finish(const RasterStatistics& statistics);
 
  private:
-  StatisticsCacheWriter(std::shared_ptr<CacheFolder> folder, OpenFile file, std::string path,
-                        const StatisticsShape& shape);
+  StatisticsCacheWriter(std::shared_ptr<CacheFolder> folder, OpenFile file, std::string path, const StatisticsKey& key);
   Result<void> Begin();
   void KeepWholeChunks(const std::function<void(const ChunkStatistics&)>& keep);
   Result<void> Cut();
@@ -79,7 +78,7 @@ class StatisticsCacheWriter {
   std::shared_ptr<CacheFolder> folder_;
   OpenFile file_;
   std::string path_;
-  StatisticsShape shape_;
+  StatisticsKey key_;
   RasterLayout layout_;  // the effective one
   ChunkGrid chunks_;
   std::uint64_t end_ = 0;

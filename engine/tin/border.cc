@@ -27,7 +27,7 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
   const auto a = all(chord.a), b = all(chord.b), h_a = all(chord.h_a), h_b = all(chord.h_b);
   const auto length = all(chord.b - chord.a), sagitta = all(options.sagitta_m);
   const auto padding = all(options.padding_m), weight = all(options.weight), step = all(options.step_m);
-  const auto scale = all(options.scale), most_weight = all(kMaxBorderWeight);
+  const auto scale = all(options.scale), max_weight = all(kMaxBorderWeight);
   const auto lanes = static_cast<int>(hn::Lanes(doubles));
 
   const auto last = hn::Set(ints, chord.b - chord.a - 1), stride = hn::Set(ints, chord.stride);
@@ -40,7 +40,7 @@ ChordMisfit ScanChord(const Chord& chord, const BorderOptions& options) {
     const auto misfit = hn::Add(hn::Abs(hn::Sub(on_chord, height)), hn::Mul(hn::Mul(sagitta, done), left));
     const auto padded = hn::Add(misfit, padding);
     const auto weighted = larger(hn::Mul(padded, weight), hn::Add(padded, step));
-    const auto error = hn::Mul(scale, smaller(weighted, hn::Mul(most_weight, misfit)));
+    const auto error = hn::Mul(scale, smaller(weighted, hn::Mul(max_weight, misfit)));
     const auto is_worse = hn::And(hn::Gt(error, most), hn::Lt(k, b));  // never at a void
     most = hn::IfThenElse(is_worse, error, most);
     at = hn::IfThenElse(is_worse, k, at);

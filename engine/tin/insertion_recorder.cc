@@ -46,13 +46,13 @@ InsertionRecorder::InsertionRecorder(const Refinement& refinement) : begun_(refi
   }
   made_ = begun_.removed.size();
   corners_ = begun_.rings.size();
-  for (const std::uint32_t size : begun_.sizes) most_made_ = std::max<std::size_t>(most_made_, size & ~Wide::kOpen);
+  for (const std::uint32_t size : begun_.sizes) max_made_ = std::max<std::size_t>(max_made_, size & ~Wide::kOpen);
 }
 
 void InsertionRecorder::Append(SamplePosition inserted, float error_before, const Star& star) {
   inserted_.push_back(inserted);
   errors_before_.push_back(error_before);
-  most_made_ = std::max(most_made_, star.count);
+  max_made_ = std::max(max_made_, star.count);
   const std::size_t corners = star.count + (star.is_closed ? 0 : 1), words = 1 + corners + star.removed_count;
   made_ += star.count;
   corners_ += corners;
@@ -65,7 +65,7 @@ void InsertionRecorder::Append(SamplePosition inserted, float error_before, cons
 }
 
 Refinement InsertionRecorder::Make(int width, int height) const {
-  const bool is_narrow = Refinement::IsNarrow(4 + inserted_.size(), most_made_);
+  const bool is_narrow = Refinement::IsNarrow(4 + inserted_.size(), max_made_);
   return {width,
           height,
           {inserted_.begin(), inserted_.end()},

@@ -44,8 +44,8 @@ class InsertionRecorder {
   // the triangles removed. An insertion removes two triangles fewer than it makes, or one fewer in an open star. The
   // first triangles made take the slots of the removed ones, the others new slots.
   LargeArray<Word> log_;
-  std::size_t made_ = 0, most_made_ = 0;  // triangles, in all and by one insertion
-  std::size_t corners_ = 0;               // of all rings
+  std::size_t made_ = 0, max_made_ = 0;  // triangles, in all and by one insertion
+  std::size_t corners_ = 0;              // of all rings
 };
 
 }  // namespace terrace::tin

@@ -71,8 +71,8 @@ bool IsSoundRecord(const InsertionRecord<Index>& record, std::size_t insertions)
 
 }  // namespace
 
-bool Refinement::IsNarrow(std::size_t vertices, std::size_t most_triangles_made) {
-  return vertices < Narrow::kNever && most_triangles_made < Narrow::kOpen;
+bool Refinement::IsNarrow(std::size_t vertices, std::size_t max_triangles_made) {
+  return vertices < Narrow::kNever && max_triangles_made < Narrow::kOpen;
 }
 
 Refinement::Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,

@@ -27,7 +27,7 @@ class Refinement {
   using Record = std::variant<InsertionRecord<std::uint16_t>, InsertionRecord<std::uint32_t>>;
 
   // Whether a record of this size has 16-bit indices, which take half of the memory. Used wherever they suffice.
-  static bool IsNarrow(std::size_t vertices, std::size_t most_triangles_made);
+  static bool IsNarrow(std::size_t vertices, std::size_t max_triangles_made);
 
   // `errors_before` and the record have one entry per insertion.
   Refinement(int width, int height, std::vector<SamplePosition> inserted, std::vector<float> errors_before,

@@ -37,10 +37,10 @@ std::size_t ConnectionSet::size() const {
 }
 
 bool ConnectionSet::HasTooMany(const std::string& client) const {
-  if (most_of_one_ == 0 || client.empty()) return false;
+  if (max_per_client_ == 0 || client.empty()) return false;
   const std::lock_guard lock(mutex_);
   const auto count = of_client_.find(client);
-  return count != of_client_.end() && count->second >= most_of_one_;
+  return count != of_client_.end() && count->second >= max_per_client_;
 }
 
 bool ConnectionSet::draining() const {

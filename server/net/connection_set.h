@@ -39,9 +39,9 @@ class Connection {
 
 class ConnectionSet {
  public:
-  // `most_of_one`: limit on the connections of one client; 0: none but the limit on all connections.
-  explicit ConnectionSet(std::size_t capacity, std::size_t most_of_one = 0)
-      : capacity_(capacity), most_of_one_(most_of_one) {}
+  // `max_per_client`: limit on the connections of one client; 0: none but the limit on all connections.
+  explicit ConnectionSet(std::size_t capacity, std::size_t max_per_client = 0)
+      : capacity_(capacity), max_per_client_(max_per_client) {}
 
   // A connection added while the set drains is drained at once. `client`: whose limit it counts against; empty: none.
   void Add(const std::shared_ptr<Connection>& connection, const std::string& client = "");
@@ -81,7 +81,7 @@ class ConnectionSet {
     bool is_evicted = false;   // told to close, and no longer counted
   };
 
-  const std::size_t capacity_, most_of_one_;
+  const std::size_t capacity_, max_per_client_;
   mutable std::mutex mutex_;
   std::condition_variable emptied_;
   std::unordered_map<const Connection*, Member> connections_;

@@ -112,8 +112,8 @@ Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& f
 Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
   if (!text) return {};
   const auto numbers = GridNumbersOf<2>(*text);
-  constexpr double kMost = 1e6;  // the scale of larger ones may overflow
-  if (!numbers || (*numbers)[0] >= (*numbers)[1] || (*numbers)[0] < -kMost || (*numbers)[1] > kMost) {
+  constexpr double kMaxScale = 1e6;  // the scale of larger ones may overflow
+  if (!numbers || (*numbers)[0] >= (*numbers)[1] || (*numbers)[0] < -kMaxScale || (*numbers)[1] > kMaxScale) {
     return InvalidGrid("range must be two numbers of metres from -1000000 to 1000000, the lower first");
   }
   if (query.format == GridFormat::kF32 || query.format == GridFormat::kGeoTiff) {

@@ -185,12 +185,12 @@ void DropHoles(const dem::MeshDemands& demands, int width, tin::TinMesh& mesh,
 
 // Whether all tiles of a level that touch the area exist.
 bool IsCovered(const dem::DemSource& source, const AreaRequest& area, int level) {
-  constexpr std::int64_t kMost = 1 << 16;  // tiles; levels that edits have added are small
+  constexpr std::int64_t kMaxTiles = 1 << 16;  // tiles; levels that edits have added are small
   const double side = 180.0 / static_cast<double>(geo::TileRows(level));
   const auto at = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / side)); };
   const std::int64_t west = at(area.west + 180), east = at(area.east + 180), south = at(area.south + 90),
                      north = std::min(at(area.north + 90), geo::TileRows(level) - 1), around = geo::TileColumns(level);
-  if ((east - west + 1) * (north - south + 1) > kMost) return false;
+  if ((east - west + 1) * (north - south + 1) > kMaxTiles) return false;
   for (std::int64_t y = south; y <= north; ++y) {
     for (std::int64_t x = west; x <= east; ++x) {
       if (!source.IsAvailable({level, (x % around + around) % around, y})) return false;

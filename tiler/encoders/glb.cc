@@ -63,9 +63,9 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   tin::TinMesh& mesh = replayed->mesh;
   const tin::SampleLimits limits = LimitsOf(*dataset.source, lattice.key);
   std::vector<float> allowed = AllowedErrors(limits, replayed->error_m);
-  double least_m = wanted_error_m;
-  for (const float error_m : allowed) least_m = std::min(least_m, static_cast<double>(error_m));
-  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m), least_m, width);
+  double min_m = wanted_error_m;
+  for (const float error_m : allowed) min_m = std::min(min_m, static_cast<double>(error_m));
+  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m), min_m, width);
   double& step_m = steps.inside;
   const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
   proto::TileErrorMeter meter(lattice, replayed->error_m, std::move(allowed));

@@ -61,7 +61,7 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
   const double relief = relief_m / static_cast<double>(quantum_);
   // For whole metres, single precision is exact except for very large triangles, and faster.
   if (quantum_ > 0 && quantum_ < 1 && !has_voids_ && relief < kMaxQuanta) {
-    most_area_in_integers_ = static_cast<float>(std::floor(kMaxNumerator / std::max(relief, 0x1p8)));
+    max_integer_area_ = static_cast<float>(std::floor(kMaxNumerator / std::max(relief, 0x1p8)));
   }
   LayOut();
   if (!has_voids_) return;

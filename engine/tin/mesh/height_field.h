@@ -47,7 +47,7 @@ class HeightField {
   // The largest doubled area of triangles that scans may process in integers: its product with the distance of a sample
   // from the triangle's plane is below 2^31 quanta, and differences of heights are below 2^22. 0 if scans cannot use
   // integers or have no need to.
-  float most_area_in_integers() const { return most_area_in_integers_; }
+  float max_integer_area() const { return max_integer_area_; }
 
   // The height of a vertex at (x, y): its sample, or the nearest valid sample if its sample is void. Only corners and
   // seeds can be void. Ties go to the smaller row, then column.
@@ -75,7 +75,7 @@ class HeightField {
   int height_ = 0;
   bool has_voids_ = false;
   float quantum_ = 0;
-  float most_area_in_integers_ = 0;
+  float max_integer_area_ = 0;
   std::size_t stride_ = 0;
   std::vector<float> heights_;  // NaN between rows
   int patches_along_x_ = 0, patches_along_y_ = 0;

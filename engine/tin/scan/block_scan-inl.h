@@ -68,7 +68,7 @@ HWY_INLINE Floats NaNWhereNegative(Floats a, Floats b, Floats c) {
 
 // The planes of as many triangles of a star as there are lanes, in single precision.
 struct StarPlanes {
-  static constexpr std::size_t kMost = hn::MaxLanes(kFloats);
+  static constexpr std::size_t kMaxFloats = hn::MaxLanes(kFloats);
 
   HWY_INLINE void Work(const HeightField& field, const Star& star, std::size_t first) {
     const std::int32_t *dx = star.ring.dx.data() + first, *dy = star.ring.dy.data() + first;
@@ -119,9 +119,9 @@ struct StarPlanes {
     // The largest distances from p of the triangle's columns and rows and of its block.
     const Floats across = hn::ConvertTo(kFloats, reach_x), up = hn::ConvertTo(kFloats, reach_y);
     const Floats of_x = hn::Add(hn::Abs(vy_uz), hn::Abs(uy_vz)), of_y = hn::Add(hn::Abs(ux_vz), hn::Abs(vx_uz));
-    const Floats most_plane = hn::Add(hn::Mul(hn::Abs(of_a), across), hn::Mul(hn::Abs(of_b), up));
+    const Floats max_plane = hn::Add(hn::Mul(hn::Abs(of_a), across), hn::Mul(hn::Abs(of_b), up));
     const Floats of_magnitude = hn::Add(hn::Mul(of_x, across), hn::Mul(of_y, up));
-    hn::Store(hn::Add(hn::Add(of_x, of_y), most_plane), kFloats, largest);
+    hn::Store(hn::Add(hn::Add(of_x, of_y), max_plane), kFloats, largest);
     hn::Store(of_magnitude, kFloats, magnitude);
 
     const auto is_exact = hn::RebindMask(kFloats, hn::Lt(extent, All(kInts, kMaxExtent + 1)));  // then of_d is exact
@@ -135,16 +135,17 @@ struct StarPlanes {
     large = tame & ~small & ~medium;
   }
 
-  HWY_ALIGN float ux[kMost], uy[kMost], vx[kMost], vy[kMost], d[kMost], a[kMost], b[kMost];
+  HWY_ALIGN float ux[kMaxFloats], uy[kMaxFloats], vx[kMaxFloats], vy[kMaxFloats], d[kMaxFloats], a[kMaxFloats],
+      b[kMaxFloats];
   // At the first sample of the block, or of the bounding box for triangles that are no blocks: barycentric coordinates
   // of u and v, plus 1/2, and A x + B y. `sum`: of all three coordinates, plus 3/2. Each edge on the border
   // subtracts 1.
-  HWY_ALIGN float u[kMost], v[kMost], sum[kMost], plane[kMost];
-  HWY_ALIGN float largest[kMost];                      // bound on all products and sums of the plane
-  HWY_ALIGN float magnitude[kMost];                    // the magnitude that rounding errors are relative to
-  HWY_ALIGN std::int32_t west[kMost], south[kMost];    // first column and row of the block or the bounding box
-  HWY_ALIGN std::int32_t width[kMost], height[kMost];  // of the bounding box
-  std::uint32_t small, medium, large, wild;            // sets of lanes
+  HWY_ALIGN float u[kMaxFloats], v[kMaxFloats], sum[kMaxFloats], plane[kMaxFloats];
+  HWY_ALIGN float largest[kMaxFloats];                         // bound on all products and sums of the plane
+  HWY_ALIGN float magnitude[kMaxFloats];                       // the magnitude that rounding errors are relative to
+  HWY_ALIGN std::int32_t west[kMaxFloats], south[kMaxFloats];  // first column and row of the block or the bounding box
+  HWY_ALIGN std::int32_t width[kMaxFloats], height[kMaxFloats];  // of the bounding box
+  std::uint32_t small, medium, large, wild;                      // sets of lanes
 
  private:
   // Makes samples on an edge along the field's border lie outside.
@@ -181,9 +182,9 @@ constexpr float kDoubtInBlocks = 0x1p-18F;
 // Given the largest numerator in single precision, returns the smallest numerator that may be the largest in double;
 // the same one if single precision is exact. Never negative, because negative numerators are not samples of the
 // triangle.
-HWY_INLINE float LeastInDoubt(float most, float largest, float magnitude, float most_exact, float doubt) {
+HWY_INLINE float MinUncertain(float most, float largest, float magnitude, float max_exact, float doubt) {
   const float least = std::max(most - doubt * (most + magnitude), 0.0F);
-  return most + largest < most_exact ? most : least;
+  return most + largest < max_exact ? most : least;
 }
 
 // Scans one block from (west, south) relative to p. `most`: the largest numerator, negative if there is no sample.
@@ -195,7 +196,7 @@ struct BlockFind {
 };
 template <int kSide>
 HWY_INLINE BlockFind ScanBlock(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
-                               float most_exact) {
+                               float max_exact) {
   constexpr int kLanes = static_cast<int>(hn::MaxLanes(kFloats)), kRowsAtOnce = kLanes / kSide;
   constexpr int kVectors = kSide * kSide / kLanes;
   const Floats x = hn::Load(kFloats, kSide == 4 ? kColumnsBy4 : kColumnsBy8);
@@ -227,8 +228,8 @@ HWY_INLINE BlockFind ScanBlock(const HeightField& field, const Star& star, const
   }
   Floats least = hn::MaxOfLanes(kFloats, most);
   BlockFind find{hn::GetLane(least), 0};
-  if (!(find.most + planes.largest[i] < most_exact)) [[unlikely]]
-    least = All(kFloats, LeastInDoubt(find.most, planes.largest[i], planes.magnitude[i], most_exact, kDoubtInBlocks));
+  if (!(find.most + planes.largest[i] < max_exact)) [[unlikely]]
+    least = All(kFloats, MinUncertain(find.most, planes.largest[i], planes.magnitude[i], max_exact, kDoubtInBlocks));
 #pragma GCC unroll 8
   for (int k = 0; k < kVectors; ++k) {
     find.found |= std::uint64_t{BitsOf(kFloats, hn::Ge(numerators[k], least))} << (k * kLanes);

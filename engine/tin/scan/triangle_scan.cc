@@ -57,12 +57,12 @@ HWY_NOINLINE PlaneMisfit MisfitInDoubt(const HeightField& field, const Star& sta
 // The result of ScanBlock: usually a single sample.
 template <int kSide>
 HWY_INLINE PlaneMisfit MisfitOf(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
-                                std::size_t first, const BlockFind& find, float most_exact) {
+                                std::size_t first, const BlockFind& find, float max_exact) {
   if (find.most < 0) return {};
   const int west = planes.west[i], south = planes.south[i];
   const std::uint32_t base = SampleNumber(star.x + west, star.y + south);
   const auto sample = [&](int k) { return base + SampleNumber(k % kSide, k / kSide); };
-  const bool is_exact = find.most + planes.largest[i] < most_exact;
+  const bool is_exact = find.most + planes.largest[i] < max_exact;
   if (is_exact || (find.most == 0 && planes.magnitude[i] == 0)) {
     if (find.most > 0) {
       return {static_cast<double>(find.most) / static_cast<double>(planes.d[i]), sample(std::countr_zero(find.found))};
@@ -109,13 +109,13 @@ HWY_NOINLINE PlaneMisfit ScanWild(const HeightField& field, const Star& star, st
 // A larger triangle for which single precision is not exact. Usable only if no lane has two samples that may be the
 // furthest.
 HWY_NOINLINE PlaneMisfit ScanDoubtfully(const HeightField& field, const Star& star, const StarPlanes& planes,
-                                        std::size_t i, std::size_t first, float most_exact) {
+                                        std::size_t i, std::size_t first, float max_exact) {
   const auto two = ScanWide<FurthestTwo>(field, SinglePlaneOf(field, star, planes, i, first));
   const float single = two.numerator();
   if (single < 0) return {};
   if (single == 0 && planes.magnitude[i] == 0) return OnPlane(field, star, first + i);
   const ExactPlane t = ExactPlaneOf(field, star, first + i);
-  const float least = LeastInDoubt(single, planes.largest[i], planes.magnitude[i], most_exact, kDoubt);
+  const float least = MinUncertain(single, planes.largest[i], planes.magnitude[i], max_exact, kDoubt);
   if (!(single < kMaxMagnitude) || MayBeACorner(single, planes.magnitude[i], kDoubt) || two.runner_up() >= least) {
     return ScanExactly(field, t);
   }
@@ -169,37 +169,37 @@ HWY_NOINLINE PlaneMisfit ScanInIntegers(const HeightField& field, const Star& st
 }
 
 HWY_INLINE PlaneMisfit ScanLarge(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t i,
-                                 std::size_t first, float most_exact) {
-  if (planes.d[i] <= field.most_area_in_integers()) return ScanInIntegers(field, star, planes, i, first);
-  if (planes.largest[i] < most_exact) {
+                                 std::size_t first, float max_exact) {
+  if (planes.d[i] <= field.max_integer_area()) return ScanInIntegers(field, star, planes, i, first);
+  if (planes.largest[i] < max_exact) {
     const auto furthest = ScanWide<Furthest<FloatsTag>>(field, SinglePlaneOf(field, star, planes, i, first));
     const float numerator = furthest.numerator();
     if (numerator < 0) return {};
-    if (numerator + planes.largest[i] < most_exact) {
+    if (numerator + planes.largest[i] < max_exact) {
       if (!(numerator > 0)) return OnPlane(field, star, first + i);
       return {static_cast<double>(numerator) / static_cast<double>(planes.d[i]), furthest.sample()};
     }
   }
-  return ScanDoubtfully(field, star, planes, i, first, most_exact);
+  return ScanDoubtfully(field, star, planes, i, first, max_exact);
 }
 
 // Class by class, not triangle by triangle, because the class of a triangle would be mispredicted.
 HWY_INLINE void ScanTogether(const HeightField& field, const Star& star, const StarPlanes& planes, std::size_t first,
-                             std::uint32_t lanes, float most_exact, PlaneMisfit* misfits) {
+                             std::uint32_t lanes, float max_exact, PlaneMisfit* misfits) {
   const auto lane = [](std::uint32_t bits) { return static_cast<std::size_t>(std::countr_zero(bits)); };
   for (std::uint32_t bits = lanes; bits != 0; bits &= bits - 1) misfits[lane(bits)] = {};
   for (std::uint32_t bits = planes.small & lanes; bits != 0; bits &= bits - 1) {
     const std::size_t i = lane(bits);
-    const BlockFind find = ScanBlock<4>(field, star, planes, i, most_exact);
-    misfits[i] = MisfitOf<4>(field, star, planes, i, first, find, most_exact);
+    const BlockFind find = ScanBlock<4>(field, star, planes, i, max_exact);
+    misfits[i] = MisfitOf<4>(field, star, planes, i, first, find, max_exact);
   }
   for (std::uint32_t bits = planes.medium & lanes; bits != 0; bits &= bits - 1) {
     const std::size_t i = lane(bits);
-    const BlockFind find = ScanBlock<kLargeSide>(field, star, planes, i, most_exact);
-    misfits[i] = MisfitOf<kLargeSide>(field, star, planes, i, first, find, most_exact);
+    const BlockFind find = ScanBlock<kLargeSide>(field, star, planes, i, max_exact);
+    misfits[i] = MisfitOf<kLargeSide>(field, star, planes, i, first, find, max_exact);
   }
   for (std::uint32_t bits = planes.large & lanes; bits != 0; bits &= bits - 1) {
-    misfits[lane(bits)] = ScanLarge(field, star, planes, lane(bits), first, most_exact);
+    misfits[lane(bits)] = ScanLarge(field, star, planes, lane(bits), first, max_exact);
   }
   for (std::uint32_t bits = planes.wild & lanes; bits != 0; bits &= bits - 1) {
     misfits[lane(bits)] = ScanWild(field, star, first + lane(bits));
@@ -218,12 +218,12 @@ void ScanStar(const HeightField& field, const Star& star, PlaneMisfit* misfits) 
 #else
   StarPlanes planes;
   const std::size_t lanes = hn::Lanes(kFloats);
-  const float most_exact = field.quantum() * 0xFFFF00;
+  const float max_exact = field.quantum() * 0xFFFF00;
   for (std::size_t first = 0; first < star.count; first += lanes) {
     planes.Work(field, star, first);
     const std::size_t count = std::min(lanes, star.count - first);
     const std::uint32_t left_out = first < Star::kMaxLeftOut ? star.left_out >> first : 0;
-    ScanTogether(field, star, planes, first, ((1U << count) - 1) & ~left_out, most_exact, misfits + first);
+    ScanTogether(field, star, planes, first, ((1U << count) - 1) & ~left_out, max_exact, misfits + first);
   }
 #endif
 }

@@ -42,11 +42,11 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
   const std::string what =
       info.overviews_unused.empty() ? "no overviews" : fmt::format("overviews not used: {}", info.overviews_unused);
   if (info.is_in_folder) return what + "; their place is taken by averages in the cache folder";
-  if (info.least_kept_factor > 0 && info.least_kept_factor <= kQuick) {
+  if (info.min_kept_factor > 0 && info.min_kept_factor <= kQuick) {
     return what + "; their place is taken by averages in memory, made at every start: a cache_dir would keep them";
   }
   return fmt::format("{}; shallow tiles read {}: give terrace a cache_dir with room, or run 'gdaladdo -r average {}'",
-                     what, info.least_kept_factor > 0 ? "many samples" : "the whole raster", info.path);
+                     what, info.min_kept_factor > 0 ? "many samples" : "the whole raster", info.path);
 }
 
 // Advice about this raster; empty: none.

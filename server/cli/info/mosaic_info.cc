@@ -86,7 +86,7 @@ std::ptrdiff_t CountHidden(const std::vector<dem::RasterInfo>& sources) {
 std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   const auto count = [&](auto is_so) { return std::ranges::count_if(info.sources, is_so); };
   const auto large = count([](const dem::RasterInfo& s) {
-    const bool has_averages = s.least_kept_factor > 0 && s.least_kept_factor <= 4;
+    const bool has_averages = s.min_kept_factor > 0 && s.min_kept_factor <= 4;
     return std::max(s.width, s.height) > 4096 && s.overview_factors.empty() && !has_averages;
   });
   const auto no_datum = count([](const dem::RasterInfo& s) { return s.datum_in_use.empty(); });

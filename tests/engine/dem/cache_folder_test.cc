@@ -180,7 +180,7 @@ TEST(CacheFolder, FilesInUseStayAndWhatFindsNoRoomIsKeptInMemory) {
     EXPECT_NE(used->averages(), nullptr);
     EXPECT_EQ(other->averages(), nullptr);
     ASSERT_NE(other->memory_averages(), nullptr);
-    EXPECT_EQ(other->memory_averages()->least_factor(), 4);
+    EXPECT_EQ(other->memory_averages()->min_factor(), 4);
     EXPECT_EQ(cache.memory->left(), budget - other->memory_averages()->bytes());
     EXPECT_NE(cache.folder->problem().find("cache_dir_bytes"), std::string::npos) << cache.folder->problem();
     ExpectAveragesOf(first, *used);
@@ -429,10 +429,10 @@ TEST(MemoryAverages, EachRasterGetsAShareOfWhatIsLeft) {
   for (int i = 0; i < 70; ++i) {
     kept.push_back(MemoryAverages::Make(layout, budget));
     ASSERT_NE(kept.back(), nullptr) << i;
-    EXPECT_GE(kept.back()->least_factor(), i == 0 ? 4 : kept[kept.size() - 2]->least_factor());
+    EXPECT_GE(kept.back()->min_factor(), i == 0 ? 4 : kept[kept.size() - 2]->min_factor());
   }
-  EXPECT_EQ(kept.front()->least_factor(), 4);
-  EXPECT_GT(kept.back()->least_factor(), 4);
+  EXPECT_EQ(kept.front()->min_factor(), 4);
+  EXPECT_GT(kept.back()->min_factor(), 4);
   EXPECT_GT(budget->left(), 0U);
   kept.clear();
   EXPECT_EQ(budget->left(), all);

@@ -233,8 +233,8 @@ TEST(ManySources, VoidsAreComparedAsOftenAsSomethingChangesAlongTheRims) {
   }
   const auto members = MakeMembers(dir, std::vector<std::uint8_t>(kAcross * kAcross), 0, voids);
   const GridVoids grid(members, IndexOfMembers(members), 0);
-  EXPECT_GT(grid.looks(), 0u);
-  EXPECT_LE(grid.looks(), members.size() * 40) << "160 pixels of a rim, with a neighbour each";
+  EXPECT_GT(grid.examinations(), 0u);
+  EXPECT_LE(grid.examinations(), members.size() * 40) << "160 pixels of a rim, with a neighbour each";
 }
 
 RasterSpec Rough(int side) {

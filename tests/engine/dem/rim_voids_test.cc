@@ -16,7 +16,7 @@ namespace terrace::dem {
 namespace {
 
 // Chunks of a raster as the statistics pass makes them.
-RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& voids, std::size_t most_runs,
+RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& voids, std::size_t max_runs,
                       std::vector<std::uint8_t>& holes) {
   holes.assign(voids.size(), 0);
   const auto at = [&](int c, int r) {
@@ -27,7 +27,7 @@ RimVoids FindRimVoids(int width, int height, const std::vector<std::uint8_t>& vo
       [&](int row, int first, int last, std::int64_t) {
         std::fill(&holes[at(first, row)], &holes[at(last, row)] + 1, 1);
       },
-      most_runs);
+      max_runs);
   const ChunkGrid chunks(width, height);
   for (int index = 0; index < chunks.count(); ++index) {
     const Chunk chunk = chunks.At(index);

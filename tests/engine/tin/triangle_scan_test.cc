@@ -69,8 +69,7 @@ TEST(TriangleScan, CountsInIntegersWhereTheyHoldAllNumerators) {
     const SamplePosition p = RandomSample(random, field), u = RandomSample(random, field),
                          v = RandomSample(random, field);
     if (Orientation(p, u, v) <= 0) continue;
-    (static_cast<double>(Orientation(p, u, v)) <= static_cast<double>(field.most_area_in_integers()) ? held
-                                                                                                     : not_held)++;
+    (static_cast<double>(Orientation(p, u, v)) <= static_cast<double>(field.max_integer_area()) ? held : not_held)++;
     ExpectReference(field, *TestStar(field, p, {u, v}));
     ASSERT_FALSE(HasFatalFailure()) << "relief " << relief;
   }
