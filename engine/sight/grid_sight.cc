@@ -251,7 +251,7 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRang
   const int count = static_cast<int>((size + 4 * curvature * (last - first) * (last - first)) * 1.125) + 1;
   const double step = (last - first) / count;
   const auto bulge = [step](const Quadratic& q) { return std::abs(q.curvature()) * step * step / 4; };
-  const Quadratic &on_x = scan.on_grid.x, &on_y = scan.on_grid.y, &height_m = scan.piece.height_m;
+  const Quadratic on_x = scan.on_grid.x, on_y = scan.on_grid.y, height_m = scan.piece.height_m;
   const GridWindow& window = block.window();
   const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
   const double north = static_cast<double>(window.row) + bulge(on_y) + kSlack;
@@ -265,14 +265,14 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRang
                            cells.east - window.column, cells.south - window.row};
   const bool has_cells = window.columns > 1 && window.rows > 1;
   const float* const largest = block.largest().data();
-  const auto stride = static_cast<std::size_t>(window.columns);
+  const std::int64_t stride = window.columns;
   double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
   for (int i = 1; i <= count; ++i) {
     const double next = i == count ? last : first + step * i;
     const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
     // Positions before the window's first sample are cut off by no more than the bulge.
-    const auto column = static_cast<std::size_t>(std::max(std::min(x, next_x), 0.0));
-    const auto row = static_cast<std::size_t>(std::max(std::min(y, next_y), 0.0));
+    const auto column = static_cast<std::int64_t>(std::max(std::min(x, next_x), 0.0));
+    const auto row = static_cast<std::int64_t>(std::max(std::min(y, next_y), 0.0));
     const auto highest = static_cast<double>(largest[row * stride + column]);
     const auto is_settled = [&](double clearance_m) { return scan.search.IsSettled(clearance_m, scan.ShareOf(s)); };
     if (!is_settled(std::min(h, next_h) - highest)) {
