@@ -12,6 +12,7 @@
 #include <exception>
 #include <filesystem>
 #include <future>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -38,13 +39,15 @@ void LogOpened(const config::DatasetConfig& wanted, const tiler::Dataset& datase
                tiler::VersionText(dataset.generation));
 }
 
+// Unknown, as of a remote file: the largest number.
 std::uintmax_t BytesOf(const config::DatasetConfig& dataset) {
   std::uintmax_t bytes = 0;
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
       std::error_code unreadable;
       const std::uintmax_t size = std::filesystem::file_size(file, unreadable);
-      if (!unreadable) bytes += size;
+      if (unreadable) return std::numeric_limits<std::uintmax_t>::max();
+      bytes += size;
     }
   }
   return bytes;
