@@ -18,38 +18,32 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The largest sum, over the crossings, of the error there and the deviation of the surface beside it. Floats suffice,
-// because Over adds what they may be off.
-float LargestAt(const EdgeCrossings& edge) {
-  const hn::CappedTag<float, 8> d;
-  const hn::RebindToSigned<decltype(d)> integers;
+// The largest sum, over the crossings, of the error there and the deviation of the surface beside it.
+HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
+  const double first = std::floor(std::min(edge.from, edge.to)) + 1, last = std::ceil(std::max(edge.from, edge.to)) - 1;
+  if (!(first <= last)) return 0;
+  const hn::CappedTag<double, 4> d;
+  const hn::Rebind<std::int32_t, decltype(d)> integers;
+  const hn::Rebind<float, decltype(d)> floats;
   using V = hn::Vec<decltype(d)>;
-  const auto set = [d](float value) HWY_ATTR { return hn::Set(d, value); };
-  const int lanes = static_cast<int>(hn::Lanes(d)), count = edge.columns + edge.rows;
-  const V one = set(1), stride = set(static_cast<float>(edge.stride)), height = set(edge.height);
-  const V columns = set(static_cast<float>(edge.columns)), last = set(static_cast<float>(count - 1));
-  const V before_rows = set(edge.first_row - static_cast<float>(edge.columns));
-  V largest = hn::Zero(d);
-  for (int k = 0; k < count; k += lanes) {
+  const double lanes = static_cast<double>(hn::Lanes(d));
+  const V last_line = hn::Set(d, last), from = hn::Set(d, edge.from), zero = hn::Zero(d);
+  const V inverse = hn::Set(d, 1 / (edge.to - edge.from)), last_cell = hn::Set(d, edge.cells - 1);
+  V largest = zero;
+  for (double line = first; line <= last; line += lanes) {
     // Surplus lanes repeat the last crossing.
-    const V crossing = hn::Min(hn::Iota(d, static_cast<float>(k)), last);
-    const auto is_row = hn::Ge(crossing, columns);
-    const auto either = [&](V of_row, V of_column) HWY_ATTR { return hn::IfThenElse(is_row, of_row, of_column); };
-    const V line = hn::Add(crossing, either(before_rows, set(edge.first_column)));
-    const V part = hn::Mul(hn::Sub(line, either(set(edge.y), set(edge.x))), either(set(edge.per_dy), set(edge.per_dx)));
-    const V along = hn::MulAdd(part, either(set(edge.dx), set(edge.dy)), either(set(edge.x), set(edge.y)));
-    const V cell = hn::Min(hn::Max(hn::Floor(along), either(set(edge.west), set(edge.south))),
-                           either(set(edge.east), set(edge.north)));
-    const V step = either(one, stride), of_line = hn::Mul(line, either(stride, one));
-    const auto at = hn::ConvertTo(integers, hn::MulAdd(cell, step, of_line));
-    const auto next = hn::Add(at, hn::ConvertTo(integers, step));
-    // Both cells beside the crossing are around the nearer node.
-    const auto nearer = hn::ConvertTo(integers, hn::MulAdd(hn::Round(along), step, of_line));
-    const V here = hn::GatherIndex(d, edge.heights, at);
-    const V rise = hn::Sub(hn::GatherIndex(d, edge.heights, next), here);
-    const V surface = hn::MulAdd(hn::Sub(along, cell), rise, hn::Sub(here, height));
-    const V error = hn::Abs(hn::Sub(hn::Mul(part, set(edge.rise)), surface));
-    largest = hn::Max(largest, hn::MulAdd(hn::GatherIndex(d, edge.twists, nearer), set(edge.bend), error));
+    const V lines = hn::Min(hn::Iota(d, line), last_line);
+    const V part = hn::Mul(hn::Sub(lines, from), inverse);
+    const V along = hn::Add(hn::Set(d, edge.along_from), hn::Mul(part, hn::Set(d, edge.along)));
+    const V cell = hn::Min(hn::Max(hn::Floor(along), zero), last_cell);
+    const auto at = hn::DemoteTo(
+        integers, hn::Add(hn::Mul(lines, hn::Set(d, edge.line_stride)), hn::Mul(cell, hn::Set(d, edge.step))));
+    const auto gather = [&](const float* values) HWY_ATTR { return hn::GatherIndex(floats, values, at); };
+    const V here = hn::PromoteTo(d, gather(edge.heights)), next = hn::PromoteTo(d, gather(edge.heights + edge.step));
+    const V surface = hn::Add(here, hn::Mul(hn::Sub(along, cell), hn::Sub(next, here)));
+    const V height = hn::Add(hn::Set(d, edge.height), hn::Mul(part, hn::Set(d, edge.rise)));
+    const V twist = hn::PromoteTo(d, hn::Max(gather(edge.twists), gather(edge.twists + edge.step)));
+    largest = hn::Max(largest, hn::Add(hn::Abs(hn::Sub(height, surface)), hn::Mul(twist, hn::Set(d, edge.bend))));
   }
   return hn::GetLane(hn::MaxOfLanes(d, largest));
 }
@@ -83,6 +77,10 @@ void SpreadTwists(const float* twists, std::size_t nodes, float* below, float* o
   }
 }
 
+double LargestAtBoth(const LatticeCrossings& columns, const LatticeCrossings& rows) {
+  return std::max(LargestAt(columns), LargestAt(rows));
+}
+
 }  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace terrace::proto
@@ -92,24 +90,11 @@ HWY_AFTER_NAMESPACE();
 namespace terrace::proto {
 namespace {
 
-HWY_EXPORT(LargestAt);
+HWY_EXPORT(LargestAtBoth);
 HWY_EXPORT(MeasureCells);
 HWY_EXPORT(SpreadTwists);
 
 constexpr std::size_t kLanes = 16;  // limit of the lanes, and so of the values stored beyond the last node
-
-// The lines strictly between two coordinates, which are not negative.
-struct LinesBetween {
-  LinesBetween(double from, double to) {
-    const double low = std::min(from, to), high = std::max(from, to);
-    const int below = static_cast<int>(high);
-    first = static_cast<int>(low) + 1;
-    count = std::max(below - first + (static_cast<double>(below) < high ? 1 : 0), 0);
-  }
-  int first, count;
-};
-
-constexpr double kRounding = 1e-9;  // of places and heights
 
 }  // namespace
 
@@ -142,40 +127,22 @@ EdgeBound::End EdgeBound::EndAt(LatticePoint place, double height) const {
 
 // Between two crossings the difference is a quadratic along the edge, which leaves the line between its ends by at most
 // a quarter of its bend: the cell's twist, times the lengths of the piece on both axes. These are at most one step and
-// the edge's slope against its longer axis. Each end of a piece counts the twists of all cells around a node beside it.
+// the edge's slope against its longer axis. Each end of a piece counts the twists of all cells around it.
 double EdgeBound::Over(const End& a, const End& b) const {
   const int cells = lattice_.cells();
+  const std::int32_t stride = cells + 3;
   const double dx = b.place.x - a.place.x, dy = b.place.y - a.place.y, rise = b.height - a.height;
-  const double width = std::abs(dx), length = std::abs(dy);
-  const double longer = std::max(width, length), shorter = std::min(width, length);
+  const double longer = std::max(std::abs(dx), std::abs(dy)), shorter = std::min(std::abs(dx), std::abs(dy));
   const double bend = longer > 0 ? shorter / longer / 4 : 0;
-  const double at_ends = std::max(a.error + a.twist * bend, b.error + b.twist * bend);
-  const LinesBetween columns(a.place.x, b.place.x), rows(a.place.y, b.place.y);
-  if (columns.count + rows.count == 0) return at_ends + kRounding * (at_ends + std::abs(a.height) + std::abs(b.height));
-
-  const int i = static_cast<int>(a.place.x), j = static_cast<int>(a.place.y);
-  const std::ptrdiff_t node = lattice_.Row(j) + i - lattice_.heights.data();
-  const double per_dx = columns.count > 0 ? 1 / dx : 0, per_dy = rows.count > 0 ? 1 / dy : 0;
-  EdgeCrossings edge;
-  edge.x = static_cast<float>(a.place.x - i), edge.y = static_cast<float>(a.place.y - j);
-  edge.dx = static_cast<float>(dx), edge.dy = static_cast<float>(dy);
-  edge.per_dx = static_cast<float>(per_dx), edge.per_dy = static_cast<float>(per_dy);
-  edge.first_column = static_cast<float>(columns.first - i), edge.first_row = static_cast<float>(rows.first - j);
-  edge.columns = columns.count, edge.rows = rows.count;
-  edge.west = static_cast<float>(-i), edge.south = static_cast<float>(-j);
-  edge.east = static_cast<float>(cells - 1 - i), edge.north = static_cast<float>(cells - 1 - j);
-  edge.height = static_cast<float>(a.height), edge.rise = static_cast<float>(rise);
-  edge.bend = static_cast<float>(bend);
-  edge.heights = lattice_.heights.data() + node, edge.twists = twists_.get() + node;
-  edge.stride = cells + 3;
-  const double largest = std::max<double>(at_ends, HWY_DYNAMIC_DISPATCH(LargestAt)(edge));
-  // What 24 bits may be off: a crossing along the edge, and so along the line; the place itself; heights.
-  constexpr double kOff = 0x1p-21;
-  const double off = kOff * (width + length + 2), drop = std::abs(rise);
-  const double of_crossing = off * std::max(std::abs(per_dx) * (length * steepest_north_ + drop),
-                                            std::abs(per_dy) * (width * steepest_east_ + drop));
-  return largest + of_crossing + off * (double{steepest_east_} + steepest_north_) + kOff * (largest + drop) +
-         std::abs(a.height - static_cast<double>(edge.height)) + kRounding * (std::abs(a.height) + std::abs(b.height));
+  const float *const heights = lattice_.Row(0), *const twists = twists_.get() + stride + 1;
+  const LatticeCrossings columns{a.place.x, b.place.x, a.place.y, dy, a.height, rise,
+                                 bend,      heights,   twists,    1,  stride,   cells};
+  const LatticeCrossings rows{a.place.y, b.place.y, a.place.x, dx,     a.height, rise,
+                              bend,      heights,   twists,    stride, 1,        cells};
+  const double largest = std::max(
+      {a.error + a.twist * bend, b.error + b.twist * bend, HWY_DYNAMIC_DISPATCH(LargestAtBoth)(columns, rows)});
+  constexpr double kRounding = 1e-9;
+  return largest + kRounding * (largest + std::abs(a.height) + std::abs(b.height));
 }
 
 }  // namespace terrace::proto

@@ -14,17 +14,15 @@ struct LatticePoint {
   double x = 0, y = 0;
 };
 
-// Where an edge crosses the lattice's lines: first those of columns, then those of rows. Coordinates are lattice steps
-// from a node near its first end.
-struct EdgeCrossings {
-  float x = 0, y = 0, dx = 0, dy = 0, per_dx = 0, per_dy = 0;  // the first end, the way to the last one, its inverses
-  float first_column = 0, first_row = 0;                       // crossed; further ones follow in steps of 1
-  int columns = 0, rows = 0;                                   // as many
-  float west = 0, south = 0, east = 0, north = 0;              // the tile's outermost cells
-  float height = 0, rise = 0;                                  // of the edge at the first end; to the last end
-  float bend = 0;  // the deviation of the surface between two crossings is at most bend * the cell's twist
-  const float *heights = nullptr, *twists = nullptr;  // at the node
-  int stride = 0;                                     // from row to row
+// Where an edge crosses the lattice's lines of one direction. Axes are named for lines of columns.
+struct LatticeCrossings {
+  double from, to;           // across the lines, at both ends
+  double along_from, along;  // along the lines: at the first end; the difference to the last end
+  double height, rise;       // of the edge at the first end; the difference to the last end
+  double bend;               // the deviation of the surface between two crossings is at most bend * the cell's twist
+  const float *heights, *twists;
+  std::int32_t line_stride, step;  // from one line to the next, and along a line
+  int cells;
 };
 
 class EdgeBound {
