@@ -32,6 +32,7 @@ class TestHandlers : private ProcessState {
   bool draining() const override { return false; }
   bool opening() const override { return false; }
   std::map<std::string, std::string> problems() const override { return {}; }
+  std::vector<PendingDataset> PendingOf(const Catalog&) const override { return {}; }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { co_return nullptr; }
 
   TileService tiles_;
