@@ -83,7 +83,8 @@ DatasetSlot::DatasetSlot(config::DatasetConfig wanted, std::future<Result<tiler:
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
 
 std::string DatasetSlot::Problem() const {
-  if (!problem_.empty()) return problem_;
+  const bool is_tried_again = !serving_ && is_opening();
+  if (!problem_.empty() && !is_tried_again) return problem_;
   if (serving_ && stale_since_ && Clock::now() - *stale_since_ > kPatience)
     return "its source changes and is not complete yet";
   return {};

@@ -121,12 +121,12 @@ void Reloader::Run() {
   std::unique_lock lock(mutex_);
   while (!wake_.wait_for(lock, kMinPause, [this] { return stop_; })) {
     const auto is_due = [this] { return look_ || reload_ || stop_; };
-    if (IsBusy() || watch_) {
+    if (IsBusy() || watch_ || LacksDatasets()) {
       wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
     } else {
       wake_.wait(lock, is_due);
     }
-    if (stop_) return;
+    if (stop_ || hooks_.stop.stop_requested()) return;
     const bool reload = std::exchange(reload_, false), look = std::exchange(look_, false) || reload;
     lock.unlock();
     const Clock::time_point now = Clock::now();
@@ -149,6 +149,11 @@ bool Reloader::IsBusy() const {
   return config_settles_ || !leaving_.empty() || std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) {
            return slot.is_opening() || !slot.is_current();
          });
+}
+
+// Such datasets are tried again, also if nothing is watched.
+bool Reloader::LacksDatasets() const {
+  return std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) { return !slot.serving(); });
 }
 
 // An exception says nothing about the configuration. Nothing has changed yet, so the next check tries again.

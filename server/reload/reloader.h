@@ -8,6 +8,7 @@
 #include <functional>
 #include <map>
 #include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -35,6 +36,7 @@ class Reloader {
     std::function<void()> reloaded = {};
     // Receives the problems by dataset; "" is the configuration. Called on the reloader's thread when they change.
     std::function<void(const std::map<std::string, std::string>&)> report;
+    std::stop_token stop = {};  // requested: opens and publishes nothing any more
   };
 
   // `datasets`: the served datasets, opened from `config.datasets` in the same order.
@@ -63,6 +65,7 @@ class Reloader {
   void Publish();
   void ReportProblems();
   bool IsBusy() const;
+  bool LacksDatasets() const;
 
   const Hooks hooks_;
   bool watch_ = false;

@@ -153,8 +153,8 @@ int ServeRun::ServeDatasets() {
     std::fprintf(stderr, "%sterrace: %s answers; being prepared: %s\n", ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "",
                  server_->url().c_str(), fmt::format("{}", fmt::join(first->pending, ", ")).c_str());
   }
+  NotifyReady(ServedText());  // before the reloader's thread may notify newer texts
   reloader_->Start(config_.watch);
-  NotifyReady(ServedText());
   MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
   const server::MemoryTrimmer trimmer;
   const bool drained = server_->Wait();
@@ -166,10 +166,15 @@ server::Reloader::Hooks ServeRun::MakeHooks() {
   server::Reloader::Hooks hooks;
   hooks.load = [this] { return watch_.Load(); };
   hooks.may_have_changed = [this] { return watch_.MayHaveChanged(); };
-  hooks.open = [cache = cache_, shares = shares_](const config::DatasetConfig& wanted, std::stop_token stop) {
+  hooks.stop = stop_opening_.get_token();
+  hooks.open = [cache = cache_, shares = shares_, end = hooks.stop](const config::DatasetConfig& wanted,
+                                                                    const std::stop_token& stop) {
+    std::stop_source either;
+    const auto request = [&either] { either.request_stop(); };
+    const std::stop_callback on_stop(stop, request), on_end(end, request);
     shares->Begin(wanted.name);
     const auto on_progress = [&](double share) { shares->Raise(wanted.name, share); };
-    return OpenDataset(wanted, cache, TERRACE_VERSION, on_progress, std::move(stop));
+    return OpenDataset(wanted, cache, TERRACE_VERSION, on_progress, either.get_token());
   };
   hooks.publish = [this](const std::vector<tiler::Dataset>& served, const config::Config& now) {
     Publish(served, now);

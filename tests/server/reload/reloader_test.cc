@@ -61,7 +61,7 @@ class ReloaderTest : public testing::Test {
   Result<tiler::Dataset> Open(const config::DatasetConfig& wanted, const std::stop_token& stop) {
     ++openings_;
     if (blocks_) {
-      while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
+      while (blocks_ && !stop.stop_requested()) std::this_thread::sleep_for(1ms);
       return MakeError(ErrorCode::kCancelled, "stopped");
     }
     if (fails_) return MakeError(ErrorCode::kInvalidArgument, "no raster");
@@ -87,6 +87,7 @@ class ReloaderTest : public testing::Test {
 
   Reloader::Hooks MakeHooks() {
     Reloader::Hooks hooks;
+    hooks.stop = stop_;
     hooks.may_have_changed = [this] {
       ++looks_;
       return changes_.load();
@@ -130,6 +131,7 @@ class ReloaderTest : public testing::Test {
 
   fs::path folder_;
   config::Config config_;
+  std::stop_token stop_;
   std::atomic<int> openings_{0}, looks_{0}, loads_{0};
   std::atomic<bool> changes_{true};
   std::atomic<bool> blocks_{false}, fails_{false}, throws_{false};
@@ -260,6 +262,32 @@ TEST_F(ReloaderTest, ServesWhatAStartHasNotOpened) {
   Put("b");
   reloader_->Look();
   ASSERT_TRUE(Eventually([&] { return names() == "abc" && Problems().empty(); }));
+}
+
+TEST_F(ReloaderTest, ADatasetThatWasNeverServedIsTriedAgainWithoutWatching) {
+  fails_ = true;
+  std::vector<DatasetSlot> slots;
+  slots.emplace_back(config_.datasets[0]);
+  next_ = config_;
+  reloader_ = std::make_unique<Reloader>(config_, std::move(slots), MakeHooks());
+  reloader_->Start(/*watch=*/false);
+  ASSERT_TRUE(Eventually([&] { return Problems()["a"] == "no raster"; }));
+  blocks_ = true;
+  ASSERT_TRUE(Eventually([&] { return openings_ == 2; }));
+  EXPECT_TRUE(Eventually([&] { return Problems().empty(); })) << "it is being prepared again";
+  blocks_ = fails_ = false;
+  EXPECT_TRUE(Eventually([&] { return Served().size() == 1; }));
+}
+
+TEST_F(ReloaderTest, OpensNothingAfterAStop) {
+  std::stop_source stop;
+  stop_ = stop.get_token();
+  Start();
+  stop.request_stop();
+  Put("a");
+  reloader_->Look();
+  std::this_thread::sleep_for(500ms);
+  EXPECT_EQ(openings_, 0);
 }
 
 TEST_F(ReloaderTest, StoppingStopsTheOpeningOfAStart) {
