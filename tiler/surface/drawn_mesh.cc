@@ -15,8 +15,10 @@ constexpr int kBoundedLevel = 4;
 
 double SideDegrees(const geo::TileKey& key) { return 180.0 / static_cast<double>(geo::TileRows(key.level)); }
 
-// Of a place in the tile, 0 .. 1.
-int BucketOf(double place, int side) { return std::clamp(static_cast<int>(place * side), 0, side - 1); }
+// Of a place in the tile, 0 .. 1. Places outside have the bucket at the edge.
+int BucketOf(double place, int side) {
+  return std::min(static_cast<int>(std::clamp(place, 0.0, 1.0) * side), side - 1);
+}
 
 // Tiles: at least the distance from a parallel of any of its chords.
 double ChordAt(const geo::TileKey& key, double latitude) {

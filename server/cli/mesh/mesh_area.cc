@@ -78,7 +78,8 @@ Result<tiler::AreaRequest> RequestOf(const AreaMeshArguments& arguments, const d
 void Print(const AreaMeshArguments& arguments, const dem::DemSource& source, const tiler::AreaRequest& request,
            const tiler::AreaPlan& plan, const tiler::EncodedTile& mesh, const MeshSeconds& seconds) {
   const bool is_local = request.coordinates == tiler::AreaCoordinates::kEnu;
-  const std::array<double, 2> origin = {plan.centre.latitude, plan.centre.longitude};
+  const double longitude = plan.centre.longitude > 180 ? plan.centre.longitude - 360 : plan.centre.longitude;
+  const std::array<double, 2> origin = {plan.centre.latitude, longitude};
   if (arguments.json) {
     nlohmann::ordered_json statistics = {
         {"input", {{"path", arguments.dem}, {"width", plan.window.columns}, {"height", plan.window.rows}}},
