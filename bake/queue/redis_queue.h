@@ -113,7 +113,7 @@ class RedisQueue : public UnitQueue {
   Clock::time_point next_connect_{};
   std::optional<Clock::time_point> away_since_;
 
-  mutable std::mutex mutex_;  // of what follows; never held while Redis is waited for
+  mutable std::mutex mutex_;       // of what follows; never held while Redis is waited for
   Clock::time_point next_take_{};  // Take does not ask before
   std::string incarnation_;
   std::chrono::milliseconds lease_;

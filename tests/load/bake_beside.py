@@ -136,7 +136,7 @@ def main():
                     times[name].append(seconds_of(command))
         print(f"{processor()}, {os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}; levels {arguments.levels}\n")
         print("| bake | tiles | user and system ms a tile: least / median | user ms a tile: least | wall ms a tile: least / median | peer / it |\n|---|---|---|---|---|---|")
-        found = {}
+        found, least = {}, 0.0  # least: the peer's, which is the first
         for name, options in bakes.items():
             folder, begin = f"{scratch}/{name}/0", 0
             if options is not None:  # the same tiles as files; their time does not count
@@ -147,7 +147,7 @@ def main():
             found[name] = tiles_in(folder, begin)
             count = len(found[name])
             both, user, wall = ([1000 * part(t) / count for t in times[name]] for part in (lambda t: t[0] + t[1], lambda t: t[0], lambda t: t[2]))
-            least = least if options is not None else min(both)  # noqa: F821
+            least = min(both) if options is None else least
             print(f"| {name} | {count:,} | {min(both):.2f} / {statistics.median(both):.2f} | {min(user):.2f} | {min(wall):.2f} / {statistics.median(wall):.2f} | {least / min(both):.2f} |", flush=True)
         if len(sources) > 1:
             return 0
