@@ -2,6 +2,8 @@
 #include "engine/dem/dem_source.h"
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <future>
 #include <map>
 
@@ -234,6 +236,30 @@ TEST(DemSource, TellsPicturesFromHeights) {
   EXPECT_EQ(part_of(photo), "Red");
   EXPECT_EQ(part_of(palette), "Palette");
   EXPECT_EQ(part_of(bytes), "");
+}
+
+TEST(DemSource, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 47, 0, -.01}}), cache = dir.File("cache"),
+                    wrong = dir.File("wrong.tif");
+  std::ofstream(wrong) << "no raster";
+  DemOptions options;
+  options.cache = CacheIn(cache);
+  const auto lacks = DemSource::OpenKept({{path}}, options);
+  ASSERT_FALSE(lacks);
+  EXPECT_EQ(lacks.error().code, ErrorCode::kCancelled);
+  const auto is_checked = DemSource::OpenKept({{path}, {wrong}}, options);
+  ASSERT_FALSE(is_checked);
+  EXPECT_NE(is_checked.error().code, ErrorCode::kCancelled);
+  EXPECT_NE(is_checked.error().message.find(wrong), std::string::npos) << is_checked.error().message;
+  EXPECT_FALSE(std::filesystem::exists(cache) && !std::filesystem::is_empty(cache)) << "nothing was begun";
+
+  const auto prepared = OpenOrFail(path, options);
+  const auto kept = DemSource::OpenKept({{path}}, options);
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ((*kept)->fingerprint(), prepared->fingerprint());
+  options.cache = {};
+  EXPECT_FALSE(DemSource::OpenKept({{path}}, options)) << "without a cache nothing is kept";
 }
 
 }  // namespace

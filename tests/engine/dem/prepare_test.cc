@@ -471,64 +471,25 @@ TEST(Prepare, GoesOnInTheSecondPass) {
   ExpectSameAverages(path, *source);
 }
 
-TEST(Prepare, SeveralThreadsStopWhenToldAndKeepWhatIsDone) {
-  const TempDir dir;
-  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  std::stop_source stop;
-  const auto told = [&](double done) {
-    if (done >= .3) stop.request_stop();
-  };
-  const auto stopped = RasterSource::Open(path, {}, CacheIn(cache), told, stop.get_token(), nullptr, 4);
-  ASSERT_FALSE(stopped);
-  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
-  const auto source = RasterSource::Open(path, {}, CacheIn(cache), {}, {}, nullptr, 4);
-  ASSERT_TRUE(source);
-  const Preparation& preparation = (*source)->preparation();
-  EXPECT_GE(preparation.chunks_kept, preparation.chunks * 3 / 10);
-  EXPECT_LT(preparation.chunks_kept, preparation.chunks);
-  ExpectSameAverages(path, **source);
-}
-
-TEST(Prepare, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
-  const TempDir dir;
-  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache"), wrong = dir.File("wrong.tif");
-  std::ofstream(wrong) << "no raster";
-  DemOptions options;
-  options.cache = CacheIn(cache);
-  const auto lacks = DemSource::OpenKept({{path}}, options);
-  ASSERT_FALSE(lacks);
-  EXPECT_EQ(lacks.error().code, ErrorCode::kCancelled);
-  const auto is_checked = DemSource::OpenKept({{path}, {wrong}}, options);
-  ASSERT_FALSE(is_checked);
-  EXPECT_NE(is_checked.error().code, ErrorCode::kCancelled);
-  EXPECT_NE(is_checked.error().message.find(wrong), std::string::npos) << is_checked.error().message;
-  EXPECT_FALSE(std::filesystem::exists(cache) && !std::filesystem::is_empty(cache)) << "nothing was begun";
-
-  const auto prepared = OpenOrFail(path, options);
-  const auto kept = DemSource::OpenKept({{path}}, options);
-  ASSERT_TRUE(kept) << kept.error().message;
-  EXPECT_EQ((*kept)->fingerprint(), prepared->fingerprint());
-  options.cache = {};
-  EXPECT_FALSE(DemSource::OpenKept({{path}}, options)) << "without a cache nothing is kept";
-}
-
 TEST(Prepare, StopsWhenToldAndGoesOnNextTime) {
   const TempDir dir;
-  const std::string path = WriteLargeRaster(dir), cache = dir.File("cache");
-  std::stop_source stop;
-  const auto stopped = RasterSource::Open(
-      path, {}, CacheIn(cache),
-      [&](double done) {
-        if (done >= .3) stop.request_stop();
-      },
-      stop.get_token());
-  ASSERT_FALSE(stopped.has_value());
-  EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
-  const auto source = OpenWithCache(path, cache);
-  EXPECT_FALSE(source->preparation().from_cache);
-  EXPECT_GE(source->preparation().chunks_kept, 11);
-  EXPECT_LT(source->preparation().chunks_kept, 35);
-  ExpectSameAverages(path, *source);
+  const std::string path = WriteLargeRaster(dir);
+  for (const unsigned threads : {1U, 4U}) {
+    const RasterCache cache = CacheIn(dir.File("cache of " + std::to_string(threads)));
+    std::stop_source stop;
+    const auto told = [&](double done) {
+      if (done >= .3) stop.request_stop();
+    };
+    const auto stopped = RasterSource::Open(path, {}, cache, told, stop.get_token(), nullptr, threads);
+    ASSERT_FALSE(stopped.has_value());
+    EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
+    const auto source = RasterSource::Open(path, {}, cache, {}, {}, nullptr, threads);
+    ASSERT_TRUE(source.has_value());
+    EXPECT_FALSE((*source)->preparation().from_cache);
+    EXPECT_GE((*source)->preparation().chunks_kept, 11) << threads << " threads";
+    EXPECT_LT((*source)->preparation().chunks_kept, 35) << threads << " threads";
+    ExpectSameAverages(path, **source);
+  }
 }
 
 }  // namespace
