@@ -117,6 +117,18 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
   return {};
 }
 
+// GDAL's drivers of several other formats (SRTMHGT, ENVI, HFA) return zeros for samples that the network did not
+// deliver.
+Result<void> CheckRemoteFormat(GDALDataset& dataset, const std::string& path) {
+  if (!IsRemote(path) || EQUAL(dataset.GetDriverName(), "GTiff")) return {};
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{}: is remote, and its format is {}: only GeoTIFFs are read over the network, because GDAL does not "
+      "report failed reads of other formats; convert it with `gdal_translate -of COG in out.tif`, or copy it "
+      "to this machine",
+      path, dataset.GetDriverName());
+}
+
 // A lower bound of the end of a GeoTIFF's blocks, according to its directory.
 class BlockEnds {
  public:
@@ -227,6 +239,7 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
                      "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
                      path, problem, path);
   }
+  if (auto format = CheckRemoteFormat(*dataset, path); !format) return tl::unexpected(format.error());
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
   return dataset;
 }

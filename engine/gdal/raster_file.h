@@ -12,7 +12,7 @@
 namespace terrace::dem {
 
 // Opens `path` read-only. Errors, with the remedy: the source policy does not allow the name, the file is not a raster,
-// has no band, has complex samples, or its sides, bands or storage blocks are absurdly large. `overview`: number of an
+// is remote and no GeoTIFF, has no band, has complex samples, or its sides, bands or storage blocks are absurdly large. `overview`: number of an
 // overview to open instead of the full raster; -1: the full raster.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 

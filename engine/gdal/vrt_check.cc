@@ -96,7 +96,12 @@ class Checker {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a part of it: {}", vrt.string(), why);
     };
     parts_.push_back(part.string());
-    if (IsRemote(part.string())) return {};
+    if (IsRemote(part.string())) {
+      // OpenRaster would look into the file, but a mosaic may have thousands of parts.
+      const std::string ending = part.extension().string();
+      if (EQUAL(ending.c_str(), ".tif") || EQUAL(ending.c_str(), ".tiff")) return {};
+      return fail(fmt::format("{}: only GeoTIFFs (.tif, .tiff) are read over the network", part.string()));
+    }
     std::error_code error;
     const fs::path real = fs::canonical(part, error);
     if (error) return fail(fmt::format("{}: is no file on this machine", part.string()));

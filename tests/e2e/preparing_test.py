@@ -294,6 +294,19 @@ class Preparing(unittest.TestCase):
                 self.assertEqual(server.process.stdout.read(), "")
             self.assertLess(remote.bytes, 1_000_000)
 
+    def test_only_geotiffs_are_read_over_the_network(self):
+        # GDAL's driver for .hgt returns zeros where the network delivers nothing.
+        (pathlib.Path(self.scratch.name) / "N46E007.hgt").write_bytes(bytes(2 * SIDE * SIDE))
+        mosaic = self.folder / "mosaic.vrt"
+        with self.remote():
+            mosaic.write_text(f'''<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Int16" band="1"><SimpleSource>
+                <SourceFilename>{self.prefix}N46E007.hgt</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>''')
+            for source, message in ((f"{self.prefix}N46E007.hgt", "its format is SRTMHGT: only GeoTIFFs are read over the network"),
+                                    (mosaic, "N46E007.hgt: only GeoTIFFs .* are read over the network")):
+                with self.serve({"hills": source}, "--allowed-drivers", "GTiff,SRTMHGT,VRT") as server:
+                    self.assertEqual(server.end(), 1)
+                    self.assertRegex(server.log, message)
+
     def test_what_cannot_be_read_is_told_and_others_are_served(self):
         with self.remote() as (hills, _):
             self.gate.fails = True
