@@ -9,12 +9,14 @@
 //   pool, in bytes times seconds, including what it holds now.
 // - A client may hold one reply of any size, or twice as much memory for replies as it leaves free: two thirds of what
 //   others do not use. This leaves memory for the next client.
-// - Waiting bodies take memory from others. A client has kGrace to take a reply that is being sent, and gains one
-//   second per kRate bytes that it takes: its reply is late once it lags kGrace behind this rate. If a body waits, the
-//   late replies of the client that holds most are cut off, if this client holds more than the waiting one. If an
-//   upload waits, the newest upload of the client that holds most is displaced, if this client holds more than the
-//   waiting one would. Uploads of other clients that have not arrived within kGrace plus one second per kRate bytes are
-//   displaced too. Bodies of one client wait for one another.
+// - A client has kGrace to take a reply that is being sent, and gains one second per kRate bytes that it takes. Its
+//   reply is late once it lags kGrace behind this rate. An upload is late if it has not arrived within kGrace plus one
+//   second per kRate bytes.
+// - A waiting reply takes memory from the client with late replies that holds most, if it holds more than the waiting
+//   client: its late replies are cut off.
+// - A waiting upload takes memory from the client that holds most, if it holds more than the waiting client would: its
+//   newest upload is displaced. Else the late uploads of all other clients are displaced.
+// - Bodies of one client wait for one another.
 //
 // Replies about the server's state, for operators, may exceed all pools by kReserve: they matter most when memory is
 // short.

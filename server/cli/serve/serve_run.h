@@ -71,7 +71,7 @@ class ServeRun {
   const ServeArguments& arguments_;
   const config::Config& config_;
   const bool is_read_once_;
-  // The server's threads use those before it, so it ends first.
+  // The server, the last member, is destroyed first: its threads use the members before it.
   ShutdownWatchdog watchdog_;  // limits how long the others take to end
   std::stop_source stop_opening_;
   const std::shared_ptr<server::BakedStore> baked_;
