@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/jobs/single_flight.h"
 #include "server/jobs/worker_pool.h"
 #include "server/tiles/catalog.h"

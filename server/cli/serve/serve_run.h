@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "config/config_watch.h"
+#include "config/file/config_watch.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "server/cli/serve/first_datasets.h"
