@@ -28,20 +28,16 @@ class ArchiveBase : public Archive {
   const Manifest& manifest() const override { return manifest_; }
 
   Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const override {
-    const bool is_mercator = manifest_.kind.format == tiler::TileFormat::kHeightPng;
+    const bool is_mercator = tiler::IsMercator(manifest_.kind.format);
     if (!tiler::IsInScheme(key, is_mercator) || key.level < manifest_.min_level || key.level > manifest_.max_level) {
       return std::nullopt;
     }
     const Result<FilePtr> file = FileOf(key);
     if (!file) return tl::unexpected(file.error());
     if (*file == nullptr) return std::nullopt;
-    Result<std::optional<CheckedTile>> found = (*file)->Find(TileIdOf(PmtilesKeyOf(key, is_mercator)));
-    if (!found) {
-      Forget(key);
-      return tl::unexpected(std::move(found.error()));
-    }
-    if (!*found) return std::nullopt;
-    return ArchivedTile{std::move((*found)->tile), (*found)->range};
+    Result<std::optional<ArchivedTile>> found = (*file)->Find(TileIdOf(PmtilesKeyOf(key, is_mercator)));
+    if (!found) Forget(key);
+    return found;
   }
 
   std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const override {
@@ -51,11 +47,11 @@ class ArchiveBase : public Archive {
   }
 
   Result<void> ForEach(const TakeTile& take) const override {
-    const bool is_mercator = manifest_.kind.format == tiler::TileFormat::kHeightPng;
-    const auto take_checked = [&](std::uint64_t tile_id, CheckedTile tile) -> Result<void> {
+    const bool is_mercator = tiler::IsMercator(manifest_.kind.format);
+    const auto take_checked = [&](std::uint64_t tile_id, ArchivedTile tile) -> Result<void> {
       const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
       if (!key) return MakeError(ErrorCode::kUnavailable, "{}: tile {} lies outside its scheme", place_, tile_id);
-      return take(*key, {std::move(tile.tile), tile.range});
+      return take(*key, std::move(tile));
     };
     return ForEachFile([&](const PmtilesFile& file) { return file.ForEach(take_checked); });
   }

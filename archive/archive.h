@@ -10,17 +10,12 @@
 #include <vector>
 
 #include "archive/manifest.h"
+#include "archive/pmtiles/tile_row.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "tiler/encoded_tile.h"
 
 namespace terrace::archive {
-
-struct ArchivedTile {
-  tiler::EncodedTile tile;  // as it was added, without ETag, times and head
-  dem::HeightRange range;
-};
 
 class Archive {
  public:

@@ -18,10 +18,6 @@ namespace {
 using tiler::TileFormat;
 using tiler::TileRequest;
 
-int StepAt(const std::vector<int>& steps, int level) {
-  return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
-}
-
 proto::QuantizedMeshOptions ExtensionsOf(const TileRequest& request) {
   return {request.normals, request.water_mask, request.metadata};
 }
@@ -43,7 +39,7 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   if (request.format == TileFormat::kHeightPng) {
     return request.height_encoding == kind.height_encoding && request.height_size == kind.height_size;
   }
-  if (request.error_step != StepAt(manifest.error_steps, level)) return false;
+  if (request.error_step != manifest.StepAt(level)) return false;
   if (request.format == TileFormat::kGlb) {
     return request.compression == kind.compression && request.texture == kind.texture;
   }

@@ -16,6 +16,7 @@
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/static_tileset.h"
 #include "archive/tile_scheme.h"
+#include "engine/core/errno_text.h"
 #include "engine/geo/mercator_grid.h"
 
 namespace terrace::archive {
@@ -27,7 +28,7 @@ dem::GeoBounds HeaderBounds(const Manifest& manifest) {
     bounds.west = -180;
     bounds.east = 180;
   }
-  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   const double max_latitude = is_mercator ? geo::kMercatorLatitude : 90;
   bounds.south = std::clamp(bounds.south, -max_latitude, max_latitude);
   bounds.north = std::clamp(bounds.north, -max_latitude, max_latitude);
@@ -82,8 +83,7 @@ class PartialFolder {
     if (descriptor >= 0) ::close(descriptor);
     // Some file systems do not allow fsync of folders, and do not need it.
     if (is_synced || (sync == ::fsync && reason == EINVAL)) return {};
-    return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", folder,
-                     std::generic_category().message(reason));
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", folder, ErrorText(reason));
   }
 
   const std::string path_, partial_;
@@ -99,7 +99,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
   file_options->bounds = HeaderBounds(manifest);
   Result<PmtilesWriter> writer = PmtilesWriter::Create(out, *file_options);
   if (!writer) return tl::unexpected(std::move(writer.error()));
-  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   const Result<void> copied = archive.ForEach([&](const geo::TileKey& key, const ArchivedTile& tile) -> Result<void> {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
     return writer->Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile.tile, tile.range);
@@ -113,7 +113,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
 Result<void> WriteFolder(const Archive& archive, const std::string& out, const std::stop_token& stop) {
   const Manifest& manifest = archive.manifest();
   if (Result<void> is_free = CheckFree(out); !is_free) return is_free;
-  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   PartialFolder folder(out);
   if (manifest.kind.format == tiler::TileFormat::kGlb) {
     const auto take = [&](const std::string& path, std::string_view bytes, bool) {

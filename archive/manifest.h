@@ -65,6 +65,11 @@ struct Manifest {
   std::vector<std::vector<geo::TileRange>> available;
   std::string identity;  // JSON object: what the baker was asked for; a later run at the same place compares it
   std::vector<UnitEntry> units;
+
+  int StepAt(int level) const {
+    const auto at = static_cast<std::size_t>(level);
+    return at < error_steps.size() ? error_steps[at] : 0;
+  }
 };
 
 // Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels is the root of a further unit.

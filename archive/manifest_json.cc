@@ -59,14 +59,10 @@ T ValueOf(const Names<T>& names, const Json& json) {
 }
 
 std::uint64_t HexOf(const Json& json) {
-  constexpr std::size_t kDigits = 16;
   const auto& text = json.get_ref<const std::string&>();
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (text.size() != kDigits || error != std::errc() || end != text.data() + text.size()) {
-    throw Wrong(fmt::format("'{}' must have 16 hexadecimal digits", text));
-  }
-  return value;
+  const std::optional<std::uint64_t> value = ParseHex16(text);
+  if (!value) throw Wrong(fmt::format("'{}' must have 16 hexadecimal digits", text));
+  return *value;
 }
 
 double NumberOf(const Json& json) {
@@ -186,7 +182,7 @@ Json AvailableJson(const std::vector<std::vector<geo::TileRange>>& available) {
 }
 
 void ReadAvailable(const Json& json, Manifest& manifest) {
-  const bool is_mercator = manifest.kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   for (const Json& ranges : json) {
     const int level = static_cast<int>(manifest.available.size());
     if (level > manifest.max_level) break;
@@ -243,6 +239,14 @@ Manifest Read(const Json& json) {
 }
 
 }  // namespace
+
+std::optional<std::uint64_t> ParseHex16(std::string_view text) {
+  constexpr std::size_t kDigits = 16;
+  std::uint64_t value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
+  if (text.size() != kDigits || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
 
 std::string ToJson(const Manifest& manifest) {
   Json json;

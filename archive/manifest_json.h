@@ -1,6 +1,8 @@
 // The manifest as JSON. Also part of the metadata of a single file.
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -13,5 +15,8 @@ namespace terrace::archive {
 inline constexpr const char* kManifestMember = "terrace";
 // kInvalidArgument: the text is not a JSON object or has no such member.
 Result<std::string> ManifestIn(std::string_view metadata);
+
+// The number that 16 hexadecimal digits state; nothing for any other text.
+std::optional<std::uint64_t> ParseHex16(std::string_view text);
 
 }  // namespace terrace::archive

@@ -32,10 +32,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           dataset.error_fraction,
           dataset.finest_level,
           [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all); },
-          [&manifest](int level) {
-            const auto at = static_cast<std::size_t>(level);
-            return at < manifest.error_steps.size() ? manifest.error_steps[at] : 0;
-          }};
+          [&manifest](int level) { return manifest.StepAt(level); }};
 }
 
 // The paths of tiles in the trees.

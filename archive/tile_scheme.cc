@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "archive/manifest.h"
@@ -31,7 +30,7 @@ std::optional<geo::TileKey> TileKeyOf(std::uint64_t tile_id, bool is_mercator) {
 }
 
 Result<PmtilesOptions> PmtilesOptionsOf(const tiler::TileRequest& kind, const std::optional<geo::TileKey>& root) {
-  const bool is_mercator = kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(kind.format);
   PmtilesOptions options;
   if (kind.coding == tiler::Coding::kGzip) {
     options.compression = PmtilesCompression::kGzip;
@@ -77,7 +76,7 @@ std::string_view MediaTypeOf(tiler::TileFormat format) {
 }
 
 std::string UnitMetadata(const tiler::TileRequest& kind, std::uint64_t key) {
-  const bool is_mercator = kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(kind.format);
   Json json;
   json["format"] = FormatName(kind.format);
   json["media_type"] = MediaTypeOf(kind.format);
@@ -96,11 +95,7 @@ std::optional<std::uint64_t> UnitKeyIn(std::string_view metadata) {
   if (own == json.end() || !own->is_object()) return std::nullopt;
   const auto key = own->find("key");
   if (key == own->end() || !key->is_string()) return std::nullopt;
-  const auto& text = key->get_ref<const std::string&>();
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  return ParseHex16(key->get_ref<const std::string&>());
 }
 
 }  // namespace terrace::archive

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "archive/manifest.h"
+#include "archive/pmtiles/unit_file.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
@@ -13,15 +14,6 @@
 #include "tiler/tile_request.h"
 
 namespace terrace::archive {
-
-// A finished file: of a unit, or of a whole archive in one file.
-struct UnitFile {
-  std::uint64_t tiles = 0;
-  std::uint64_t bytes = 0;  // of the file
-  std::string xxh3;         // XXH3-128 of the file, 32 hexadecimal digits
-
-  friend bool operator==(const UnitFile&, const UnitFile&) = default;
-};
 
 // Used by one thread at a time. The same tiles make the same bytes, in whatever order they were added.
 // Destroyed without Finish: removes what it wrote. A process that is killed leaves files that end with ".partial",

@@ -24,7 +24,7 @@ class UnitWriter final : public TileWriter {
       : name_(std::move(name)), options_(options), writer_(std::move(writer)) {}
 
   Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange& range) override {
-    const bool is_mercator = options_.kind.format == tiler::TileFormat::kHeightPng;
+    const bool is_mercator = tiler::IsMercator(options_.kind.format);
     if (!tiler::IsInScheme(key, is_mercator) || UnitNameOf(key) != name_) {
       return MakeError(ErrorCode::kInvalidArgument, "tile {} does not belong to unit {}", geo::ToString(key), name_);
     }
@@ -91,9 +91,9 @@ Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, c
   if ((*file)->metadata() != UnitMetadata(options.kind, options.key) || !IsHeaderOf((*file)->header(), *wanted)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} was baked from other sources or with other options", path);
   }
-  const bool is_mercator = options.kind.format == tiler::TileFormat::kHeightPng;
+  const bool is_mercator = tiler::IsMercator(options.kind.format);
   UnitFile unit_file;
-  const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const CheckedTile&) -> Result<void> {
+  const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const ArchivedTile&) -> Result<void> {
     const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
     if (!key || UnitNameOf(*key) != name) {
       return MakeError(ErrorCode::kInvalidArgument, "{} has a tile of another unit", path);

@@ -167,7 +167,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.encoder = tiler::EncoderText();
     manifest.dataset = Describe(dataset);
     manifest.kind = *kind;
-    const bool is_mercator = format == tiler::TileFormat::kHeightPng;
+    const bool is_mercator = tiler::IsMercator(format);
     const int deepest = is_mercator ? source.info().max_mercator_depth : source.max_level();
     const auto [first, last] = request.levels.value_or(std::pair(0, deepest));
     if (last > deepest) {

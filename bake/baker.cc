@@ -15,13 +15,12 @@
 #include "bake/copy_unit.h"
 #include "bake/queue/local_queue.h"
 #include "bake/unit_key.h"
+#include "tiler/encoded_tile.h"
 
 namespace terrace::bake {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // A unit that is being baked.
 class OpenUnit {
@@ -199,9 +198,11 @@ class Run {
     }
     if (!unit_file) return false;
     counters_.passed += unit_file->tiles;
-    Report(
-        index,
-        {target, {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3}, outcome, SecondsSince(start), {}});
+    Report(index, {target,
+                   {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3},
+                   outcome,
+                   tiler::SecondsSince(start),
+                   {}});
     return true;
   }
 
@@ -259,7 +260,7 @@ class Run {
       Report(unit.index, {output.target,
                           {name, output.key, unit_file->tiles, unit_file->bytes, unit_file->xxh3},
                           UnitOutcome::kBaked,
-                          SecondsSince(unit.start),
+                          tiler::SecondsSince(unit.start),
                           {}});
     }
     if (options_.stop.stop_requested()) return queue_.Return(unit.index);
@@ -271,7 +272,7 @@ class Run {
       ReportLocked(unit.index, {output.target,
                                 {name, output.key, 0, 0, {}},
                                 UnitOutcome::kFailed,
-                                SecondsSince(unit.start),
+                                tiler::SecondsSince(unit.start),
                                 unit.error->message});
     }
   }

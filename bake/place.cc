@@ -17,6 +17,7 @@
 #include <system_error>
 #include <utility>
 
+#include "engine/core/errno_text.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::bake {
@@ -39,8 +40,6 @@ std::string ReadText(const fs::path& file) {
   text << in.rdbuf();
   return text.str();
 }
-
-std::string WhyOf(int error) { return std::generic_category().message(error); }
 
 // The start of a process in the kernel's ticks. It differs for a later process with the same number. Empty: unknown.
 std::string StartOf(long pid) {
@@ -109,7 +108,7 @@ Result<void> MakeFolder(const std::string& place) {
   }
   if (::access(place.c_str(), W_OK | X_OK) != 0) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a folder that can be written with --out",
-                     place, WhyOf(errno));
+                     place, ErrorText());
   }
   return {};
 }
@@ -237,7 +236,8 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
     }
     if (error != EEXIST) {
       return MakeError(ErrorCode::kUnavailable,
-                       "{}: cannot be written: {}; give a folder with room that can be written", file, WhyOf(error));
+                       "{}: cannot be written: {}; give a folder with room that can be written", file,
+                       ErrorText(error));
     }
     const std::string text = ReadText(file);
     const Owner owner = Owner::Parse(text);
@@ -300,7 +300,7 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   if (fs::exists(file, error)) return {};
   const int why = CreateFile(file.string(), ToJson(identity));
   if (why == EEXIST) return CheckSame(place, ReadText(file), identity, file.string());  // of another shard
-  if (why != 0) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), WhyOf(why));
+  if (why != 0) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), ErrorText(why));
   return {};
 }
 
@@ -359,7 +359,7 @@ Result<std::string> PlaceId(const std::string& place) {
   std::istringstream(ReadText(file)) >> id;
   if (!id.empty()) return id;
   return MakeError(ErrorCode::kUnavailable, "{}: cannot be {}: {}", file.string(),
-                   error != 0 && error != EEXIST ? "written" : "read", WhyOf(error == EEXIST ? EIO : error));
+                   error != 0 && error != EEXIST ? "written" : "read", ErrorText(error == EEXIST ? EIO : error));
 }
 
 bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {

@@ -1,4 +1,4 @@
-// The configuration of a server, with its defaults: plain values that parse.h or options.h have checked.
+// The configuration of a server, with its defaults: plain values that file/parse.h or options/options.h have checked.
 // A Config does not change after the start; threads share it without locks.
 #pragma once
 

@@ -13,17 +13,15 @@
 #include <cerrno>
 #include <climits>
 #include <cstddef>
-#include <system_error>
 #include <utility>
 
+#include "engine/core/errno_text.h"
 #include "redis/resolver.h"
 
 namespace terrace::redis {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-std::string WhyOf(int error) { return std::generic_category().message(error); }
 
 int FamilyOf(const HostAddress& address) {
   sa_family_t family = AF_UNSPEC;
@@ -73,7 +71,7 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
     const Deadline share = now + (deadline - now) / left;
     const int fd = ::socket(FamilyOf(*one), SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
     if (fd < 0) {
-      why = WhyOf(errno);
+      why = ErrorText();
       continue;
     }
     Socket socket(fd, name);
@@ -91,7 +89,7 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
       ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size);
     }
     if (error != 0) {
-      why = WhyOf(error);
+      why = ErrorText(error);
       continue;
     }
     if (address.is_tls) {
@@ -146,7 +144,7 @@ Result<void> Socket::WaitFor(short events, Deadline deadline) const {
     pollfd wait{fd_, events, 0};
     const int ready = ::poll(&wait, 1, static_cast<int>(std::min<long long>(left, INT_MAX)));
     if (ready > 0) return {};
-    if (ready < 0 && errno != EINTR) return Failed(WhyOf(errno));
+    if (ready < 0 && errno != EINTR) return Failed(ErrorText());
   }
 }
 
@@ -182,7 +180,7 @@ Result<void> Socket::Write(std::string_view bytes, Deadline deadline) {
     } else if (errno == EAGAIN || errno == EWOULDBLOCK) {
       if (auto waited = WaitFor(POLLOUT, deadline); !waited) return waited;
     } else if (errno != EINTR) {
-      return Failed(WhyOf(errno));
+      return Failed(ErrorText());
     }
   }
   return {};
@@ -203,7 +201,7 @@ Result<std::size_t> Socket::Read(std::span<char> into, Deadline deadline) {
     if (errno == EAGAIN || errno == EWOULDBLOCK) {
       if (auto waited = WaitFor(POLLIN, deadline); !waited) return tl::unexpected(waited.error());
     } else if (errno != EINTR) {
-      return Failed(WhyOf(errno));
+      return Failed(ErrorText());
     }
   }
 }

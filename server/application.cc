@@ -214,11 +214,11 @@ std::map<std::string, std::string> TerrainApplication::problems() const {
 std::vector<PendingDataset> TerrainApplication::PendingOf(const Catalog& catalog) const {
   if (catalog.pending.empty()) return {};
   constexpr int kMaxPercent = 99;
-  const std::map<std::string, std::string> troubles = problems();
+  const std::map<std::string, std::string> known_problems = problems();
   std::vector<PendingDataset> pending;
   for (const std::string& name : catalog.pending) {
     const double share = parts_.share_done ? parts_.share_done(name) : 0;
-    pending.push_back({name, std::clamp(static_cast<int>(100 * share), 0, kMaxPercent), troubles.contains(name)});
+    pending.push_back({name, std::clamp(static_cast<int>(100 * share), 0, kMaxPercent), known_problems.contains(name)});
   }
   return pending;
 }

@@ -25,7 +25,7 @@ namespace terrace::server {
 struct ServerOptions {
   config::Config config;
   int listen_socket = -1;  // used instead of config.listen: a socket that another process keeps open as well
-  // Cache tiers of finished tiles below memory, the first asked first.
+  // Cache tiers of finished tiles below memory, in the order of look-ups.
   std::vector<std::shared_ptr<tiler::TileStore>> tile_stores = {};
   std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
   std::function<std::string()> cache_problem = {};                // why cache_dir is not used; "": it is; thread-safe

@@ -19,6 +19,9 @@ struct StageTimes {
 inline std::chrono::microseconds MicrosecondsSince(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
 }
+inline double SecondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
 
 // How a build used the refinement cache. kNone: the format has no mesh.
 enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };

@@ -1,12 +1,11 @@
-// The geometric error that is asked for, by a client or for a bake, and the step of the ladder that it means at a
-// level.
+// The geometric error that a client or a bake requests, and the step of the ladder that serves it at a level.
 #pragma once
 
 #include <optional>
 
 namespace terrace::tiler {
 
-// The geometric error that a client requests; all members are optional.
+// All members are optional.
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of the level's error; finite, > 0

@@ -25,8 +25,9 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
-CONFIG = ["config/common", "config/config.h", "config/input", "config/options", "config"]
-ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio.h"]
+CONFIG = ["config/common", "config", "config/input", "config/options", "config/file"]
+ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio"]
+ARCHIVE = ["archive/files", "archive/pmtiles", "archive"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/statistics", "engine/sources", "engine/mosaic", "engine/sight",
        "engine/bound", "engine/edits", "engine/image", "engine/export"]
@@ -61,9 +62,11 @@ MODULES = {
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
     "tiler": GEOMETRY + ["engine/dem"] + PROTO,
-    "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"],
+    "archive/files": ["engine/core", "engine/dem"] + PROTO,
+    "archive/pmtiles": ["engine/core", "engine/dem"] + PROTO + ["tiler", "archive/files"],
+    "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"] + ARCHIVE[:2],
     "bake/queue": ["engine/core", "redis"],
-    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler", "archive", "bake/queue"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"] + ARCHIVE + ["bake/queue"],
     "redis": ["engine/core"],
     "fly/scene": ["engine/core", "engine/geo"],
     "fly/select": ["engine/core", "engine/geo", "fly/scene"],
@@ -73,10 +76,10 @@ MODULES = {
     "fly/flight": ["engine/core", "engine/geo"] + FLY[:5],
     "fly/report": ["engine/core", "engine/geo"] + FLY[:6],
     "server/cli/fly": ["engine/core", "server/cli/common"] + FLY,
-    "server/asio.h": [],
-    "server/jobs": ["engine/core", "server/asio.h"],
-    "server/net": ["engine/core", "server/asio.h"],
-    "server/http": ["engine/core", "server/asio.h", "server/net"],
+    "server/asio": [],
+    "server/jobs": ["engine/core", "server/asio"],
+    "server/net": ["engine/core", "server/asio"],
+    "server/http": ["engine/core", "server/asio", "server/net"],
     "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive", "redis"],
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
@@ -86,11 +89,11 @@ MODULES = {
     "server/frontend": API + ["server/telemetry"],
     "server/documents": API,
     "server/handlers": API + ["server/query", "server/documents"],
-    "server/reload": ENGINE + ["server/tiles"],
+    "server/reload": ENGINE + ["config/file", "server/tiles"],
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],
-    **{"server/cli/" + command: SERVER + ["server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
-    "server/cli/bake": ENGINE + ["redis", "bake/queue", "bake", "server/store", "server/cli/common"],
+    **{"server/cli/" + command: SERVER + ["config/file", "server", "server/reload", "server/cli/common"] for command in ("serve", "mesh", "info")},
+    "server/cli/bake": ENGINE + ["config/file", "archive/files", "redis", "bake/queue", "bake", "server/store", "server/cli/common"],
     "server/cli": SERVER + ["server", "server/cli/common", "server/cli/serve", "server/cli/mesh", "server/cli/info", "server/cli/bake", "server/cli/fly"],
 }
 
@@ -307,8 +310,8 @@ class SelfTest(unittest.TestCase):
 
     def test_boost_crosses_rooms_of_the_server(self):
         self.assert_clean({
-            "server/asio.h": "#include <boost/asio/awaitable.hpp>\n",
-            "server/tiles/service.h": '#include "server/asio.h"\n',
+            "server/asio/asio.h": "#include <boost/asio/awaitable.hpp>\n",
+            "server/tiles/service.h": '#include "server/asio/asio.h"\n',
             "server/api/router.h": '#include "server/tiles/service.h"\n',
         })
 

@@ -5,11 +5,11 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
+#include "engine/core/errno_text.h"
 #include "engine/gdal/remote_file.h"
 
 namespace terrace::archive {
@@ -33,7 +33,7 @@ class LocalFile final : public InputFile {
     for (std::size_t done = 0; done < size;) {
       const ssize_t read = ::pread(descriptor_, bytes.data() + done, size - done, static_cast<off_t>(offset + done));
       if (read < 0 && errno == EINTR) continue;
-      if (read < 0) return MakeError(ErrorCode::kUnavailable, "{} cannot be read: {}", path_, std::strerror(errno));
+      if (read < 0) return MakeError(ErrorCode::kUnavailable, "{} cannot be read: {}", path_, ErrorText());
       if (read == 0) return MakeError(ErrorCode::kUnavailable, "{} has become shorter since it was opened", path_);
       done += static_cast<std::size_t>(read);
     }
@@ -69,7 +69,7 @@ Result<std::unique_ptr<const InputFile>> InputFile::Open(const std::string& path
   if (descriptor < 0) {
     const bool is_missing = errno == ENOENT || errno == ENOTDIR;
     return MakeError(is_missing ? ErrorCode::kNotFound : ErrorCode::kUnavailable, "{} cannot be opened: {}", path,
-                     std::strerror(errno));
+                     ErrorText());
   }
   struct stat status {};
   if (::fstat(descriptor, &status) != 0 || !S_ISREG(status.st_mode)) {

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <random>
 #include <system_error>
@@ -13,6 +12,7 @@
 #include <utility>
 
 #include "engine/common/content_hash.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::archive {
 namespace {
@@ -22,7 +22,7 @@ constexpr int kMode = 0644;
 
 tl::unexpected<Error> CannotWrite(const std::string& path, int error) {
   return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; free space or choose another place", path,
-                   std::strerror(error));
+                   ErrorText(error));
 }
 
 Result<void> WriteAll(int descriptor, std::string_view bytes, const std::string& path) {
@@ -192,7 +192,7 @@ Result<std::string> SpoolFile::Read(std::uint64_t offset, std::size_t size) {
     if (read < 0 && errno == EINTR) continue;
     if (read <= 0) {
       return MakeError(ErrorCode::kUnavailable, "a temporary file in {} cannot be read: {}", folder_,
-                       std::strerror(read < 0 ? errno : EIO));
+                       ErrorText(read < 0 ? errno : EIO));
     }
     done += static_cast<std::size_t>(read);
   }

@@ -94,26 +94,26 @@ Result<PmtilesFile::LeafPtr> PmtilesFile::FindLeaf(const DirectoryEntry& leaf) c
   return read;
 }
 
-Result<CheckedTile> PmtilesFile::ReadTile(const Leaf& leaf, std::size_t entry, std::uint64_t tile_id) const {
+Result<ArchivedTile> PmtilesFile::ReadTile(const Leaf& leaf, std::size_t entry, std::uint64_t tile_id) const {
   const DirectoryEntry& found = leaf.entries[entry];
   const std::uint64_t row_number = leaf.rows_before[entry] + (tile_id - found.tile_id);
   const Result<std::string> row = file_->Read(leaf.rows_at + row_number * kRowBytes, kRowBytes);
   if (!row) return tl::unexpected(row.error());
   Result<std::string> bytes = file_->Read(header_.data.offset + found.offset, found.length);
   if (!bytes) return tl::unexpected(std::move(bytes.error()));
-  std::optional<CheckedTile> tile = DecodeRow(tile_id, *row, *std::move(bytes));
+  std::optional<ArchivedTile> tile = DecodeRow(tile_id, *row, *std::move(bytes));
   if (!tile) return tl::unexpected(Damaged(fmt::format("the checksum of tile {} is wrong", tile_id)));
   return *std::move(tile);
 }
 
-Result<std::optional<CheckedTile>> PmtilesFile::Find(std::uint64_t tile_id) const {
+Result<std::optional<ArchivedTile>> PmtilesFile::Find(std::uint64_t tile_id) const {
   const DirectoryEntry* const in_root = EntryFor(root_, tile_id);
   if (in_root == nullptr) return std::nullopt;
   const Result<LeafPtr> leaf = FindLeaf(*in_root);
   if (!leaf) return tl::unexpected(leaf.error());
   const DirectoryEntry* const entry = EntryFor((*leaf)->entries, tile_id);
   if (entry == nullptr || tile_id - entry->tile_id >= entry->run) return std::nullopt;
-  Result<CheckedTile> tile = ReadTile(**leaf, static_cast<std::size_t>(entry - (*leaf)->entries.data()), tile_id);
+  Result<ArchivedTile> tile = ReadTile(**leaf, static_cast<std::size_t>(entry - (*leaf)->entries.data()), tile_id);
   if (!tile) return tl::unexpected(std::move(tile.error()));
   return *std::move(tile);
 }
@@ -126,7 +126,7 @@ Result<void> PmtilesFile::ForEach(const Take& take) const {
     for (std::size_t i = 0; i < (*leaf)->entries.size(); ++i) {
       const DirectoryEntry& entry = (*leaf)->entries[i];
       for (std::uint32_t k = 0; k < entry.run; ++k) {
-        Result<CheckedTile> tile = ReadTile(**leaf, i, entry.tile_id + k);
+        Result<ArchivedTile> tile = ReadTile(**leaf, i, entry.tile_id + k);
         if (!tile) return tl::unexpected(std::move(tile.error()));
         if (Result<void> taken = take(entry.tile_id + k, *std::move(tile)); !taken) return taken;
         ++tiles;

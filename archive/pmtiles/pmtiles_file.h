@@ -28,10 +28,10 @@ class PmtilesFile {
   const std::string& metadata() const { return metadata_; }  // JSON
 
   // Nothing: the file does not have the tile. kUnavailable: it is damaged or cannot be read.
-  Result<std::optional<CheckedTile>> Find(std::uint64_t tile_id) const;
+  Result<std::optional<ArchivedTile>> Find(std::uint64_t tile_id) const;
 
   // Calls `take` for each tile in order, until it fails. Reads and checks every byte.
-  using Take = std::function<Result<void>(std::uint64_t tile_id, CheckedTile tile)>;
+  using Take = std::function<Result<void>(std::uint64_t tile_id, ArchivedTile tile)>;
   Result<void> ForEach(const Take& take) const;
 
  private:
@@ -48,7 +48,7 @@ class PmtilesFile {
   Result<void> ReadHead(std::size_t max_metadata_bytes);
   Result<LeafPtr> ReadLeaf(const DirectoryEntry& leaf) const;
   Result<LeafPtr> FindLeaf(const DirectoryEntry& leaf) const;
-  Result<CheckedTile> ReadTile(const Leaf& leaf, std::size_t entry, std::uint64_t tile_id) const;
+  Result<ArchivedTile> ReadTile(const Leaf& leaf, std::size_t entry, std::uint64_t tile_id) const;
   Error Damaged(const std::string& how) const;
 
   const std::string path_;

@@ -8,7 +8,7 @@
 
 #include "archive/files/output_file.h"
 #include "archive/pmtiles/directory.h"
-#include "archive/tile_writer.h"
+#include "archive/pmtiles/unit_file.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "tiler/encoded_tile.h"

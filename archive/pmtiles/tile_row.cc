@@ -33,12 +33,12 @@ std::string EncodeRow(std::uint64_t tile_id, const tiler::EncodedTile& tile, con
   return row.Take();
 }
 
-std::optional<CheckedTile> DecodeRow(std::uint64_t tile_id, std::string_view row, std::string bytes) {
+std::optional<ArchivedTile> DecodeRow(std::uint64_t tile_id, std::string_view row, std::string bytes) {
   ByteReader reader(row);
   const auto checksum = reader.Get<std::uint64_t>();
   if (row.size() != kRowBytes || checksum != Checksum(tile_id, row.substr(sizeof(checksum)), bytes))
     return std::nullopt;
-  CheckedTile checked;
+  ArchivedTile checked;
   tiler::EncodedTile& tile = checked.tile;
   tile.max_error_m = reader.Get<double>();
   const auto certified_error_m = reader.Get<double>();

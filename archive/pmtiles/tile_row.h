@@ -17,13 +17,13 @@ inline constexpr std::size_t kRowBytes = 48;
 
 std::string EncodeRow(std::uint64_t tile_id, const tiler::EncodedTile& tile, const dem::HeightRange& range);
 
-struct CheckedTile {
-  tiler::EncodedTile tile;  // without ETag, times and head
+struct ArchivedTile {
+  tiler::EncodedTile tile;  // as it was added, without ETag, times and head
   dem::HeightRange range;
 };
 
 // Nothing: the row does not belong to this tile and these bytes, or one of them is damaged (missed with a probability
 // of 2^-64).
-std::optional<CheckedTile> DecodeRow(std::uint64_t tile_id, std::string_view row, std::string bytes);
+std::optional<ArchivedTile> DecodeRow(std::uint64_t tile_id, std::string_view row, std::string bytes);
 
 }  // namespace terrace::archive

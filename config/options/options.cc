@@ -42,7 +42,7 @@ std::string OptionInfo::Flag() const { return FlagOf(key); }
 std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
 std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
 
-bool TakesRestart(std::string_view key) {
+bool NeedsRestart(std::string_view key) {
   const auto& table = ServerOptionTable();
   return std::none_of(table.begin(), table.end(),
                       [&](const Option<Config>& option) { return option.key == key && option.is_live; });

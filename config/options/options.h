@@ -30,7 +30,7 @@ std::vector<OptionInfo> ServerOptions();
 std::vector<OptionInfo> DatasetOptions();
 
 // Whether a change of this option at the top level of the file needs a restart.
-bool TakesRestart(std::string_view key);
+bool NeedsRestart(std::string_view key);
 
 // Returns the keys of options at the top level of the file whose values differ between two configurations.
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);

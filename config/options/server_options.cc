@@ -264,7 +264,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "load",
        .help = "Memory for replies that clients have not received yet, and for request bodies",
        .details =
-           "[Bodies on their way](operations.md#bodies-on-their-way): half of it is for replies of up to a sixteenth "
+           "[Bodies in transfer](operations.md#bodies-in-transfer): half of it is for replies of up to a sixteenth "
            "of it, a quarter for larger replies, and a quarter for request bodies. Bodies up to 16 KiB do not count",
        .codec = Bytes(&Config::transfer_bytes, kMaxCacheBytes)},
       {.key = "requests_per_second",

@@ -96,13 +96,14 @@ struct GeoPosition {
   double longitude = 0, latitude = 0;
 };
 
-// A rectangle of nodes: first column and row, and their numbers.
+// A rectangle of nodes: its first column and row, and how many of each.
 struct NodeWindow {
   std::int64_t column = 0, row = 0;
   int columns = 0, rows = 0;
 };
 
-// The number of elements of a grid, or before a row of it.
+// The number of elements in `rows` rows of `columns` elements: the size of a grid, or the index of a row's first
+// element.
 constexpr std::size_t Area(std::int64_t columns, std::int64_t rows) {
   return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
 }

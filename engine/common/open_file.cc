@@ -50,8 +50,6 @@ std::uint64_t SizeOf(int file) {
 
 void Touch(int file) { ::futimens(file, nullptr); }
 
-std::string ErrorText() { return std::generic_category().message(errno); }
-
 std::filesystem::path AbsolutePath(const std::string& path) {
   std::error_code unresolved;
   std::filesystem::path whole = std::filesystem::weakly_canonical(path, unresolved);

@@ -48,9 +48,6 @@ std::optional<std::string> ReadAt(int file, std::uint64_t offset, std::uint64_t 
 // Sets the time of modification to now. Does nothing if that is not permitted.
 void Touch(int file);
 
-// The text of errno.
-std::string ErrorText();
-
 // `path` without links and relative parts; as it is if it cannot be resolved.
 std::filesystem::path AbsolutePath(const std::string& path);
 

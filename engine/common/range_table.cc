@@ -89,10 +89,10 @@ std::size_t RangeTable::bytes() const {
   return blocks * sizeof(BlockRange);
 }
 
-RangeTable RangeTable::Coarse(std::size_t most) const {
+RangeTable RangeTable::Coarse(std::size_t max_blocks) const {
   RangeTable coarse = *this;
   for (Level& level : coarse.levels_) {
-    if (level.blocks.size() > most) level.blocks = std::vector<BlockRange>();
+    if (level.blocks.size() > max_blocks) level.blocks = std::vector<BlockRange>();
   }
   return coarse;
 }

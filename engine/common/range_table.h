@@ -53,8 +53,9 @@ class RangeTable {
   // Memory of the blocks.
   std::size_t bytes() const;
 
-  // Returns a copy without the levels of more than `most` blocks. It answers queries of large boxes only (TryQuery).
-  RangeTable Coarse(std::size_t most) const;
+  // Returns a copy without the levels of more than `max_blocks` blocks. It answers queries of large boxes only
+  // (TryQuery).
+  RangeTable Coarse(std::size_t max_blocks) const;
   // Query, or nothing if that needs a level that this table does not have.
   std::optional<BlockRange> TryQuery(double west, double north, double east, double south) const;
 

@@ -20,7 +20,8 @@ namespace terrace::dem {
 // The position of nodes that a raster's CRS cannot represent: NaN.
 inline constexpr Position kNowhere{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 
-// All nodes of a pole row, or beyond it, share one position; other grids have no pole rows.
+// Whether a row lies on a pole or beyond it: all its nodes share one position. Grids other than lattices have no such
+// rows.
 inline bool IsPoleRow(const geo::Lattice& lattice, std::int64_t row) { return row <= 0 || row >= lattice.rows(); }
 template <typename Grid>
 bool IsPoleRow(const Grid&, std::int64_t) {

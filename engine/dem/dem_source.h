@@ -28,8 +28,8 @@ class DemSource {
   // Opens and checks rasters, and reads each once for its statistics. Errors name the file, the fault and the remedy.
   static Result<std::unique_ptr<DemSource>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
-  // Open from the statistics that the cache has, without reading a raster. kCancelled: it lacks some, or it was
-  // stopped; all files were checked then, if it was not stopped.
+  // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks some, and all files
+  // have passed the other checks; or stopped.
   static Result<std::unique_ptr<DemSource>> OpenKept(std::vector<DemFile> files, const DemOptions& options);
   ~DemSource();
 

@@ -19,6 +19,7 @@
 #include "engine/common/parallel_for.h"
 #include "engine/common/source_log.h"
 #include "engine/core/bytes.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::dem {
 namespace {

@@ -35,7 +35,7 @@ Result<void> AllowVrts();
 // message has the remedy.
 Result<void> CheckSourceName(const std::string& path);
 
-// Checks whether an opened file refers to files that are not allowed. Call it before overviews are used.
+// Checks that an opened file refers to allowed files only. Call it before overviews are used.
 Result<void> CheckLinks(GDALDataset& dataset, const std::string& path);
 
 // The checks of CheckSourceName that do not depend on the file's format, for files that no raster driver reads.

@@ -1,5 +1,5 @@
-// RoundedSinCos of many angles, with SIMD. There is one nearest multiple of 2^-44, so results are those of single
-// angles on all instruction sets.
+// RoundedSinCos of many angles, with SIMD. The nearest multiple of 2^-44 is unique: results are bit-equal to those of
+// RoundedSinCos, on all instruction sets.
 #pragma once
 
 #include <span>

@@ -16,7 +16,7 @@ bool Contains(const std::vector<TileRange>& ranges, const TileKey& key);
 // Whether a tile is valid and available. `available`: the ranges of each level, from 0.
 bool IsAvailable(const std::vector<std::vector<TileRange>>& available, const TileKey& key);
 
-// Returns the tiles of `level` in `key`. Precondition: `level` is not above the key's.
+// Returns the tiles of `level` in `key`. Precondition: level >= key.level.
 constexpr TileRange TilesBelow(const TileKey& key, int level) {
   const int down = level - key.level;
   return {key.x << down, key.y << down, ((key.x + 1) << down) - 1, ((key.y + 1) << down) - 1};

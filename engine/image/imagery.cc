@@ -16,6 +16,7 @@
 #include "engine/geo/mercator_grid.h"
 #include "engine/image/image_bins.h"
 #include "engine/image/image_pool.h"
+#include "engine/sources/located_raster.h"
 
 namespace terrace::dem {
 namespace {
@@ -61,19 +62,13 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   auto image = ImageFile::Open(path);
   if (!image) return tl::unexpected(image.error());
   constexpr int kMaxBands = 4;  // red, green, blue and alpha
-  if (auto complete = CheckComplete(image->dataset(), path, kMaxBands); !complete) {
-    return tl::unexpected(complete.error());
-  }
-  auto files = StampedFiles::OfOpened(FilesOf(image->dataset(), path), before);
-  if (!files) return tl::unexpected(files.error());
-  auto georeference = Georeference::Of(image->dataset(), path);
-  if (!georeference) return tl::unexpected(georeference.error());
-  const auto spacing = SourceSpacing::Of(*georeference, path);
-  if (!spacing) return tl::unexpected(spacing.error());
-  const Footprint footprint = Footprint::Of(*georeference);
+  auto located = LocateRaster(image->dataset(), path, before, kMaxBands);
+  if (!located) return tl::unexpected(located.error());
+  const Footprint footprint = Footprint::Of(located->georeference);
   if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
-  auto impl = std::make_unique<Impl>(ImagePool(*std::move(image), *std::move(files)), *std::move(georeference));
-  impl->spacing = *spacing;
+  auto impl =
+      std::make_unique<Impl>(ImagePool(*std::move(image), std::move(located->files)), std::move(located->georeference));
+  impl->spacing = located->spacing;
   impl->footprint = footprint.Padded();
   impl->bounds = footprint.Bounds();
   const auto fingerprint = impl->georeference.FingerprintWith(impl->pool.files(), content);
@@ -82,10 +77,10 @@ Result<std::unique_ptr<Imagery>> Imagery::Open(const std::string& path, const Ge
   return std::unique_ptr<Imagery>(new Imagery(std::move(impl)));
 }
 
-int Imagery::SideOf(int level, int most) const {
-  TERRACE_CHECK(IsSide(most));
+int Imagery::SideOf(int level, int max_side) const {
+  TERRACE_CHECK(IsSide(max_side));
   constexpr double kSlack = 1.01;  // pixels as fine as the image are fine enough, despite rounding of its spacing
-  int side = most;
+  int side = max_side;
   while (side > kMinSideOfCoarseImages && SamplesPerCell({level, side / 2}, impl_->spacing) <= kSlack) side /= 2;
   return side;
 }

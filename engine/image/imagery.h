@@ -49,10 +49,10 @@ class Imagery {
                                                const FileContentOptions& content = {});
   ~Imagery();
 
-  // Returns the number of pixels along the edge of a level's tiles: `most`, halved down to 256 while the pixels are
-  // still as fine as the image. Depends only on image, level and `most`. Precondition: `most` is a power of two from
-  // kMinSide to kMaxSide.
-  int SideOf(int level, int most) const;
+  // Returns the number of pixels along the edge of a level's tiles: `max_side`, halved down to 256 while the pixels are
+  // still as fine as the image. Depends only on image, level and `max_side`. Precondition: `max_side` is a power of two
+  // from kMinSide to kMaxSide.
+  int SideOf(int level, int max_side) const;
 
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
   // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that

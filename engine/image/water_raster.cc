@@ -13,6 +13,7 @@
 #include "engine/gdal/raster_file.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/sample_grid.h"
+#include "engine/sources/located_raster.h"
 
 namespace terrace::dem {
 namespace {
@@ -50,18 +51,13 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
-  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
-  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
-  if (!files) return tl::unexpected(files.error());
-  auto georeference = Georeference::Of(**dataset, path);
-  if (!georeference) return tl::unexpected(georeference.error());
-  const auto spacing = SourceSpacing::Of(*georeference, path);
-  if (!spacing) return tl::unexpected(spacing.error());
-  const Footprint footprint = Footprint::Of(*georeference);
+  auto located = LocateRaster(**dataset, path, before);
+  if (!located) return tl::unexpected(located.error());
+  const Footprint footprint = Footprint::Of(located->georeference);
   if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
 
-  auto impl = std::make_unique<Impl>(path, *std::move(files), *std::move(georeference));
-  impl->spacing = *spacing;
+  auto impl = std::make_unique<Impl>(path, std::move(located->files), std::move(located->georeference));
+  impl->spacing = located->spacing;
   impl->layout = RasterLayout::Of(**dataset, impl->georeference, "");
   impl->layout.rules.is_indicator = true;
   impl->footprint = footprint.Padded();

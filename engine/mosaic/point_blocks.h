@@ -64,8 +64,9 @@ class PointBlockCache {
   PointBlockPtr Find(const PointBlockKey& key);  // null: not kept
   void Insert(const PointBlockKey& key, PointBlockPtr block);
 
-  // Notes the block. Returns whether it was noted before, and its note was not replaced since by one of another block.
-  // A block that is wanted once, for a few points, is not worth reading as a whole.
+  // Returns whether the block was noted by an earlier call, and notes it. A few notes may be lost: each replaces that
+  // of another block with the same hash. A block that is wanted once, for a few points, is not worth reading as a
+  // whole.
   bool Note(const PointBlockKey& key);
 
   std::size_t count() const;

@@ -53,7 +53,7 @@ std::optional<LeftOut> LeftOutOf(const DemFile& file) {
   return LeftOut{false, file.path};
 }
 
-void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>& names) {
+void LogLeftOut(spdlog::level::level_enum level, const std::vector<std::string>& names) {
   constexpr std::size_t kMaxNamed = 5;
   if (names.empty()) return;
   const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMaxNamed));
@@ -65,9 +65,9 @@ void TellLeftOut(spdlog::level::level_enum level, const std::vector<std::string>
 struct LeftOutFiles {
   std::vector<std::string> missed, others;  // look like rasters; do not
 
-  void Tell() const {
-    TellLeftOut(spdlog::level::warn, missed);
-    TellLeftOut(spdlog::level::debug, others);
+  void Log() const {
+    LogLeftOut(spdlog::level::warn, missed);
+    LogLeftOut(spdlog::level::debug, others);
   }
 };
 
@@ -184,9 +184,9 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
   const std::string folder = EscapeControls(std::filesystem::path(files.front().path).parent_path().string());
   LeftOutFiles others = LeaveOutOthers(files);
   // If statistics are missing, the files are opened once more, and told then.
-  if (!only_kept) others.Tell();
+  if (!only_kept) others.Log();
   if (files.empty()) {
-    if (only_kept) others.Tell();
+    if (only_kept) others.Log();
     return MakeError(ErrorCode::kNotFound,
                      "{}: none of the files in this folder is a raster; name a folder of rasters or a raster", folder);
   }
@@ -209,7 +209,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     } else if (opening.LacksStatistics(opened)) {
       if (!lacking) lacking = opened.error();
     } else {
-      if (only_kept) others.Tell();
+      if (only_kept) others.Log();
       if (!options.fault || options.stop.stop_requested()) return tl::unexpected(opened.error());
       options.fault(opened.error());
       if (!fault) fault = opened.error();
@@ -217,8 +217,8 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     kept.push_back(std::move(files[i]));
   }
   if (lacking) return tl::unexpected(*std::move(lacking));
-  if (only_kept) others.Tell();
-  TellLeftOut(spdlog::level::warn, without_height);
+  if (only_kept) others.Log();
+  LogLeftOut(spdlog::level::warn, without_height);
   left_out = std::move(others.missed);
   left_out.insert(left_out.end(), without_height.begin(), without_height.end());
   if (fault) return tl::unexpected(*std::move(fault));

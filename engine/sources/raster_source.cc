@@ -15,6 +15,7 @@
 #include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
+#include "engine/sources/located_raster.h"
 
 namespace terrace::dem {
 namespace {
@@ -197,16 +198,12 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   const auto before = StampOf(path);
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
-  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
-  auto files = StampedFiles::OfOpened(FilesOf(**dataset, path), before);
-  if (!files) return tl::unexpected(files.error());
-  auto georeference = Georeference::Of(**dataset, path);
-  if (!georeference) return tl::unexpected(georeference.error());
-  const auto spacing = SourceSpacing::Of(*georeference, path);
-  if (!spacing) return tl::unexpected(spacing.error());
+  auto located = LocateRaster(**dataset, path, before);
+  if (!located) return tl::unexpected(located.error());
 
-  std::unique_ptr<RasterSource> source(new RasterSource(path, *std::move(files), *std::move(georeference)));
-  source->spacing_ = *spacing;
+  std::unique_ptr<RasterSource> source(
+      new RasterSource(path, std::move(located->files), std::move(located->georeference)));
+  source->spacing_ = located->spacing;
   if (auto found = source->FindLayout(**dataset, path, options); !found) return tl::unexpected(found.error());
   const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
   std::string overviews_unused;

@@ -58,7 +58,7 @@ class StatisticsPages {
   void Remove(std::list<Page>::iterator page);
 
   mutable std::mutex mutex_;
-  std::size_t kept_left_;  // guarded by mutex_, as are these
+  std::size_t kept_left_;  // guarded by mutex_, as are the next members
   const std::size_t max_paged_;
   std::size_t paged_ = 0;
   std::list<Page> pages_;  // most recently used first
@@ -69,8 +69,8 @@ class RasterSource {
  public:
   // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
   // Statistics are stored in `cache`, or loaded from it. `pages`: limits the memory of the statistics of this and other
-  // rasters; null: no limit. `threads`: that compute statistics. kCancelled: stopped; or without threads, the cache
-  // lacks the statistics: all other checks have passed then.
+  // rasters; null: no limit. `threads`: that compute statistics. 0: the raster is not read; if the cache lacks the
+  // statistics, Open returns kCancelled after all other checks. kCancelled: stopped as well.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const RasterCache& cache = {},
                                                     const std::function<void(double)>& progress = {},

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/common/dem_types.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::dem {
 namespace {

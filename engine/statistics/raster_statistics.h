@@ -52,7 +52,7 @@ struct RasterStatistics {
   float lowest = 0, highest = 0;  // of the samples
   std::uint64_t valid = 0, voids = 0;
   RimVoids rim_voids;
-  std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 where they are too many to tell
+  std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 if rim_voids.is_everything()
   ZeroEdges zeros;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
   AveragingErrors errors;

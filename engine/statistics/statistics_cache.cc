@@ -19,6 +19,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/common/source_log.h"
 #include "engine/core/bytes.h"
+#include "engine/core/errno_text.h"
 #include "engine/statistics/statistics_codec.h"
 
 namespace terrace::dem {

@@ -66,9 +66,9 @@ bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool 
 //   of the value are at most a quarter as many as those equal to it.
 // - Heights below -500 m or above 9,000 m are mixtures of heights and a nodata value if all of them lie within 3
 //   samples of a void, though at most a quarter of all samples do, and at least half of them differ from a neighbour by
-//   more than 1,000 m (or the coast step). No land is lower or higher, and none is so steep. A sea floor has such
-//   heights elsewhere too; there the bound is -12,000 m. If they are an eighth of the samples near voids or more, as
-//   after resampling, all voids grow by 2 samples.
+//   more than 1,000 m (or the coast step). No land is lower or higher, and none is so steep. Where heights below -500 m
+//   also lie away from voids, as on a sea floor, the lower bound is -12,000 m. If mixtures are an eighth of the samples
+//   near voids or more, as after resampling, all voids grow by 2 samples.
 // - Zeros are voids if they are a collar; voids then grow by one sample, if at most a quarter of all samples are near
 //   voids.
 //

@@ -29,10 +29,8 @@ struct ChordMisfit {
   int at = 0;        // the sample with this error; the first of equals
 };
 
-// The worst sample strictly between the ends by the rule of BorderOptions, in exactly its form and without fused
-// operations. Other samples are not read. The result is bit-equal on every processor.
-//
-// Safe to call from many threads at once.
+// The sample strictly between the ends with the largest error by the rule of BorderOptions. The formula is evaluated as
+// it is written there, without fused operations: the result is bit-equal on every processor. Reads no other samples.
 ChordMisfit WorstOfChord(const Chord& chord, const BorderOptions& options);
 
 // The worst valid sample strictly between two neighbouring border vertices, given in any order, by the rule of

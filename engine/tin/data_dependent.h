@@ -11,9 +11,9 @@
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
-// that makes the shape worse rarely saves vertices in the end, and even more rarely farther from p. It also adds two
-// triangles to scan. Hence there are three thresholds. All of this together saves 3 to 6 % of the vertices
-// (docs/decisions/0007).
+// that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
+// Therefore it takes less to keep u-v than to take p-w, and least away from p: there are three thresholds. All of this
+// together saves 3 to 6 % of the vertices (docs/decisions/0007).
 //
 // A test depends on its quadrilateral, on which of the corners beyond the edge is the youngest, and on how its edge
 // came into the outline. The cavity therefore does not depend on the order of the tests, on the triangle that the

@@ -3,7 +3,7 @@
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5. An error e of
 // a sample counts as
 //   weight e           while e <= cap,
-//   weight e 2^34      above: every cap in metres precedes every error of a run (below 2^34 times the smallest cap),
+//   weight e 2^34 above the cap: precedes all errors of a run that are below 2^34 times the smallest cap,
 //   max(e, 1) 2^40     if the sample is forced, whatever its error is.
 // None of this depends on the goal of a run, so coarser meshes stay prefixes of finer ones. A mesh to the error E has
 // e <= min(E / weight, cap) at every sample, and all forced samples as vertices.
@@ -34,8 +34,8 @@ struct SampleLimits {
     return !weights.empty() && (weights[sample] > 1 || caps[sample] < std::numeric_limits<float>::infinity());
   }
 
-  // The error of a sample, weighted as defined above. `scale`: factor on the caps; from 1024 on no sample counts as
-  // forced. For runs that may not take more vertices.
+  // The error of a sample, weighted as defined above. `scale`: factor on the caps; from 1024 on, forced samples count
+  // like others. A run that exceeds a limit of vertices is repeated with a larger scale.
   double Counted(std::size_t sample, double error, double scale = 1) const {
     constexpr double kBeyondCap = 0x1p34, kForced = 0x1p40, kGiveUp = 1024;
     if (!forced.empty() && forced[sample] != 0 && scale < kGiveUp) return std::max(error, 1.0) * kForced;

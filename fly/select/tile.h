@@ -47,7 +47,7 @@ struct Tile {
   std::shared_ptr<ImplicitTree> tree;
   geo::TileKey local;  // inside `tree`: level 0 is its root
 
-  // Its children are always visited instead of it: of structure, and of empty tiles whose error is not below the
+  // Its children are always visited instead of it. True for structure, and for empty tiles whose error is not below the
   // parent's.
   bool always_refine = false;
 

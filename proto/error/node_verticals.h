@@ -58,12 +58,11 @@ class NodeVerticals {
   Position PositionOf(const geo::Vec3& point, int i, int j) const;
 
   // A bound, in lattice steps, on the offset of a triangle's point from the position that its barycentric coordinates
-  // give. `unit`: distance between nodes, in the unit of the corners' coordinates. `beside_m`: bound on the distance of
-  // the corners from their plumb lines. Infinite if no bound is known: around a pole, and over more than half a radian.
+  // give. Infinite if no bound is known: around a pole, and over more than half a radian.
   struct Shift {
     double x = 0, y = 0;
   };
-  // Bounds for one triangle (BoundsOf). The longitude of a point is the mean of the corners' longitudes, weighted with
+  // Bounds for one triangle. The longitude of a point is the mean of the corners' longitudes, weighted with
   // their distances from the axis, up to the cube of their difference. The offset of its latitude has three parts. The
   // point is nearer to the axis than the corners: less than sin cos d^2 / 8 for a difference d in longitude. The other
   // two are the covariances of latitude with height and with the radius of curvature. All bounds are a few times too
@@ -75,6 +74,8 @@ class NodeVerticals {
     // most 1/sqrt(3) of the longest edge.
     double sagitta_m = 0;
   };
+  // `unit`: distance between nodes, in the unit of the corners' coordinates. `beside_m`: bound on the distance of the
+  // corners from their plumb lines.
   Bounds BoundsOf(const std::array<NodePoint, 3>& corners, std::int64_t unit, double beside_m) const {
     const Extent extent(corners, unit);
     const double width = extent.columns * step_, height = extent.rows * step_;

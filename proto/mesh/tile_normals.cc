@@ -29,9 +29,9 @@ LocalFrame FrameOf(geo::SinCos longitude, geo::SinCos latitude) {
           {latitude.cos * longitude.cos, latitude.cos * longitude.sin, latitude.sin}};
 }
 
-// The central difference, limited to within kWidestTurn of van Leer's limited difference, which is zero if one of the
-// two steps is level, as at the foot and at the top of a cliff that is one step wide. `before` and `after`: the slopes
-// of the two steps.
+// The central difference, limited to within 13 degrees (kCosWidestTurn) of van Leer's limited difference, which is zero
+// if one of the two steps is level, as at the foot and at the top of a cliff that is one step wide. `before` and
+// `after`: the slopes of the two steps.
 double Limited(double central, double before, double after) {
   constexpr double kTangent = kSinWidestTurn / kCosWidestTurn;
   const double limited = before * after > 0 ? 2 / (1 / before + 1 / after) : 0, turned = limited * kTangent;
@@ -97,8 +97,8 @@ std::vector<geo::Vec3> AreaWeightedNormals(const std::vector<std::array<std::uin
   return normals;
 }
 
-// Turns `normal` towards `goal` until they are at most kWidestTurn apart. Both are unit vectors. The goal is zero for
-// triangles without area beside a pole; then `normal` is not turned.
+// Turns `normal` towards `goal` until they are at most 13 degrees apart (kCosWidestTurn). Both are unit vectors. The
+// goal is zero for triangles without area beside a pole; then `normal` is not turned.
 geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
   const double cosine = geo::Dot(normal, goal);
   if (cosine >= kCosWidestTurn || (goal.x == 0 && goal.y == 0 && goal.z == 0)) return normal;

@@ -16,7 +16,7 @@
 
 #include "engine/core/result.h"
 #include "server/api/request_context.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/application.h"
 #include "server/http/request.h"
 #include "server/http/response.h"

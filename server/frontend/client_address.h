@@ -8,7 +8,7 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/request.h"
 #include "server/net/address.h"
 

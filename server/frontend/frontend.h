@@ -6,7 +6,7 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/frontend/admission_control.h"
 #include "server/http/cors.h"
 #include "server/net/connection_set.h"

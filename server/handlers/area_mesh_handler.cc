@@ -76,10 +76,10 @@ std::string FormatOrigin(const dem::GeoPosition& centre) {
 }
 
 // `response`: complete except for what depends on the mesh.
-asio::awaitable<Response> BuildArea(const Handlers& from, const RequestContext& context, std::uint32_t dataset,
+asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset,
                                     tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
                                     Response response) {
-  Work<tiler::EncodedTile> work = [catalog = from.catalog, dataset, area, plan, coding,
+  Work<tiler::EncodedTile> work = [catalog = handlers.catalog, dataset, area, plan, coding,
                                    requested_at =
                                        TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
     const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
@@ -91,9 +91,9 @@ asio::awaitable<Response> BuildArea(const Handlers& from, const RequestContext& 
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
-  const auto deadline = from.Deadline();
+  const auto deadline = handlers.Deadline();
   Result<tiler::EncodedTile> mesh =
-      co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+      co_await handlers.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {
@@ -157,25 +157,25 @@ Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
   return area;
 }
 
-Answer AnswerArea(const Handlers& from, const RequestContext& context) {
+Answer AnswerArea(const Handlers& handlers, const RequestContext& context) {
   const Request& request = *context.request;
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<tiler::AreaRequest> area = ParseAreaRequest(context.route.query);
   if (!area) return ClientErrorResponse(area.error(), request.id);
-  const Result<tiler::AreaPlan> plan = from.catalog->pipeline->PlanArea(*dataset, *area, from.max_mesh_samples);
+  const Result<tiler::AreaPlan> plan = handlers.catalog->pipeline->PlanArea(*dataset, *area, handlers.max_mesh_samples);
   if (!plan) return ClientErrorResponse(plan.error(), request.id);
 
-  const DatasetView& view = from.catalog->datasets[*dataset];
+  const DatasetView& view = handlers.catalog->datasets[*dataset];
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
   response.content_encoding = tiler::NameOf(coding);
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, context.route.query, coding);
-  response.cache_control = CacheControlOf(context.route.query, view, from.cache_control);
+  response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
   response.vary = "Accept-Encoding";
   if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
-  return BuildArea(from, context, *dataset, *area, *plan, coding, std::move(response));
+  return BuildArea(handlers, context, *dataset, *area, *plan, coding, std::move(response));
 }
 
 }  // namespace terrace::server

@@ -118,10 +118,10 @@ std::string_view ContentTypeOf(GridFormat format) {
   return "application/octet-stream";
 }
 
-asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& context, std::uint32_t dataset,
+asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset,
                                    std::shared_ptr<const GridQuery> query, tiler::Coding coding, Response response) {
-  const DatasetView& view = from.catalog->datasets[dataset];
-  Work<MadeGrid> work = [catalog = from.catalog, dataset, query, coding, most = from.max_mesh_samples,
+  const DatasetView& view = handlers.catalog->datasets[dataset];
+  Work<MadeGrid> work = [catalog = handlers.catalog, dataset, query, coding, most = handlers.max_mesh_samples,
                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
     made.reply.times.queue = tiler::MicrosecondsSince(requested_at);
@@ -141,9 +141,9 @@ asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& c
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");
     return made;
   };
-  const auto deadline = from.Deadline();
+  const auto deadline = handlers.Deadline();
   Result<MadeGrid> made =
-      co_await from.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+      co_await handlers.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
   if (!made) co_return co_await RefusePoints(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
   co_return co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
@@ -151,13 +151,13 @@ asio::awaitable<Response> MakeGrid(const Handlers& from, const RequestContext& c
 
 }  // namespace
 
-Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
+Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
   const Request& request = *context.request;
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   Result<GridQuery> query = ParseGrid(context.route.query);
   if (!query) return ClientErrorResponse(query.error(), request.id);
-  const DatasetView& view = from.catalog->datasets[*dataset];
+  const DatasetView& view = handlers.catalog->datasets[*dataset];
   if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
     return ClientErrorResponse(datum.error(), request.id);
   }
@@ -172,11 +172,11 @@ Answer AnswerGrid(const Handlers& from, const RequestContext& context) {
   // The version does not cover the geoid grid that orthometric heights depend on.
   const bool is_versioned = query->datum == dem::HeightDatum::kEllipsoid;
   response.cache_control =
-      is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;
+      is_versioned ? CacheControlOf(context.route.query, view, handlers.cache_control) : handlers.cache_control;
   response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
   if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   auto shared = std::make_shared<const GridQuery>(*std::move(query));
-  return MakeGrid(from, context, *dataset, std::move(shared), coding, std::move(response));
+  return MakeGrid(handlers, context, *dataset, std::move(shared), coding, std::move(response));
 }
 
 }  // namespace terrace::server

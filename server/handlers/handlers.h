@@ -20,7 +20,7 @@
 #include "proto/documents/implicit_tree.h"
 #include "server/api/request_context.h"
 #include "server/api/tile_formats.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/documents/document.h"
 #include "server/documents/static_files.h"
 #include "server/http/application.h"
@@ -88,12 +88,12 @@ struct Handlers {
 
 // GET /{dataset}/{z}/{x}/{y}.terrain, .glb and .png. Replies that need no build (refusals and cached tiles) are
 // returned at once. Precondition: the route has a format.
-Answer AnswerTile(const Handlers& from, const RequestContext& context);
+Answer AnswerTile(const Handlers& handlers, const RequestContext& context);
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times);
 
 // GET and POST /{dataset}/heights
-Answer AnswerHeights(const Handlers& from, const RequestContext& context);
+Answer AnswerHeights(const Handlers& handlers, const RequestContext& context);
 
 // Limit of tiles per request: each must be built if it is not cached.
 inline constexpr std::size_t kMaxCertifiedTiles = 64;
@@ -121,13 +121,13 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
 std::string HeightsBytes(const tiler::PointHeights& known);
 
 // GET /{dataset}/grid (server/query/grid_query.h). The Terrain-Grid header has the grid's size, place and scale.
-Answer AnswerGrid(const Handlers& from, const RequestContext& context);
+Answer AnswerGrid(const Handlers& handlers, const RequestContext& context);
 
 // GET and POST /{dataset}/sight (server/query/sight_query.h)
-Answer AnswerSight(const Handlers& from, const RequestContext& context);
+Answer AnswerSight(const Handlers& handlers, const RequestContext& context);
 
 // GET /{dataset}/mesh
-Answer AnswerArea(const Handlers& from, const RequestContext& context);
+Answer AnswerArea(const Handlers& handlers, const RequestContext& context);
 // Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,
 // `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
 // kInvalidArgument: the message is for the client.
@@ -136,7 +136,7 @@ Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
 Result<dem::GeoBounds> ParseBox(std::string_view text);
 
 // GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
-DocumentAnswer DescribeLayer(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeLayer(const Handlers& handlers, const RequestContext& context);
 // The document for requests without parameters.
 Document PlainLayer(const DatasetView& dataset);
 // The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
@@ -152,32 +152,32 @@ std::string WithToken(std::string query, const RequestContext& context);
 const Grant* GrantInQuery(const RequestContext& context);
 
 // GET /{dataset}/edits.geojson: outlines of the dataset's edits. 404: it has none.
-DocumentAnswer DescribeEdits(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeEdits(const Handlers& handlers, const RequestContext& context);
 // A FeatureCollection of MultiLineStrings, RFC 7946, in the order of the edits. Properties: `op`, `file` without its
 // folder, `feature`, its index in the file, `area`: lines are closed rings. Returns an empty string if a stop was
 // requested.
 std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::stop_token& stop = {});
 
 // GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
-DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.
 void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made);
 // The .subtree files of the tileset. Any available tile may be the root, so that an older tileset.json that a client
 // has cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree
 // begins at this tile.
-DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeSubtree(const Handlers& handlers, const RequestContext& context);
 
 // GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.
-Answer AnswerTileJson(const Handlers& from, const RequestContext& context);
+Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context);
 
 // GET /{dataset}/hillshade/tiles.json and those of slopes, contours and imagery. The parameters of the tiles go into
 // the tile template; `?format` names the suffix of pictures. Precondition: the route has a format.
-Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context);
+Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context);
 
 // GET /datasets: the datasets that the client may see.
-DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeDatasets(const Handlers& handlers, const RequestContext& context);
 // GET / and /viewer/{file}. Without a viewer, `/` is a plain list of datasets.
-DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeViewerFile(const Handlers& handlers, const RequestContext& context);
 // Whether the client may see a dataset. Empty: it may see all.
 using IsSeen = std::function<bool(const DatasetView&)>;
 
@@ -205,12 +205,12 @@ Response StateResponse(int status, std::string_view content_type, Body text);
 inline constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
 // GET /livez, /readyz and /metrics: for operators of the server.
-Answer AnswerLive(const Handlers& from, const RequestContext& context);
-Answer AnswerReady(const Handlers& from, const RequestContext& context);
-Answer AnswerMetrics(const Handlers& from, const RequestContext& context);
+Answer AnswerLive(const Handlers& handlers, const RequestContext& context);
+Answer AnswerReady(const Handlers& handlers, const RequestContext& context);
+Answer AnswerMetrics(const Handlers& handlers, const RequestContext& context);
 
 // GET /version: which program answers, and what it serves, so that operators can compare the nodes of a fleet.
-Answer AnswerVersion(const Handlers& from, const RequestContext& context);
+Answer AnswerVersion(const Handlers& handlers, const RequestContext& context);
 // {"product","version","build","encoder","libraries":{"GDAL":"3.6.2",...},"datasets":[{"name","version"}]}
 std::string VersionJson(const Catalog& catalog);
 

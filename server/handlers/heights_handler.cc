@@ -38,49 +38,30 @@ constexpr std::size_t kShortList = 1000;
 // Points written between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 1024;
 
-// Parses on a worker, unless the input is small.
-asio::awaitable<Result<HeightsQuery>> ParseOnWorker(const Handlers& from, const RequestContext& context,
-                                                    TileService::Clock::time_point deadline) {
-  const Request& request = *context.request;
-  const std::string& query = context.route.query;
-  const bool is_post = request.method == Method::kPost;
-  // A path of two corners may have thousands of points.
-  const bool may_be_path = query.find("path") != std::string::npos;
-  if (!is_post && query.size() <= kQuickQuery && !may_be_path) {
-    const HeightsInput input{query, {}, {}};
-    co_return ParseHeights(input, from.max_locations);
-  }
-  const std::string_view type = is_post ? request.fields->content_type : std::string_view();
-  Work<HeightsQuery> parse = [query, type = std::string(type), body = request.body,
-                              most = from.max_locations](const std::stop_token& stop) {
-    return ParseHeights({query, type, body}, most, stop);
-  };
-  co_return co_await from.tiles.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
-}
-
-asio::awaitable<Result<ServedTile>> TileOf(const Handlers& from, tiler::TileRequest tile,
+asio::awaitable<Result<ServedTile>> TileOf(const Handlers& handlers, tiler::TileRequest tile,
                                            TileService::Clock::time_point deadline, std::uint64_t client) {
-  if (std::optional<ServedTile> found = from.tiles.Find(*from.catalog, tile)) co_return *std::move(found);
-  co_return co_await from.tiles.Build(from.catalog, tile, deadline, client);
+  if (std::optional<ServedTile> found = handlers.tiles.Find(*handlers.catalog, tile)) co_return *std::move(found);
+  co_return co_await handlers.tiles.Build(handlers.catalog, tile, deadline, client);
 }
 
 // Gets the certified errors of the points' tiles one after the other, from the cache or by building the tiles.
-asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& from, std::uint32_t dataset, const HeightsQuery& query,
-                                                 TileService::Clock::time_point deadline, std::uint64_t client) {
+asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& handlers, std::uint32_t dataset,
+                                                 const HeightsQuery& query, TileService::Clock::time_point deadline,
+                                                 std::uint64_t client) {
   // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
-  Work<CertifiedPoints> find = [catalog = from.catalog, dataset, wanted = query.points,
+  Work<CertifiedPoints> find = [catalog = handlers.catalog, dataset, wanted = query.points,
                                 level = *query.certify_level](const std::stop_token& stop) {
     return TilesOf(catalog->datasets[dataset], wanted, level, stop);
   };
   Result<CertifiedPoints> points =
-      co_await from.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
+      co_await handlers.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
   if (!points) co_return points;
   for (std::size_t i = 0; i < points->tiles.size(); ++i) {
     tiler::TileRequest tile;
     tile.dataset = dataset;
     tile.key = points->tiles[i];
     tile.coding = tiler::Coding::kGzip;  // the format that is most probably cached
-    const Result<ServedTile> served = co_await TileOf(from, tile, deadline, client);
+    const Result<ServedTile> served = co_await TileOf(handlers, tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
     points->errors_m[i] = served->tile->certified_error_m;
   }
@@ -99,11 +80,14 @@ Result<tiler::PointHeights> ReadSurface(const tiler::TilePipeline& pipeline, std
   return heights;
 }
 
-asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext& context, std::uint32_t dataset) {
+asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
-  const DatasetView& view = from.catalog->datasets[dataset];
-  const auto deadline = from.Deadline();
-  Result<HeightsQuery> parsed = co_await ParseOnWorker(from, context, deadline);
+  const DatasetView& view = handlers.catalog->datasets[dataset];
+  const auto deadline = handlers.Deadline();
+  // A path of two corners may have thousands of points.
+  const bool is_quick =
+      context.route.query.size() <= kQuickQuery && context.route.query.find("path") == std::string::npos;
+  Result<HeightsQuery> parsed = co_await ParsePoints(handlers, context, ParseHeights, is_quick, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
   if (const Result<void> datum = CheckDatum(parsed->datum, view); !datum) {
     co_return ClientErrorResponse(datum.error(), request.id);
@@ -116,7 +100,7 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     // The version covers neither the geoid grid that orthometric heights depend on nor certified errors.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
     response.cache_control =
-        is_versioned ? CacheControlOf(context.route.query, view, from.cache_control) : from.cache_control;
+        is_versioned ? CacheControlOf(context.route.query, view, handlers.cache_control) : handlers.cache_control;
     // Certified errors depend on the program, not only on the data.
     if (!parsed->certify_level) {
       response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
@@ -126,14 +110,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
 
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> known = co_await Certify(from, dataset, *parsed, deadline, request.client);
+    Result<CertifiedPoints> known = co_await Certify(handlers, dataset, *parsed, deadline, request.client);
     if (!known) co_return co_await RefusePoints(known.error(), view, request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query, certified,
+  Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query, certified,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = tiler::MicrosecondsSince(requested_at);
@@ -148,14 +132,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& from, const RequestContext
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
-  Result<MadeReply> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
   co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
 }
 
 }  // namespace
 
-Answer AnswerHeights(const Handlers& from, const RequestContext& context) {
-  return AnswerPoints(from, context, ReadHeights);
+Answer AnswerHeights(const Handlers& handlers, const RequestContext& context) {
+  return AnswerPoints(handlers, context, ReadHeights);
 }
 
 std::string HeightsBytes(const tiler::PointHeights& known) {

@@ -1,13 +1,18 @@
 // What replies about points have in common: heights, grids and lines of sight.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <stop_token>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/handlers/handlers.h"
+#include "server/query/heights_query.h"
 
 namespace terrace::server {
 
@@ -17,13 +22,34 @@ struct MadeReply {
   tiler::StageTimes times;
 };
 
-using PointHandler = asio::awaitable<Response> (*)(const Handlers& from, const RequestContext& context,
+using PointHandler = asio::awaitable<Response> (*)(const Handlers& handlers, const RequestContext& context,
                                                    std::uint32_t dataset);
 // Calls `handler` with the index of the dataset. 415: the body's type is not supported. 404: no such dataset.
-Answer AnswerPoints(const Handlers& from, const RequestContext& context, PointHandler handler);
+Answer AnswerPoints(const Handlers& handlers, const RequestContext& context, PointHandler handler);
 
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
+
+// Parses query and body with ParseHeights or ParseSight, on a worker unless it is a query alone and `is_quick`.
+template <typename Query>
+asio::awaitable<Result<Query>> ParsePoints(const Handlers& handlers, const RequestContext& context,
+                                           Result<Query> (*parse)(const HeightsInput& input, std::size_t max_points,
+                                                                  const std::stop_token& stop),
+                                           bool is_quick, TileService::Clock::time_point deadline) {
+  const Request& request = *context.request;
+  const std::string& query = context.route.query;
+  const bool is_post = request.method == Method::kPost;
+  if (!is_post && is_quick) {
+    const HeightsInput input{query, {}, {}};
+    co_return parse(input, handlers.max_locations, {});
+  }
+  const std::string_view type = is_post ? request.fields->content_type : std::string_view();
+  Work<Query> work = [parse, query, type = std::string(type), body = request.body,
+                      max_points = handlers.max_locations](const std::stop_token& stop) {
+    return parse({query, type, body}, max_points, stop);
+  };
+  co_return co_await handlers.tiles.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
+}
 
 // Starts a reply with JSON, in a coding that the client accepts, or with binary values, uncompressed: they hardly
 // shrink, and compressing them takes longer than reading them. Sets `no-store`, as for replies to POST.

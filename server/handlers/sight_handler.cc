@@ -110,42 +110,25 @@ std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswe
   return json + "],\"status\":\"OK\"}";
 }
 
-// Parses on a worker, unless the input is small.
-asio::awaitable<Result<SightQuery>> ParseRaysOnWorker(const Handlers& from, const RequestContext& context,
-                                                      TileService::Clock::time_point deadline) {
+asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
-  const std::string& query = context.route.query;
-  const bool is_post = request.method == Method::kPost;
-  if (!is_post && query.size() <= kQuickRays) {
-    const HeightsInput input{query, {}, {}};
-    co_return ParseSight(input, from.max_locations);
-  }
-  const std::string_view type = is_post ? request.fields->content_type : std::string_view();
-  Work<SightQuery> parse = [query, type = std::string(type), body = request.body,
-                            most = from.max_locations](const std::stop_token& stop) {
-    return ParseSight({query, type, body}, most, stop);
-  };
-  co_return co_await from.tiles.Run(std::move(parse), TileService::Length::kShort, deadline, request.client);
-}
-
-asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& context, std::uint32_t dataset) {
-  const Request& request = *context.request;
-  const DatasetView& view = from.catalog->datasets[dataset];
-  const auto deadline = from.Deadline();
-  Result<SightQuery> parsed = co_await ParseRaysOnWorker(from, context, deadline);
+  const DatasetView& view = handlers.catalog->datasets[dataset];
+  const auto deadline = handlers.Deadline();
+  const bool is_quick = context.route.query.size() <= kQuickRays;
+  Result<SightQuery> parsed = co_await ParsePoints(handlers, context, ParseSight, is_quick, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
   if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;
   if (request.method != Method::kPost) {
-    response.cache_control = CacheControlOf(context.route.query, view, from.cache_control);
+    response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
     response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
-  Work<MadeReply> work = [catalog = from.catalog, dataset, coding, query,
+  Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = tiler::MicrosecondsSince(requested_at);
@@ -164,14 +147,14 @@ asio::awaitable<Response> LookAlong(const Handlers& from, const RequestContext& 
     return made;
   };
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
-  Result<MadeReply> made = co_await from.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
   co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
 }
 
 }  // namespace
 
-Answer AnswerSight(const Handlers& from, const RequestContext& context) {
-  return AnswerPoints(from, context, LookAlong);
+Answer AnswerSight(const Handlers& handlers, const RequestContext& context) {
+  return AnswerPoints(handlers, context, LookAlong);
 }
 
 }  // namespace terrace::server

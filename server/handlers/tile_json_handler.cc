@@ -39,21 +39,22 @@ void SetBounds(const dem::GeoBounds& bounds, proto::TileJsonDescription& tiles) 
   tiles.north = bounds.north;
 }
 
-Response ServeTileJson(const Handlers& from, const RequestContext& context, const proto::TileJsonDescription& tiles) {
+Response ServeTileJson(const Handlers& handlers, const RequestContext& context,
+                       const proto::TileJsonDescription& tiles) {
   Response response =
       Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *context.request, kRevalidate);
-  response.vary_more = from.origin_headers;
+  response.vary_more = handlers.origin_headers;
   return response;
 }
 
 }  // namespace
 
-Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), context.request->id);
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(context.route.query);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
-  const DatasetView& dataset = from.catalog->datasets[*index];
+  const DatasetView& dataset = handlers.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
@@ -67,14 +68,14 @@ Answer AnswerTileJson(const Handlers& from, const RequestContext& context) {
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
   SetBounds({dataset.west, dataset.south, dataset.east, dataset.north}, tiles);
-  return ServeTileJson(from, context, tiles);
+  return ServeTileJson(handlers, context, tiles);
 }
 
-Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
+Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context) {
   const auto refuse = [&](const Error& error) { return ClientErrorResponse(error, context.request->id); };
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!index) return refuse(index.error());
-  const DatasetView& dataset = from.catalog->datasets[*index];
+  const DatasetView& dataset = handlers.catalog->datasets[*index];
   const TileFormatRow* row = context.route.format;
   if (const auto has = CheckHasFormat(dataset, row->format); !has) return refuse(has.error());
   if (const auto has = CheckHasImagery(dataset, row->format); !has) return refuse(has.error());
@@ -103,7 +104,7 @@ Answer AnswerMapTileJson(const Handlers& from, const RequestContext& context) {
   }
   tiles.tile_size = parameters->size;
   SetBounds(MapBounds(dataset, row->format), tiles);
-  return ServeTileJson(from, context, tiles);
+  return ServeTileJson(handlers, context, tiles);
 }
 
 }  // namespace terrace::server

@@ -58,10 +58,10 @@ void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
   made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
 }
 
-DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& context) {
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, from.catalog->datasets);
+DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& context) {
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
-  if (const auto has = CheckHasFormat(from.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
+  if (const auto has = CheckHasFormat(handlers.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
   const Result<TileParameters> parameters =
@@ -69,13 +69,13 @@ DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& conte
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, context.route.query);
   std::string content_query = WithToken(content_parameters, context);
-  if (content_query.empty()) return Serve(from.of_datasets[*dataset].tileset, *context.request, kRevalidate);
+  if (content_query.empty()) return Serve(handlers.of_datasets[*dataset].tileset, *context.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), context);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = from.catalog->datasets[*dataset], roots = from.of_datasets[*dataset].roots,
+  plan.write = [&view = handlers.catalog->datasets[*dataset], roots = handlers.of_datasets[*dataset].roots,
                 requested = parameters->requested, content_query = std::move(content_query),
                 subtree_query = std::move(subtree_query)](const std::stop_token&) {
     return WriteTileset(view, *roots, requested, content_query, subtree_query);
@@ -83,13 +83,13 @@ DocumentAnswer DescribeTileset(const Handlers& from, const RequestContext& conte
   return plan;
 }
 
-DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& context) {
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, from.catalog->datasets);
+DocumentAnswer DescribeSubtree(const Handlers& handlers, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), context.request->id);
   const Result<TileParameters> parameters =
       ParseTileParameters(context.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
-  const DatasetView& dataset = from.catalog->datasets[*index];
+  const DatasetView& dataset = handlers.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kGlb); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
@@ -103,7 +103,7 @@ DocumentAnswer DescribeSubtree(const Handlers& from, const RequestContext& conte
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(context.route.key),
                          context.route.subtree_levels, TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
-  plan.cache_control = CacheControlOf(context.route.query, dataset, from.cache_control);
+  plan.cache_control = CacheControlOf(context.route.query, dataset, handlers.cache_control);
   plan.write = [&dataset, requested, top = context.route.key, levels = context.route.subtree_levels](
                    const std::stop_token&) { return tiler::SubtreeOf(TreeOf(dataset, requested), top, levels); };
   return plan;

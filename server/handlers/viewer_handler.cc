@@ -17,8 +17,8 @@ using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen
                                       std::span<const PendingDataset>);
 
 // The pending datasets that the client may see.
-std::vector<PendingDataset> PendingOfSeen(const Handlers& from, const RequestContext& context) {
-  std::vector<PendingDataset> pending = from.process.PendingOf(*from.catalog);
+std::vector<PendingDataset> PendingOfSeen(const Handlers& handlers, const RequestContext& context) {
+  std::vector<PendingDataset> pending = handlers.process.PendingOf(*handlers.catalog);
   std::erase_if(pending,
                 [&](const PendingDataset& one) { return !context.sees_all() && !context.grant->Sees(one.name); });
   return pending;
@@ -26,8 +26,8 @@ std::vector<PendingDataset> PendingOfSeen(const Handlers& from, const RequestCon
 
 // A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets. `pending`: what
 // PendingOfSeen returns.
-DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const RequestContext& context, WriteDatasets write,
-                        std::vector<PendingDataset> pending) {
+DocumentPlan PlanOfSeen(const Handlers& handlers, const Document& all, const RequestContext& context,
+                        WriteDatasets write, std::vector<PendingDataset> pending) {
   DocumentPlan plan;
   // Each token has one Grant as long as the server runs.
   plan.key = fmt::format("{} {}", all.identity_etag, fmt::ptr(context.grant.get()));
@@ -35,7 +35,7 @@ DocumentPlan PlanOfSeen(const Handlers& from, const Document& all, const Request
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
   const GrantPtr limited = context.sees_all() ? nullptr : context.grant;
-  plan.write = [datasets = std::span<const DatasetView>(from.catalog->datasets), limited, write,
+  plan.write = [datasets = std::span<const DatasetView>(handlers.catalog->datasets), limited, write,
                 pending = std::move(pending)](const std::stop_token& stop) {
     const auto is_seen = limited ? IsSeen([&](const DatasetView& view) { return limited->Sees(view.name); }) : IsSeen();
     return write(datasets, is_seen, stop, pending);
@@ -125,26 +125,27 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
       pending.empty() ? "" : "<meta http-equiv=\"refresh\" content=\"5\">", items);
 }
 
-DocumentAnswer DescribeDatasets(const Handlers& from, const RequestContext& context) {
+DocumentAnswer DescribeDatasets(const Handlers& handlers, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  std::vector<PendingDataset> pending = PendingOfSeen(from, context);
-  if (context.sees_all() && pending.empty()) return Serve(from.list, *context.request, kRevalidate);
-  return PlanOfSeen(from, from.list, context, DatasetsJson, std::move(pending));
+  std::vector<PendingDataset> pending = PendingOfSeen(handlers, context);
+  if (context.sees_all() && pending.empty()) return Serve(handlers.list, *context.request, kRevalidate);
+  return PlanOfSeen(handlers, handlers.list, context, DatasetsJson, std::move(pending));
 }
 
 // Pages keep their state in the query, so any query is allowed.
-DocumentAnswer DescribeViewerFile(const Handlers& from, const RequestContext& context) {
-  if (const Document* file = from.viewer->Find(context.route.file)) return Serve(*file, *context.request, kRevalidate);
-  if (from.viewer->empty() && context.route.file == "index.html") {
-    std::vector<PendingDataset> pending = PendingOfSeen(from, context);
+DocumentAnswer DescribeViewerFile(const Handlers& handlers, const RequestContext& context) {
+  if (const Document* file = handlers.viewer->Find(context.route.file))
+    return Serve(*file, *context.request, kRevalidate);
+  if (handlers.viewer->empty() && context.route.file == "index.html") {
+    std::vector<PendingDataset> pending = PendingOfSeen(handlers, context);
     if (context.sees_all() && pending.empty()) {
-      Response index = Serve(from.index, *context.request, kRevalidate);
+      Response index = Serve(handlers.index, *context.request, kRevalidate);
       index.depends_on_token = context.grant != nullptr;
       return index;
     }
-    DocumentPlan index = PlanOfSeen(from, from.index, context, IndexHtml, std::move(pending));
+    DocumentPlan index = PlanOfSeen(handlers, handlers.index, context, IndexHtml, std::move(pending));
     index.depends_on_token = context.grant != nullptr;
     return index;
   }

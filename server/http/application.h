@@ -11,7 +11,7 @@
 #include <string_view>
 #include <variant>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 

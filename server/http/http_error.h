@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 

@@ -15,7 +15,7 @@
 #include <string>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/session.h"
 #include "server/http/unix_socket.h"
 #include "server/net/io_threads.h"

@@ -13,7 +13,7 @@
 #include <random>
 #include <utility>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/text.h"
 
 namespace terrace::server {

@@ -119,8 +119,8 @@ asio::awaitable<tl::expected<void, BadRequest>> RequestReader::ReadBody(const Re
   }
 }
 
-asio::awaitable<void> RequestReader::Discard(std::size_t most) {
-  for (std::size_t taken = 0; taken < most;) {
+asio::awaitable<void> RequestReader::Discard(std::size_t max_bytes) {
+  for (std::size_t taken = 0; taken < max_bytes;) {
     Consume(Unread().size());
     const Transfer got = co_await Fill(kReadBytes);
     if (!got) break;

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <tl/expected.hpp>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/request.h"
 #include "server/net/stream.h"
 
@@ -43,8 +43,8 @@ class RequestReader {
   bool closing() const { return closing_; }
   bool waiting() const { return waiting_; }  // for the first byte of a request
 
-  // Discards what was read, then reads and discards until the client ends its sending or `most` bytes have come.
-  asio::awaitable<void> Discard(std::size_t most);
+  // Discards what was read, then reads and discards until the client ends its sending or `max_bytes` bytes have come.
+  asio::awaitable<void> Discard(std::size_t max_bytes);
 
  private:
   std::string_view Unread() const { return std::string_view(buffer_).substr(begin_, end_ - begin_); }

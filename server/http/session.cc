@@ -134,7 +134,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   Response Failed(const std::exception& exception) const;
   asio::awaitable<void> Interrupted();
   asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Response& response);
-  TransferBudget::HoldRequest AskFor(const Response& response) const;
+  TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
   asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
@@ -249,12 +249,12 @@ asio::awaitable<bool> Session::ReceiveBody() {
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
   tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
   if (read && request.content_length > first) {
-    TransferBudget::HoldRequest ask;
-    ask.kind = TransferBudget::Kind::kUpload;
-    ask.bytes = request.content_length;
-    ask.client = request.client;
-    ask.holder = weak_from_this();
-    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(ask), Deadline()));
+    TransferBudget::HoldRequest upload;
+    upload.kind = TransferBudget::Kind::kUpload;
+    upload.bytes = request.content_length;
+    upload.client = request.client;
+    upload.holder = weak_from_this();
+    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(upload), Deadline()));
     if (!room || !*room) {
       co_await RefuseUpload();
       co_return false;
@@ -349,14 +349,14 @@ bool Session::SendsBody(const Response& response) const {
   return exchange_.request.method != Method::kHead && response.status != 304 && response.body;
 }
 
-TransferBudget::HoldRequest Session::AskFor(const Response& response) const {
-  TransferBudget::HoldRequest ask;
-  ask.kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
-  ask.bytes = SendsBody(response) ? response.body->size() : 0;
-  ask.body = response.body;
-  ask.client = exchange_.request.client;
-  ask.holder = std::const_pointer_cast<Session>(shared_from_this());
-  return ask;
+TransferBudget::HoldRequest Session::HoldRequestOf(const Response& response) const {
+  TransferBudget::HoldRequest hold_request;
+  hold_request.kind = response.is_vital ? TransferBudget::Kind::kVitalReply : TransferBudget::Kind::kReply;
+  hold_request.bytes = SendsBody(response) ? response.body->size() : 0;
+  hold_request.body = response.body;
+  hold_request.client = exchange_.request.client;
+  hold_request.holder = std::const_pointer_cast<Session>(shared_from_this());
+  return hold_request;
 }
 
 // Releases the reply's body, waits for memory, and makes the reply again, usually from a cache: a waiting body must not
@@ -364,13 +364,13 @@ TransferBudget::HoldRequest Session::AskFor(const Response& response) const {
 // gone.
 asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
   for (;;) {
-    TransferBudget::HoldRequest ask = AskFor(response);
-    const std::size_t bytes = ask.bytes;
-    ask.body = nullptr;
+    TransferBudget::HoldRequest hold_request = HoldRequestOf(response);
+    const std::size_t bytes = hold_request.bytes;
+    hold_request.body = nullptr;
     Response bare;  // its lines share ownership with the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    auto waited = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(ask), Deadline()));
+    auto waited = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), Deadline()));
     if (!waited || !*waited) co_return std::nullopt;
     std::optional<TransferBudget::Hold> room = *std::move(waited);
     Answer again = Handle();
@@ -396,7 +396,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
-    room = context_->transfers->TryHold(AskFor(response));
+    room = context_->transfers->TryHold(HoldRequestOf(response));
   }
   if (!room && can_respond_again) room = co_await RoomLater(response);
   if (!room) {

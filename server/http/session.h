@@ -13,7 +13,7 @@
 #include <memory>
 #include <string>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/http/application.h"
 #include "server/http/cors.h"
 #include "server/http/request_reader.h"

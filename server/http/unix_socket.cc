@@ -6,10 +6,10 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <system_error>
 #include <utility>
+
+#include "engine/core/errno_text.h"
 
 namespace terrace::server {
 namespace {
@@ -17,8 +17,6 @@ namespace {
 tl::unexpected<Error> CannotListen(const std::string& path, std::string_view why, std::string_view remedy) {
   return MakeError(ErrorCode::kUnavailable, "cannot listen on unix:{}: {}; {}", path, why, remedy);
 }
-
-std::string WhyOf(int error) { return std::generic_category().message(error); }
 
 class Descriptor {
  public:
@@ -48,7 +46,7 @@ Result<bool> IsStale(const std::string& path) {
   struct stat found {};
   if (::lstat(path.c_str(), &found) != 0) {
     if (errno == ENOENT) return false;
-    return CannotListen(path, WhyOf(errno), "choose another path");
+    return CannotListen(path, ErrorText(), "choose another path");
   }
   if (!S_ISSOCK(found.st_mode))
     return CannotListen(path, "something else lies there", "remove it, or choose another path");
@@ -56,7 +54,7 @@ Result<bool> IsStale(const std::string& path) {
   const sockaddr_un address = AddressOf(path);
   if (::connect(caller.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
     if (errno == ECONNREFUSED) return true;
-    return CannotListen(path, WhyOf(errno), "choose another path");
+    return CannotListen(path, ErrorText(), "choose another path");
   }
   return CannotListen(path, "another process listens there", "stop it, or choose another path");
 }
@@ -96,12 +94,12 @@ Result<PathSocket> ListenOnPath(const std::string& path, unsigned mode) {
   Descriptor socket;
   const sockaddr_un address = AddressOf(path);
   if (::bind(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-    return CannotListen(path, WhyOf(errno), "choose a path in a folder that exists and can be written");
+    return CannotListen(path, ErrorText(), "choose a path in a folder that exists and can be written");
   }
   SocketFile file(path);
   // Nobody can connect before it listens. So the mode of the umask, which the file has until then, does not matter.
   if (::chmod(path.c_str(), mode) != 0 || ::listen(socket.get(), SOMAXCONN) != 0) {
-    return CannotListen(path, WhyOf(errno), "choose another path");
+    return CannotListen(path, ErrorText(), "choose another path");
   }
   return PathSocket{socket.Release(), std::move(file)};
 }
@@ -111,7 +109,7 @@ Result<void> CheckSocketPath(const std::string& path) {
   if (!is_stale) return tl::unexpected(is_stale.error());
   const std::string folder = std::filesystem::path(path).parent_path().string();
   if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
-  return CannotListen(path, WhyOf(errno), "choose a path in a folder that exists and can be written");
+  return CannotListen(path, ErrorText(), "choose a path in a folder that exists and can be written");
 }
 
 }  // namespace terrace::server

@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/jobs/worker_pool.h"
 
 namespace terrace::server {

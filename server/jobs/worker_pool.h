@@ -25,7 +25,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/jobs/fair_queue.h"
 
 namespace terrace::server {

@@ -3,7 +3,7 @@
 
 #include <boost/asio/ip/address.hpp>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 
 namespace terrace::server {
 

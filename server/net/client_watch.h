@@ -1,7 +1,7 @@
 // Detects that a client no longer waits for its answer.
 #pragma once
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/net/stream.h"
 
 namespace terrace::server {

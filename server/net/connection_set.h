@@ -58,9 +58,9 @@ class ConnectionSet {
 
   // Makes room for a connection of `newcomer` by closing another one: a connection of the client with the most
   // connections, the new one included. Clients with fewer than the newcomer lose none. Closes the client's oldest idle
-  // connection, else its oldest without a complete request, else its newest; the last only if it is another client with
-  // more connections than the newcomer. A connection without a client ("") counts as a client of its own. Returns false
-  // if no connection can be closed.
+  // connection, else its oldest without a complete request. If all are busy, closes its newest, but only if this client
+  // is not the newcomer and has more connections. A connection without a client ("") counts as a client of its own.
+  // Returns false if no connection can be closed.
   bool EvictOne(const std::string& newcomer);
 
   // From now on every connection ends after its current request.

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 
 namespace terrace::server {
 

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <tl/expected.hpp>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 
 namespace boost::asio::ssl {
 class context;

@@ -9,7 +9,7 @@
 #include <string>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 
 namespace boost::asio::ssl {
 class context;

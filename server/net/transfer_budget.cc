@@ -13,7 +13,7 @@ namespace terrace::server {
 namespace {
 
 // How often a waiter checks for late holders, and whether it could not be woken because memory was exhausted.
-constexpr std::chrono::milliseconds kLook{250};
+constexpr std::chrono::milliseconds kCheckPeriod{250};
 
 // Parts of the memory.
 constexpr std::size_t kRepliesPart = 2, kLargePart = 4, kUploadsPart = 4;
@@ -29,8 +29,8 @@ constexpr std::chrono::duration<double> kHalfLife{10};
 // A local object of HoldWhenRoom; in waiters_ during its lifetime.
 class TransferBudget::Waiter {
  public:
-  Waiter(TransferBudget& owner, const HoldRequest& asked, const asio::any_io_executor& executor)
-      : ask(asked), timer(std::make_shared<asio::steady_timer>(executor)), budget(owner) {
+  Waiter(TransferBudget& owner, const HoldRequest& of_waiter, const asio::any_io_executor& executor)
+      : request(of_waiter), timer(std::make_shared<asio::steady_timer>(executor)), budget(owner) {
     const std::lock_guard lock(budget.mutex_);
     budget.waiters_.push_back(this);
   }
@@ -39,10 +39,10 @@ class TransferBudget::Waiter {
   ~Waiter() {
     const std::lock_guard lock(budget.mutex_);
     std::erase(budget.waiters_, this);
-    budget.WakeNext(budget.PoolOf(ask), budget.now_());
+    budget.WakeNext(budget.PoolOf(request), budget.now_());
   }
 
-  const HoldRequest& ask;
+  const HoldRequest& request;
   const std::shared_ptr<asio::steady_timer> timer;
   TransferBudget& budget;
 };
@@ -54,42 +54,42 @@ TransferBudget::TransferBudget(std::size_t capacity, std::function<Clock::time_p
   pools_[kOversized].takes_one = pools_[kOversizedUpload].takes_one = true;
 }
 
-std::size_t TransferBudget::PoolOf(const HoldRequest& ask) const {
-  if (ask.kind == Kind::kUpload) return ask.bytes <= pools_[kUploads].capacity ? kUploads : kOversizedUpload;
-  if (ask.bytes <= pools_[kSmall].capacity / kSmallPart) return kSmall;
-  return ask.bytes <= pools_[kLarge].capacity ? kLarge : kOversized;
+std::size_t TransferBudget::PoolOf(const HoldRequest& request) const {
+  if (request.kind == Kind::kUpload) return request.bytes <= pools_[kUploads].capacity ? kUploads : kOversizedUpload;
+  if (request.bytes <= pools_[kSmall].capacity / kSmallPart) return kSmall;
+  return request.bytes <= pools_[kLarge].capacity ? kLarge : kOversized;
 }
 
-std::optional<TransferBudget::Hold> TransferBudget::TryHold(const HoldRequest& ask) {
-  if (ask.bytes <= kFreeBytes) return Hold();
+std::optional<TransferBudget::Hold> TransferBudget::TryHold(const HoldRequest& request) {
+  if (request.bytes <= kFreeBytes) return Hold();
   const std::lock_guard lock(mutex_);
-  return Take(ask, now_(), nullptr);
+  return Take(request, now_(), nullptr);
 }
 
-asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoom(HoldRequest ask,
+asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoom(HoldRequest request,
                                                                                   Clock::time_point deadline) {
   std::optional<Hold> hold;
-  if (ask.bytes <= kFreeBytes) {
+  if (request.bytes <= kFreeBytes) {
     hold.emplace();
     co_return hold;
   }
   const auto executor = co_await asio::this_coro::executor;
-  const Waiter waiter(*this, ask, executor);
+  const Waiter waiter(*this, request, executor);
   for (;;) {
     const auto now = now_();
     Victims victims;
     {
       const std::lock_guard lock(mutex_);
-      hold = Take(ask, now, &waiter);
+      hold = Take(request, now, &waiter);
       if (!hold && now < deadline) {
-        ask.kind == Kind::kUpload ? ChooseUploads(ask, now, victims) : ChooseLate(ask, now, victims);
+        request.kind == Kind::kUpload ? ChooseUploads(request, now, victims) : ChooseLate(request, now, victims);
       }
       if (!hold && now >= deadline) ++refused_;
     }
     if (hold || now >= deadline) co_return hold;
     for (const auto& connection : victims.cut) connection->Abort();
     for (const auto& connection : victims.displaced) connection->Preempt();
-    waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kLook));
+    waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kCheckPeriod));
     boost::system::error_code ignored;  // woken, or time for a check
     co_await waiter.timer->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
   }
@@ -133,25 +133,25 @@ TransferBudget::Share& TransferBudget::ShareOf(std::uint64_t client, Pool& pool,
 }
 
 // `waiter`: the waiter that asks; null: a new request, which is last in the order.
-bool TransferBudget::MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const {
-  const std::size_t number = PoolOf(ask);
+bool TransferBudget::MayTake(const HoldRequest& request, Clock::time_point now, const Waiter* waiter) const {
+  const std::size_t number = PoolOf(request);
   const Pool& pool = pools_[number];
-  if (ask.body && charges_.contains(ask.body.get())) return true;
-  if (!HasRoom(ask)) return false;
+  if (request.body && charges_.contains(request.body.get())) return true;
+  if (!HasRoom(request)) return false;
   if (waiters_.empty()) return true;
   const Waiter* next = NextWaiter(number, now);
   if (next == nullptr || next == waiter) return true;
-  return Claim(ask.client, pool, now) < Claim(next->ask.client, pool, now);
+  return Claim(request.client, pool, now) < Claim(next->request.client, pool, now);
 }
 
 // Any waiter.
-bool TransferBudget::HasRoom(const HoldRequest& ask) const {
-  const std::size_t number = PoolOf(ask);
+bool TransferBudget::HasRoom(const HoldRequest& request) const {
+  const std::size_t number = PoolOf(request);
   const Pool& pool = pools_[number];
   if (pool.takes_one) return pool.held == 0;
-  if (pool.held + ask.bytes > pool.capacity) return false;
-  const std::size_t own = HeldBy(ask.client, pool);
-  return number == kUploads || own == 0 || own + ask.bytes <= kShare * (pool.capacity - pool.held - ask.bytes);
+  if (pool.held + request.bytes > pool.capacity) return false;
+  const std::size_t own = HeldBy(request.client, pool);
+  return number == kUploads || own == 0 || own + request.bytes <= kShare * (pool.capacity - pool.held - request.bytes);
 }
 
 // The oldest waiter of the client with the smallest claim.
@@ -159,8 +159,8 @@ TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t pool, Clock::time
   Waiter* next = nullptr;
   std::uint64_t least = 0;
   for (Waiter* waiter : waiters_) {
-    if (PoolOf(waiter->ask) != pool) continue;
-    const std::uint64_t claim = Claim(waiter->ask.client, pools_[pool], now);
+    if (PoolOf(waiter->request) != pool) continue;
+    const std::uint64_t claim = Claim(waiter->request.client, pools_[pool], now);
     if (next == nullptr || claim < least) {
       next = waiter;
       least = claim;
@@ -169,31 +169,31 @@ TransferBudget::Waiter* TransferBudget::NextWaiter(std::size_t pool, Clock::time
   return next;
 }
 
-std::optional<TransferBudget::Hold> TransferBudget::Take(const HoldRequest& ask, Clock::time_point now,
+std::optional<TransferBudget::Hold> TransferBudget::Take(const HoldRequest& request, Clock::time_point now,
                                                          const Waiter* waiter) {
-  const bool fits = MayTake(ask, now, waiter);
-  const bool is_beyond = !fits && ask.kind == Kind::kVitalReply && reserve_held_ + ask.bytes <= kReserve;
+  const bool fits = MayTake(request, now, waiter);
+  const bool is_beyond = !fits && request.kind == Kind::kVitalReply && reserve_held_ + request.bytes <= kReserve;
   if (!fits && !is_beyond) return std::nullopt;
-  const std::size_t number = PoolOf(ask);
+  const std::size_t number = PoolOf(request);
   Pool& pool = pools_[number];
   auto late_at = Clock::time_point::max();
-  if (ask.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(ask.bytes * 1000 / kRate);
+  if (request.kind == Kind::kUpload) late_at = now + kGrace + std::chrono::milliseconds(request.bytes * 1000 / kRate);
   // Allocations come first, because they may fail.
   Entries made;
-  made.push_back({ask.body.get(), number, late_at, ask.holder, ask.client});
-  if (!ask.body) made.front().charge = &made.front();
-  Share& own = ShareOf(ask.client, pool, now);
+  made.push_back({request.body.get(), number, late_at, request.holder, request.client});
+  if (!request.body) made.front().charge = &made.front();
+  Share& own = ShareOf(request.client, pool, now);
   Charge& charge = charges_[made.front().charge];
   const auto entry = made.begin();
   entries_.splice(entries_.end(), made);
   ++own.holds;
   if (++charge.holders == 1) {
-    charge = {ask.bytes, 1, is_beyond, ask.client};
-    (is_beyond ? reserve_held_ : pool.held) += ask.bytes;
-    own.bytes += ask.bytes;
+    charge = {request.bytes, 1, is_beyond, request.client};
+    (is_beyond ? reserve_held_ : pool.held) += request.bytes;
+    own.bytes += request.bytes;
   }
   if (waiter != nullptr) WakeNext(number, now);  // there may be memory for the next one too
-  return Hold(this, entry, ask.body);
+  return Hold(this, entry, request.body);
 }
 
 // Each connection is told once. Its memory is released when it has ended, or its request was refused.
@@ -208,14 +208,14 @@ bool TransferBudget::Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>
 
 // Chooses all late replies of the client that holds most, including those that were told before and have not ended yet.
 // Vital replies may also take memory from their own client.
-void TransferBudget::ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
-  const std::size_t number = PoolOf(ask);
+void TransferBudget::ChooseLate(const HoldRequest& request, Clock::time_point now, Victims& victims) {
+  const std::size_t number = PoolOf(request);
   const Pool& pool = pools_[number];
-  const bool is_vital = ask.kind == Kind::kVitalReply;
-  std::size_t most = is_vital ? 0 : HeldBy(ask.client, pool);
+  const bool is_vital = request.kind == Kind::kVitalReply;
+  std::size_t most = is_vital ? 0 : HeldBy(request.client, pool);
   std::optional<std::uint64_t> client;
   const auto is_late = [&](const Entry& entry) {
-    return entry.pool == number && now >= entry.late_at && (is_vital || entry.client != ask.client);
+    return entry.pool == number && now >= entry.late_at && (is_vital || entry.client != request.client);
   };
   for (const Entry& entry : entries_) {
     if (!is_late(entry)) continue;
@@ -229,22 +229,22 @@ void TransferBudget::ChooseLate(const HoldRequest& ask, Clock::time_point now, V
   }
 }
 
-void TransferBudget::ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims) {
-  const std::size_t number = PoolOf(ask);
+void TransferBudget::ChooseUploads(const HoldRequest& request, Clock::time_point now, Victims& victims) {
+  const std::size_t number = PoolOf(request);
   const Pool& pool = pools_[number];
-  std::uint64_t largest = ask.client;
+  std::uint64_t largest = request.client;
   for (const auto& [client, share] : pool.shares) {
     const std::size_t most = HeldBy(largest, pool);
     // Ties are broken by the client's number, so that the order of the table does not matter.
     if (share.bytes > most || (share.bytes == most && client < largest)) largest = client;
   }
-  if (HeldBy(largest, pool) > HeldBy(ask.client, pool) + ask.bytes) {
+  if (HeldBy(largest, pool) > HeldBy(request.client, pool) + request.bytes) {
     for (auto entry = entries_.rbegin(); entry != entries_.rend(); ++entry) {
       if (entry->pool == number && entry->client == largest && Tell(*entry, victims.displaced)) return;
     }
   }
   for (Entry& entry : entries_) {
-    if (entry.pool == number && entry.client != ask.client && now >= entry.late_at) Tell(entry, victims.displaced);
+    if (entry.pool == number && entry.client != request.client && now >= entry.late_at) Tell(entry, victims.displaced);
   }
 }
 

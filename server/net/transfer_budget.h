@@ -5,16 +5,18 @@
 // for larger replies, a quarter for uploads. A body that is larger than its pool is transferred outside of it, one at a
 // time, as if in a pool of its own. The same rules hold in each pool:
 // - A body that many replies share counts once.
-// - Bodies that do not fit wait (HoldWhenRoom). Next is the oldest body of the client with the least recent use of the
-//   pool, in bytes times seconds, including what it holds now.
+// - Bodies that do not fit wait (HoldWhenRoom). Next is the oldest body of the client that has used the pool least in
+//   the last seconds: bytes times seconds, with a half-life of ten seconds, including what it holds now.
 // - A client may hold one reply of any size, or twice as much memory for replies as it leaves free: two thirds of what
 //   others do not use. This leaves memory for the next client.
-// - Waiting bodies take memory from others. A client has kGrace to take a reply that is being sent, and gains one
-//   second per kRate bytes that it takes: its reply is late once it lags kGrace behind this rate. If a body waits, the
-//   late replies of the client that holds most are cut off, if this client holds more than the waiting one. If an
-//   upload waits, the newest upload of the client that holds most is displaced, if this client holds more than the
-//   waiting one would. Uploads of other clients that have not arrived within kGrace plus one second per kRate bytes are
-//   displaced too. Bodies of one client wait for one another.
+// - A client has kGrace to take a reply that is being sent, and gains one second per kRate bytes that it takes. Its
+//   reply is late once it lags kGrace behind this rate. An upload is late if it has not arrived within kGrace plus one
+//   second per kRate bytes.
+// - A waiting reply takes memory from the client with late replies that holds most, if it holds more than the waiting
+//   client: its late replies are cut off.
+// - A waiting upload takes memory from the client that holds most, if it holds more than the waiting client would: its
+//   newest upload is displaced. Else the late uploads of all other clients are displaced.
+// - Bodies of one client wait for one another.
 //
 // Replies about the server's state, for operators, may exceed all pools by kReserve: they matter most when memory is
 // short.
@@ -36,7 +38,7 @@
 #include <utility>
 #include <vector>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/net/connection_set.h"
 
 namespace terrace::server {
@@ -69,11 +71,11 @@ class TransferBudget {
   };
 
   // Takes memory until the hold is destroyed. Returns nothing if there is none now.
-  std::optional<Hold> TryHold(const HoldRequest& ask);
+  std::optional<Hold> TryHold(const HoldRequest& request);
 
-  // Waits for memory until `deadline`; returns nothing then. `ask` should have no body, because a waiting body would
-  // itself take memory. The coroutine must run on a single thread.
-  asio::awaitable<std::optional<Hold>> HoldWhenRoom(HoldRequest ask, Clock::time_point deadline);
+  // Waits for memory until `deadline`; returns nothing then. `request` should have no body, because a waiting body
+  // would itself take memory. The coroutine must run on a single thread.
+  asio::awaitable<std::optional<Hold>> HoldWhenRoom(HoldRequest request, Clock::time_point deadline);
 
   struct Stats {
     std::size_t held_bytes = 0;
@@ -119,19 +121,19 @@ class TransferBudget {
     std::vector<std::shared_ptr<Connection>> cut, displaced;
   };
 
-  std::size_t PoolOf(const HoldRequest& ask) const;
+  std::size_t PoolOf(const HoldRequest& request) const;
   // mutex_ is held, as for the following.
   static std::size_t HeldBy(std::uint64_t client, const Pool& pool);
   static void Age(Share& share, Clock::time_point now);
   static std::uint64_t Claim(std::uint64_t client, const Pool& pool, Clock::time_point now);
   static Share& ShareOf(std::uint64_t client, Pool& pool, Clock::time_point now);
-  bool HasRoom(const HoldRequest& ask) const;
-  bool MayTake(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter) const;
+  bool HasRoom(const HoldRequest& request) const;
+  bool MayTake(const HoldRequest& request, Clock::time_point now, const Waiter* waiter) const;
   Waiter* NextWaiter(std::size_t pool, Clock::time_point now) const;
-  void ChooseLate(const HoldRequest& ask, Clock::time_point now, Victims& victims);
-  void ChooseUploads(const HoldRequest& ask, Clock::time_point now, Victims& victims);
+  void ChooseLate(const HoldRequest& request, Clock::time_point now, Victims& victims);
+  void ChooseUploads(const HoldRequest& request, Clock::time_point now, Victims& victims);
   bool Tell(Entry& entry, std::vector<std::shared_ptr<Connection>>& whom);
-  std::optional<Hold> Take(const HoldRequest& ask, Clock::time_point now, const Waiter* waiter);
+  std::optional<Hold> Take(const HoldRequest& request, Clock::time_point now, const Waiter* waiter);
   void WakeNext(std::size_t pool, Clock::time_point now);
 
   void Release(Entries::iterator entry);

@@ -103,14 +103,14 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
   retry_at_ = {};
 }
 
-std::size_t DatasetSlot::CheckFiles(std::size_t most) {
+std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
   if (!serving_ || stale_since_) return 0;
   if (HasToRecoverCache()) {
     spdlog::info("dataset {}: what was kept of its sources in cache_dir is gone; it is opened anew", wanted_.name);
     MarkStale();
     return 0;
   }
-  const std::size_t count = std::min(most, files_.size());
+  const std::size_t count = std::min(max_files, files_.size());
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t file = next_file_;
     next_file_ = (next_file_ + 1) % files_.size();

@@ -47,8 +47,9 @@ class DatasetSlot {
   // Changes the wanted configuration. The old dataset is served until the new one is open.
   void Want(config::DatasetConfig wanted);
 
-  // Checks up to `most` files for changes, beginning where the last call ended. Returns the number of files checked.
-  std::size_t CheckFiles(std::size_t most);
+  // Checks up to `max_files` files for changes, beginning where the last call ended. Returns the number of files
+  // checked.
+  std::size_t CheckFiles(std::size_t max_files);
 
   // Begins to open the wanted dataset if that is due. Waits until its files have not been written to for a moment.
   void OpenIfDue(const DatasetOpener& open);

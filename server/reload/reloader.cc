@@ -30,7 +30,7 @@ constexpr std::ptrdiff_t kMaxOpenings = 2;
 void WarnAboutRestart(const config::Config& started, const config::Config& now, const config::Config& next) {
   const std::vector<std::string> differ = config::ChangedServerOptions(started, next);
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
-    if (!config::TakesRestart(key)) continue;
+    if (!config::NeedsRestart(key)) continue;
     if (std::ranges::find(differ, key) == differ.end()) continue;  // back to what it was at the start
     spdlog::warn("configuration: {} has changed, which takes a restart; until then the old value holds", key);
   }
@@ -76,11 +76,6 @@ std::string TextOf(const std::vector<config::ConfigError>& errors) {
 
 }  // namespace
 
-Reloader::Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks)
-    : Reloader(std::move(config), std::vector<DatasetSlot>(), std::move(hooks)) {
-  for (std::size_t i = 0; i < datasets.size(); ++i) slots_.emplace_back(config_.datasets[i], std::move(datasets[i]));
-}
-
 Reloader::Reloader(config::Config config, std::vector<DatasetSlot> slots, Hooks hooks)
     : hooks_(std::move(hooks)),
       config_(std::move(config)),
@@ -104,9 +99,9 @@ void Reloader::Stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Reloader::Look() {
+void Reloader::CheckNow() {
   const std::lock_guard lock(mutex_);
-  look_ = true;
+  check_now_ = true;
   wake_.notify_all();
 }
 
@@ -117,26 +112,26 @@ void Reloader::Reload() {
 }
 
 void Reloader::Run() {
-  Clock::time_point next_look = Clock::now() + kPeriod, next_config = next_look;
+  Clock::time_point next_check = Clock::now() + kPeriod, next_config = next_check;
   std::unique_lock lock(mutex_);
   while (!wake_.wait_for(lock, kMinPause, [this] { return stop_; })) {
-    const auto is_due = [this] { return look_ || reload_ || stop_; };
+    const auto is_due = [this] { return check_now_ || reload_ || stop_; };
     if (IsBusy() || watch_ || LacksDatasets()) {
       wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
     } else {
       wake_.wait(lock, is_due);
     }
     if (stop_ || hooks_.stop.stop_requested()) return;
-    const bool reload = std::exchange(reload_, false), look = std::exchange(look_, false) || reload;
+    const bool reload = std::exchange(reload_, false), check_now = std::exchange(check_now_, false) || reload;
     lock.unlock();
     const Clock::time_point now = Clock::now();
     if (reload || (watch_ && now >= next_config)) {
       CheckConfigFile(reload);
       next_config = now + (config_settles_ ? kConfigSettleTime : kPeriod);
     }
-    if (look || (watch_ && now >= next_look)) {
+    if (check_now || (watch_ && now >= next_check)) {
       CheckFiles();
-      next_look = now + kPeriod;
+      next_check = now + kPeriod;
     }
     if (StepOpenings()) Publish();
     ReportProblems();
@@ -165,16 +160,16 @@ config::ConfigResult Reloader::Load() const {
   }
 }
 
-void Reloader::CheckConfigFile(bool asked) {
-  const bool may_differ = asked || config_settles_ || !hooks_.may_have_changed || hooks_.may_have_changed();
+void Reloader::CheckConfigFile(bool is_requested) {
+  const bool may_differ = is_requested || config_settles_ || !hooks_.may_have_changed || hooks_.may_have_changed();
   if (!may_differ) return;
   config::ConfigResult next = Load();
-  config_settles_ = !asked && next != seen_;
+  config_settles_ = !is_requested && next != seen_;
   seen_ = next;
   if (config_settles_) return;
   if (!next) {
     std::string problem = TextOf(next.error());
-    if (!asked && problem == config_problem_) return;
+    if (!is_requested && problem == config_problem_) return;
     spdlog::error("the new configuration is wrong, the old one stays: {}", problem);
     config_problem_ = std::move(problem);
     return;
@@ -182,7 +177,7 @@ void Reloader::CheckConfigFile(bool asked) {
   config_problem_.clear();
   if (*next != config_) {
     Apply(*std::move(next));
-  } else if (asked) {
+  } else if (is_requested) {
     spdlog::info("the configuration is as it was");
   }
 }

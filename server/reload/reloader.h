@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "config/parse.h"
+#include "config/file/parse.h"
 #include "server/reload/dataset_slot.h"
 
 namespace terrace::server {
@@ -39,8 +39,6 @@ class Reloader {
     std::stop_token stop = {};  // requested: opens and publishes nothing any more
   };
 
-  // `datasets`: the served datasets, opened from `config.datasets` in the same order.
-  Reloader(config::Config config, std::vector<tiler::Dataset> datasets, Hooks hooks);
   // `slots`: one for each of `config.datasets`, in the same order. Opens those that serve nothing.
   Reloader(config::Config config, std::vector<DatasetSlot> slots, Hooks hooks);
   ~Reloader();  // Stop
@@ -51,15 +49,15 @@ class Reloader {
   void Stop();
 
   // Checks at once instead of at the next second. Thread-safe.
-  void Look();
-  // Like Look, and loads the configuration even if its file may still be changing.
+  void CheckNow();
+  // Like CheckNow, and loads the configuration even if its file may still be changing.
   void Reload();
 
  private:
   void Run();
   void CheckFiles();
   config::ConfigResult Load() const;
-  void CheckConfigFile(bool asked);
+  void CheckConfigFile(bool is_requested);
   void Apply(config::Config next);
   bool StepOpenings();
   void Publish();
@@ -81,7 +79,7 @@ class Reloader {
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  bool look_ = false, reload_ = false, stop_ = false;  // guarded by mutex_
+  bool check_now_ = false, reload_ = false, stop_ = false;  // guarded by mutex_
   std::thread thread_;
 };
 

@@ -17,14 +17,13 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/errno_text.h"
 #include "server/store/disk_store.h"
 #include "tiler/build_id.h"
 #include "tiler/store/tile_record.h"
 
 namespace terrace::server {
 namespace {
-
-std::string SystemMessage() { return std::system_category().message(errno); }
 
 // The lock ends with the process, however it ends.
 class DirectoryLock {
@@ -50,7 +49,7 @@ Result<LockPtr> LockDirectory(const std::filesystem::path& directory) {
   const std::filesystem::path path = directory / "lock";
   int file = open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
   if (file < 0) {
-    const std::string why = SystemMessage();
+    const std::string why = ErrorText();
     file = open(path.c_str(), O_RDONLY | O_CLOEXEC);  // a disk that has become read-only
     if (file < 0) {
       return MakeError(ErrorCode::kInvalidArgument,
@@ -60,7 +59,7 @@ Result<LockPtr> LockDirectory(const std::filesystem::path& directory) {
   }
   if (flock(file, LOCK_EX | LOCK_NB) != 0) {
     const bool is_used = errno == EWOULDBLOCK;
-    const std::string why = SystemMessage();
+    const std::string why = ErrorText();
     close(file);
     if (!is_used) return MakeError(ErrorCode::kInvalidArgument, "disk_cache: {}: {}", path.string(), why);
     return MakeError(ErrorCode::kInvalidArgument,

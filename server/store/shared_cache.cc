@@ -70,7 +70,7 @@ class SharedCache final : public tiler::TileStore {
 
   std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override {
     const std::size_t kind = ClassOf(key.request);
-    if (lease_.count() == 0 && !gate_.ShouldAsk(kind)) {
+    if (lease_.count() == 0 && !gate_.ShouldLookUp(kind)) {
       ++not_asked_;
       return std::nullopt;
     }

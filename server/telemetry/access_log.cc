@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "engine/core/errno_text.h"
 #include "server/telemetry/redact.h"
 
 namespace terrace::server {
@@ -86,7 +87,7 @@ tl::unexpected<Error> CannotOpen(const std::filesystem::path& file) {
                      file.string());
   }
   return MakeError(ErrorCode::kUnavailable, "access log {}: {}; give a file in a folder that the server may write to",
-                   file.string(), std::generic_category().message(errno));
+                   file.string(), ErrorText());
 }
 
 }  // namespace
@@ -198,7 +199,7 @@ void AccessLog::Reopen() {
   if (file_.empty()) return;
   const int descriptor = OpenToAppend(file_);
   if (descriptor < 0) {
-    spdlog::error("access log {}: cannot be opened anew: {}", file_.string(), std::generic_category().message(errno));
+    spdlog::error("access log {}: cannot be opened anew: {}", file_.string(), ErrorText());
     return;
   }
   std::uint64_t missed = 0;

@@ -30,7 +30,7 @@ class Metrics {
 
   struct ServerState {
     tiler::ByteCacheStats refinements;  // in memory
-    // The tiers below memory: `tile_stores` of tiles, then those of refinements.
+    // The tiers below memory: the first `tile_stores` hold tiles, the others refinements.
     std::vector<tiler::StoreBase*> stores;
     std::size_t tile_stores = 0;
     std::size_t connections = 0;  // open
@@ -38,7 +38,7 @@ class Metrics {
     TransferBudget::Stats transfers;
     CatalogPtr catalog;  // never null
     std::size_t problems = 0;
-    std::uint64_t catalogs = 0;  // that have replaced one another
+    std::uint64_t catalogs = 0;  // how often one has replaced another
   };
   // Returns the text of all counters and of the given state.
   std::string Text(const TileService::Stats& tiles, const ServerState& state) const;

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "server/asio.h"
+#include "server/asio/asio.h"
 
 namespace terrace::server {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/asio.h"
+#include "server/asio/asio.h"
 #include "server/jobs/single_flight.h"
 #include "server/jobs/worker_pool.h"
 #include "server/tiles/catalog.h"
@@ -34,7 +34,7 @@ struct TileServiceOptions {
   unsigned worker_threads = 0;                       // 0: as many as the machine has processors
   std::size_t queue_length = 10'000;                 // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
-  // Tiers below memory, the first asked first. Each gets every tile that is built or found in a tier below it.
+  // Tiers below memory, in the order of look-ups. Each gets every tile that is built or found in a tier below it.
   std::vector<std::shared_ptr<tiler::TileStore>> stores = {};
   HeaderWriter write_head = nullptr;  // null: heads are left empty
 };

@@ -139,7 +139,7 @@ TEST_F(HostileArchiveTest, LeafThatNamesItself) {
   const auto file = PmtilesFile::Open(unit_);
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_FALSE((*file)->Find(0));
-  EXPECT_FALSE((*file)->ForEach([](std::uint64_t, const CheckedTile&) -> Result<void> { return {}; }));
+  EXPECT_FALSE((*file)->ForEach([](std::uint64_t, const ArchivedTile&) -> Result<void> { return {}; }));
 }
 
 TEST_F(HostileArchiveTest, ManifestCutShortOrFlipped) {

@@ -103,7 +103,7 @@ TEST_F(PmtilesTest, EveryTileIsFoundAndNoOther) {
   EXPECT_EQ((*file)->header().tiles, kTiles);
   EXPECT_LT((*file)->header().contents, 200U) << "equal bytes are kept once";
   for (std::uint64_t id = 0; id < kTiles; ++id) {
-    const Result<std::optional<CheckedTile>> found = (*file)->Find(id * 2);
+    const Result<std::optional<ArchivedTile>> found = (*file)->Find(id * 2);
     ASSERT_TRUE(found && *found);
     const tiler::EncodedTile wanted = TileOf(id);
     ASSERT_EQ((*found)->tile.bytes, wanted.bytes);
@@ -111,7 +111,7 @@ TEST_F(PmtilesTest, EveryTileIsFoundAndNoOther) {
     ASSERT_EQ((*found)->tile.certified_error_m, wanted.certified_error_m);
     ASSERT_EQ((*found)->tile.vertices, wanted.vertices);
     ASSERT_EQ((*found)->range.max, 2.25);
-    const Result<std::optional<CheckedTile>> none = (*file)->Find(id * 2 + 1);
+    const Result<std::optional<ArchivedTile>> none = (*file)->Find(id * 2 + 1);
     ASSERT_TRUE(none && !*none);
   }
 }

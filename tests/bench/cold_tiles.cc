@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "config/parse.h"
+#include "config/file/parse.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "tiler/tile_pipeline.h"

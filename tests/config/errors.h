@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "config/parse.h"
+#include "config/file/parse.h"
 
 namespace terrace::config {
 

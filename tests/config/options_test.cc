@@ -229,9 +229,9 @@ TEST(ChangedServerOptions, NamesWhatDiffers) {
   EXPECT_EQ(ChangedServerOptions(a, b), (std::vector<std::string>{"datasets", "cache_bytes"}));
 }
 
-TEST(TakesRestart, KnowsWhatIsTakenOverWhileServing) {
-  EXPECT_FALSE(TakesRestart("datasets") || TakesRestart("cache_bytes") || TakesRestart("log_level"));
-  EXPECT_TRUE(TakesRestart("listen") && TakesRestart("tokens") && TakesRestart("io_threads"));
+TEST(NeedsRestart, KnowsWhatIsTakenOverWhileServing) {
+  EXPECT_FALSE(NeedsRestart("datasets") || NeedsRestart("cache_bytes") || NeedsRestart("log_level"));
+  EXPECT_TRUE(NeedsRestart("listen") && NeedsRestart("tokens") && NeedsRestart("io_threads"));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "config/parse.h"
+#include "config/file/parse.h"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "config/file/parse.h"
 #include "config/options/option_table.h"
-#include "config/parse.h"
 
 namespace terrace::config {
 namespace {

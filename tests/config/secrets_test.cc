@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "config/common/token_hash.h"
+#include "config/file/parse.h"
 #include "config/input/json_text.h"
 #include "config/options/options.h"
-#include "config/parse.h"
 #include "tests/config/errors.h"
 #include "tests/support/source_dir.h"
 

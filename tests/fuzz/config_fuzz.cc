@@ -8,7 +8,7 @@
 #include <string>
 #include <string_view>
 
-#include "config/parse.h"
+#include "config/file/parse.h"
 #include "engine/core/check.h"
 #include "tests/fuzz/fuzz_input.h"
 

@@ -235,10 +235,10 @@ TEST(TileErrorMeter, SeesTheGridsRounding) {
   };
   // A vertex moves by at most sqrt(3) / 2 of a step, on slopes of up to 50 m over 38 m of latitude and 31 m of
   // longitude.
-  constexpr double kMost = 0.87 * (1 + 2.1);
-  EXPECT_LE(measured(1.0 / 64), kMost / 64);
+  constexpr double kMaxRatio = 0.87 * (1 + 2.1);
+  EXPECT_LE(measured(1.0 / 64), kMaxRatio / 64);
   EXPECT_GT(measured(4), 0.5);
-  EXPECT_LE(measured(4), kMost * 4);
+  EXPECT_LE(measured(4), kMaxRatio * 4);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ double ReachOf(Vec3 position, Vec3 direction, double shrink_m) {
 }
 
 TEST(HorizonReach, IsThatOfTheFarthestPosition) {
-  constexpr double kMost = 100;
+  constexpr double kMaxReach = 100;
   std::mt19937 random(9);
   std::uniform_real_distribution<double> degrees(-0.5, 0.5), metres(-300, 5000);
   for (std::size_t count = 1; count <= 40; ++count) {
@@ -40,14 +40,14 @@ TEST(HorizonReach, IsThatOfTheFarthestPosition) {
       for (const Vec3& p : positions) expected = std::max(expected, ReachOf(p, direction, shrink_m));
       tin::ForEachInstructionSet([&] {
         double reach = 1;
-        EXPECT_TRUE(RaiseReach(positions, direction, shrink_m, kMost, reach));
+        EXPECT_TRUE(RaiseReach(positions, direction, shrink_m, kMaxReach, reach));
         EXPECT_EQ(reach, expected) << count;
         // One position that has none, at any place in a vector.
         std::vector<Vec3> with_far = positions;
         with_far[count / 2] = with_far[count / 2] * -1;
-        EXPECT_FALSE(RaiseReach(with_far, direction, shrink_m, kMost, reach)) << count;
+        EXPECT_FALSE(RaiseReach(with_far, direction, shrink_m, kMaxReach, reach)) << count;
         with_far[count / 2] = {0, 0, 0};
-        EXPECT_FALSE(RaiseReach(with_far, direction, shrink_m, kMost, reach)) << count;
+        EXPECT_FALSE(RaiseReach(with_far, direction, shrink_m, kMaxReach, reach)) << count;
       });
     }
   }

@@ -63,16 +63,16 @@ TEST_F(Limits, FiveHundredSlowReadersHoldABoundedPart) {
   ASSERT_TRUE(Eventually([&] { return under_way() >= 500; })) << under_way();
   ASSERT_GT(std::stol(Metric("terrace_http_transfers_waiting")), 400);
   EXPECT_EQ(Metric("terrace_http_transfers_refused_total"), "0");
-  constexpr long kMost = 64'000'000 / 1024;
-  long grown = kMost;
-  for (int look = 0; look < 4 && grown >= kMost; ++look) {
+  constexpr long kMaxGrowth = 64'000'000 / 1024;
+  long grown = kMaxGrowth;
+  for (int look = 0; look < 4 && grown >= kMaxGrowth; ++look) {
     std::this_thread::sleep_for(1s);
     malloc_trim(0);
     grown = test_support::ResidentKib() - before;
   }
   RecordProperty("resident_kib", static_cast<int>(grown));
   if (!test_support::kSanitized) {
-    EXPECT_LT(grown, kMost);
+    EXPECT_LT(grown, kMaxGrowth);
   }
   // The slow clients are late now, so a new client is served.
   EXPECT_EQ(Fetch(port(), "/maui/0/0/0.terrain", "X-Forwarded-For: 192.0.2.1\r\n").status, 200);

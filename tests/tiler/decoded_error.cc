@@ -11,7 +11,7 @@
 namespace terrace::tiler {
 namespace {
 
-constexpr std::int64_t kMost = 32767;  // u and v at the eastern and the northern edge
+constexpr std::int64_t kMaxUv = 32767;  // u and v at the eastern and the northern edge
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
 // In units in which both positions and samples are integers: 1 / (32767 * cells) of the tile.
@@ -35,15 +35,15 @@ std::vector<double> DecodedErrors(const proto::DecodedTile& tile, const dem::Til
     std::array<double, 3> z{};
     for (std::size_t i = 0; i < 3; ++i) {
       p[i] = {std::int64_t{tile.u[triangle[i]]} * cells, std::int64_t{tile.v[triangle[i]]} * cells};
-      z[i] = min + (max - min) * tile.h[triangle[i]] / static_cast<double>(kMost);
+      z[i] = min + (max - min) * tile.h[triangle[i]] / static_cast<double>(kMaxUv);
     }
     const std::int64_t area = Turn(p[0], p[1], p[2]);
     if (area <= 0) return std::vector<double>(errors.size(), kInfinite);
     const auto [west, east] = std::minmax({p[0].x, p[1].x, p[2].x});
     const auto [south, north] = std::minmax({p[0].y, p[1].y, p[2].y});
-    for (std::int64_t j = south / kMost; j * kMost <= north; ++j) {
-      for (std::int64_t i = west / kMost; i * kMost <= east; ++i) {
-        const Point sample{i * kMost, j * kMost};
+    for (std::int64_t j = south / kMaxUv; j * kMaxUv <= north; ++j) {
+      for (std::int64_t i = west / kMaxUv; i * kMaxUv <= east; ++i) {
+        const Point sample{i * kMaxUv, j * kMaxUv};
         const std::array<std::int64_t, 3> weights = {Turn(p[1], p[2], sample), Turn(p[2], p[0], sample),
                                                      Turn(p[0], p[1], sample)};
         if (*std::min_element(weights.begin(), weights.end()) < 0) continue;

@@ -7,7 +7,7 @@
 namespace terrace::tiler {
 namespace {
 
-constexpr double kMost = 32767;  // u and v at the eastern and the northern edge
+constexpr double kMaxUv = 32767;  // u and v at the eastern and the northern edge
 
 // The direction of the plumb line at a position, and its foot on the ellipsoid.
 geo::Vec3 UpAt(double longitude, double latitude) {
@@ -41,7 +41,7 @@ TileSurface::TileSurface(const proto::DecodedTile& mesh, const geo::TileKey& key
   west_ = side_ * static_cast<double>(key.x) - 180;
   south_ = side_ * static_cast<double>(key.y) - 90;
   for (std::size_t k = 0; k < mesh.u.size(); ++k) {
-    const geo::Vec3 up = UpAt(west_ + side_ * mesh.u[k] / kMost, south_ + side_ * mesh.v[k] / kMost);
+    const geo::Vec3 up = UpAt(west_ + side_ * mesh.u[k] / kMaxUv, south_ + side_ * mesh.v[k] / kMaxUv);
     ecef_.push_back(FootAt(up) + up * HeightOf(k));
   }
   for (const auto& corners : mesh.triangles) AddTriangle(corners);
@@ -66,13 +66,13 @@ void TileSurface::AddTriangle(const std::array<std::uint32_t, 3>& corners) {
 void TileSurface::FindExtent(Triangle& triangle) const {
   // Small triangles far from the poles bulge by less than this and need no exact test.
   constexpr double kSmall = 20'000, kRadius = 6'356'000, kFromPole = 10;  // metres, degrees
-  const double middle = south_ + side_ * mesh_.v[triangle.k[0]] / kMost;
+  const double middle = south_ + side_ * mesh_.v[triangle.k[0]] / kMaxUv;
   const bool is_small = triangle.longest < kSmall && std::abs(middle) < 90 - kFromPole;
   constexpr double kPerMetre = 180 / (std::numbers::pi * kRadius);
   const int steps = is_small ? 1 : 8;
   constexpr double kSlack = 1e-3;
-  double bulge = is_small ? 4 * triangle.longest * triangle.longest / kRadius * kPerMetre / side_ * kMost : 0;
-  triangle.west = triangle.south = kMost;
+  double bulge = is_small ? 4 * triangle.longest * triangle.longest / kRadius * kPerMetre / side_ * kMaxUv : 0;
+  triangle.west = triangle.south = kMaxUv;
   for (std::size_t i = 0; i < 3; ++i) {
     const std::size_t a = triangle.k[i], b = triangle.k[(i + 1) % 3];
     triangle.west = std::min<double>(triangle.west, mesh_.u[a]);
@@ -80,7 +80,8 @@ void TileSurface::FindExtent(Triangle& triangle) const {
     for (int step = 0; step < steps; ++step) {
       const double t = static_cast<double>(step) / steps;
       const double linear = mesh_.v[a] + t * (mesh_.v[b] - mesh_.v[a]);
-      const double v = step == 0 ? linear : (LatitudeOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t) - south_) / side_ * kMost;
+      const double v =
+          step == 0 ? linear : (LatitudeOf(ecef_[a] + (ecef_[b] - ecef_[a]) * t) - south_) / side_ * kMaxUv;
       bulge = std::max(bulge, std::abs(v - linear));
       triangle.south = std::min(triangle.south, v);
       triangle.north = std::max(triangle.north, v);
@@ -93,8 +94,8 @@ void TileSurface::FindExtent(Triangle& triangle) const {
 double TileSurface::ErrorAt(const Sample& sample) const {
   double longitude = sample.longitude - west_;
   longitude -= 360 * std::floor(longitude / 360);
-  const double u = longitude / side_ * kMost, v = (sample.latitude - south_) / side_ * kMost;
-  if (!(u >= 0 && u <= kMost && v >= 0 && v <= kMost)) return -1;
+  const double u = longitude / side_ * kMaxUv, v = (sample.latitude - south_) / side_ * kMaxUv;
+  if (!(u >= 0 && u <= kMaxUv && v >= 0 && v <= kMaxUv)) return -1;
   const geo::Vec3 up = UpAt(sample.longitude, sample.latitude), foot = FootAt(up);
   double error = -1;
   for (const std::size_t t : bins_[static_cast<std::size_t>(BinOf(v) * bins_per_side_ + BinOf(u))]) {
@@ -133,11 +134,11 @@ double TileSurface::LargestError(const SampleIndex& samples) const {
 }
 
 int TileSurface::BinOf(double at) const {
-  return static_cast<int>(std::clamp(std::floor(at * bins_per_side_ / (kMost + 1)), 0.0, bins_per_side_ - 1.0));
+  return static_cast<int>(std::clamp(std::floor(at * bins_per_side_ / (kMaxUv + 1)), 0.0, bins_per_side_ - 1.0));
 }
 
 double TileSurface::HeightOf(std::size_t k) const {
-  return double{mesh_.min_height} + (double{mesh_.max_height} - double{mesh_.min_height}) * mesh_.h[k] / kMost;
+  return double{mesh_.min_height} + (double{mesh_.max_height} - double{mesh_.min_height}) * mesh_.h[k] / kMaxUv;
 }
 
 }  // namespace terrace::tiler

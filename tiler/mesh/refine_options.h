@@ -9,7 +9,6 @@
 
 namespace terrace::tiler {
 
-// The edges depend on the level and on their own samples and steps alone.
 // `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
 tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
 

@@ -211,9 +211,9 @@ class ByteCache {
       }
       TrimGhosts(to);
     }
-    // Evicts entries until `most` bytes are left. They become ghosts.
-    void EvictTo(std::size_t most, std::vector<ValuePtr>& evicted) {
-      while (charged() > most) {
+    // Evicts entries until at most `max_bytes` are left. They become ghosts.
+    void EvictTo(std::size_t max_bytes, std::vector<ValuePtr>& evicted) {
+      while (charged() > max_bytes) {
         Segment& from = probation.entries.empty() ? protection : probation;
         const Place entry = std::prev(from.entries.end());
         Move(entry, ghosts);

@@ -23,8 +23,8 @@ struct PointHeights;  // tile_pipeline.h
 
 // The surface to read. The error and the rest are those of a tile's URL.
 struct DrawnSurface {
-  std::optional<int> level;  // nothing: of the first level whose default error is at most the requested one, or of the
-                             // deepest
+  std::optional<int> level;  // nothing: LevelOf chooses the first level whose default error is at most the requested
+                             // one, or the deepest
   RequestedError requested;
   TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only

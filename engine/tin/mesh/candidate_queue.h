@@ -105,7 +105,7 @@ class CandidateQueue {
   std::vector<std::uint32_t> swept_;  // slots that the last sweep found, ascending
   std::vector<std::uint64_t> words_;  // of SortSwept, and room for a vector beyond them
   std::size_t wanted_ = kMinWanted;   // entries between two sweeps
-  std::size_t entered_ = 0;           // since the last one
+  std::size_t entered_ = 0;           // entries since the last sweep
 };
 
 }  // namespace terrace::tin

@@ -66,7 +66,8 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->capture_default_str()
       ->group(kWhat);
   command
-      .add_flag("--no-gzip", arguments.no_gzip, "Tiles as they are, for static hosts that cannot send Content-Encoding")
+      .add_flag("--no-gzip", arguments.no_gzip,
+                "Does not compress tiles, for static hosts that cannot send Content-Encoding")
       ->group(kWhat);
   command.add_option("--levels", arguments.levels, "The first and the last level; by default all")
       ->type_name("A-B")
@@ -93,29 +94,35 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->group(kWhat);
 }
 
-void AddQueueSecrets(CLI::App& command, BakeArguments& arguments) {
+void AddQueueSecrets(CLI::App& command, BakeArguments& arguments, const char* group) {
   command
       .add_option("--queue-password-file", arguments.queue_password_file,
-                  "The password of Redis; else that of the environment variable TERRACE_QUEUE_PASSWORD")
+                  "File with the password of Redis; by default the environment variable TERRACE_QUEUE_PASSWORD has it")
       ->type_name("FILE")
-      ->group(kHow);
+      ->group(group);
   command
-      .add_option("--queue-ca", arguments.queue_ca,
-                  "The certificates (PEM) that may sign that of rediss://; by default the system's")
+      .add_option(
+          "--queue-ca", arguments.queue_ca,
+          "With rediss://: certificates (PEM) of the authorities that sign the server's; by default the system's")
       ->type_name("FILE")
-      ->group(kHow);
+      ->group(group);
 }
 
 void AddStatus(CLI::App& bake, int& exit_code) {
   auto arguments = std::make_shared<BakeArguments>();
   auto how = std::make_shared<StatusView>();
-  CLI::App* command = bake.add_subcommand("status", "Tells how far a job of --queue is");
+  CLI::App* command = bake.add_subcommand("status", "Prints the progress of a job of --queue");
+  command->footer(
+      "Example:\n"
+      "  terrace bake status --queue redis://10.0.0.5:6379/0 --job alps --watch\n\n"
+      "Exit codes: 0 the job is baking or complete; 1 there is no such job, it ended incomplete, or Redis cannot be\n"
+      "reached; 2 wrong arguments.");
   command->add_option("--queue", arguments->queue, "Redis of the job")->type_name("redis://HOST:PORT/DB")->required();
   command->add_option("--job", arguments->job, "The name of the job")->type_name("NAME")->required();
-  AddQueueSecrets(*command, *arguments);
+  AddQueueSecrets(*command, *arguments, "Options");
   command->add_flag("--json", how->json, "Prints JSON, with --watch a line each time");
-  command->add_flag("--watch", how->watch, "Again every two seconds, until the job has ended");
-  command->add_flag("--remove", how->remove, "Forgets the job in Redis; files of the bake stay");
+  command->add_flag("--watch", how->watch, "Prints again every two seconds, until the job has ended");
+  command->add_flag("--remove", how->remove, "Removes the job from Redis; the files of the bake stay");
   command->callback([arguments, how, &exit_code] { exit_code = FinishOutput(ShowStatus(*arguments, *how)); });
 }
 
@@ -142,14 +149,13 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
       .add_flag("--finish", arguments.finish, "Bakes nothing: checks all files, and writes the manifest after shards")
       ->group(kHow);
   command
-      .add_option(
-          "--queue", arguments.queue,
-          "Redis of which this and other workers take the units of the job, into the same place; rediss:// with "
-          "TLS")
+      .add_option("--queue", arguments.queue,
+                  "Takes the units from a queue in Redis, which several workers share; all write into the same --out. "
+                  "rediss:// uses TLS")
       ->type_name("redis://HOST:PORT/DB")
       ->group(kHow);
   command.add_option("--job", arguments.job, "With --queue: the name of the job")->type_name("NAME")->group(kHow);
-  AddQueueSecrets(command, arguments);
+  AddQueueSecrets(command, arguments, kHow);
   command.add_option("--lease", arguments.lease)
       ->check(NumberAbove0("a number of seconds above 0"))
       ->group("");  // for tests: how long a worker may be silent
@@ -168,14 +174,15 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
 void AddPlanning(CLI::App& command, BakeArguments& arguments) {
   command
       .add_flag("--dry-run", arguments.dry_run,
-                "Bakes nothing: tells levels, tiles, files, bytes and core-hours, from a few tiles that are built")
+                "Bakes nothing: prints levels, tiles, files, bytes and core-hours, from a few tiles that are built")
       ->group(kPlanning);
   command
       .add_option("--catalogue", arguments.catalogue,
                   "With --dry-run, instead of DEMs: a list of one-degree cells such as N46E008, one a line")
       ->type_name("FILE")
       ->group(kPlanning);
-  command.add_option("--arc-seconds", arguments.arc_seconds, "Of the catalogue: between samples, from south to north")
+  command
+      .add_option("--arc-seconds", arguments.arc_seconds, "Of the catalogue: spacing of samples from south to north")
       ->check(NumberAbove0("a number above 0"))
       ->capture_default_str()
       ->type_name("S")
@@ -219,7 +226,7 @@ void AddBake(CLI::App& app, int& exit_code) {
   AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
-  AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
+  AddFlags(*command, about_cache, "Statistics of the rasters, as for terrace serve", arguments->cache_flags);
   AddStatus(*command, exit_code);
   command->callback([arguments, command, &exit_code] {
     if (!command->get_subcommands().empty()) return;

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "config/common/working_directory.h"
+#include "config/file/parse.h"
 #include "config/options/options.h"
-#include "config/parse.h"
 #include "engine/geo/tile_key.h"
 #include "proto/media_type.h"
 #include "server/cli/common/source_files.h"

@@ -13,6 +13,7 @@
 
 #include "engine/core/plain_number.h"
 #include "server/cli/common/progress.h"
+#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -83,7 +84,7 @@ void BakeDisplay::Show() {
 }
 
 std::string BakeDisplay::Line() const {
-  const double seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  const double seconds = tiler::SecondsSince(start_);
   const std::uint64_t built = counters_.tiles, passed = counters_.passed;
   const std::uint64_t done = std::min(built + passed, tiles_);
   const double pace = seconds > 0 ? static_cast<double>(built) / seconds : 0;

@@ -32,6 +32,7 @@
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
 #include "tiler/build_id.h"
+#include "tiler/encoded_tile.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::cli {
@@ -189,8 +190,7 @@ int BakeJob(const PlacedBake& bake, const std::string& worker) {
       {bake.arguments, bake.pipeline, bake.targets, bake.plan, bake.options, bake.place, worker, bake.identity, finish},
       counters, reports);
   if (bake.signals.signal() != 0) return StopCode(bake.signals);
-  BakeSummary summary =
-      Summarize(reports, counters, bake.place, std::chrono::duration<double>(Clock::now() - start).count());
+  BakeSummary summary = Summarize(reports, counters, bake.place, tiler::SecondsSince(start));
   summary.is_complete = code == kExitOk;
   if (code == kExitUsage) return code;
   fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
@@ -219,8 +219,7 @@ int BakeAlone(const PlacedBake& bake) {
     const BakeDisplay display(bake.pipeline.datasets().front().name, bake.plan.tiles, bake.plan.files, counters);
     reports = bake::Bake(bake.pipeline, bake.targets, bake.plan, bake.options, counters);
   }
-  BakeSummary summary =
-      Summarize(reports, counters, bake.place, std::chrono::duration<double>(Clock::now() - start).count());
+  BakeSummary summary = Summarize(reports, counters, bake.place, tiler::SecondsSince(start));
   const std::uint64_t done = summary.baked + summary.kept + summary.copied;
   if (bake.signals.signal() != 0) {
     std::fprintf(stderr, "terrace: stopped: %s of %s files are done; run the same command again to go on\n",

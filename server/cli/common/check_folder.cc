@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <system_error>
 
+#include "engine/core/errno_text.h"
+
 namespace terrace::cli {
 
 Result<void> CheckFolder(const std::filesystem::path& folder) {
@@ -22,7 +24,7 @@ Result<void> CheckFolder(const std::filesystem::path& folder) {
   if (std::filesystem::is_directory(existing, failed) && ::access(existing.c_str(), W_OK | X_OK) == 0) return {};
   const std::string in_the_way = existing == wanted ? "used" : "made: " + existing.string();
   return MakeError(ErrorCode::kUnavailable, "{} cannot be {}: {}; name a directory that may be written to",
-                   folder.string(), in_the_way, std::generic_category().message(errno));
+                   folder.string(), in_the_way, ErrorText());
 }
 
 }  // namespace terrace::cli

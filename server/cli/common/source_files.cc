@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "config/common/nearest_name.h"
+#include "engine/core/errno_text.h"
 #include "engine/gdal/source_policy.h"
 
 namespace terrace::cli {
@@ -66,8 +67,7 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
     if (!path.starts_with('/') || path.starts_with("/vsi") || ::access(path.c_str(), R_OK) == 0) return {};
     const int reason = errno;
     return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}{}",
-                     dataset.name, path, std::generic_category().message(reason), remedy,
-                     reason == ENOENT ? SimilarFile(path) : "");
+                     dataset.name, path, ErrorText(reason), remedy, reason == ENOENT ? SimilarFile(path) : "");
   };
   for (const config::SourceConfig& source : dataset.sources) {
     for (const std::string& file : source.files) {
@@ -78,7 +78,7 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
   if (dataset.sources.empty() && is_local && ::access(dataset.baked.c_str(), R_OK) != 0) {
     return MakeError(ErrorCode::kNotFound,
                      "dataset {}: {}: {}; give the folder or file that 'terrace bake' wrote, or \"sources\"",
-                     dataset.name, dataset.baked, std::generic_category().message(errno));
+                     dataset.name, dataset.baked, ErrorText());
   }
   if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
   return read(dataset.water.mask, ", or for a sea level a number of metres");

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "config/config.h"
+#include "config/file/parse.h"
 #include "config/options/options.h"
-#include "config/parse.h"
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/gdal/source_policy.h"
@@ -282,7 +282,7 @@ void AddInfo(CLI::App& app, int& exit_code) {
   AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
-  AddFlags(*command, about_cache, "What is learnt of the rasters, as for terrace serve", arguments->cache_flags);
+  AddFlags(*command, about_cache, "Statistics of the rasters, as for terrace serve", arguments->cache_flags);
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });
 }
 

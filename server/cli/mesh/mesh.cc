@@ -41,6 +41,7 @@
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
 #include "server/cli/mesh/mesh_placement.h"
+#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -268,19 +269,19 @@ int Mesh(const MeshArguments& arguments) {
   if (!placement) return Fail(placement.error().message, kExitUsage);
   const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
-  seconds.read = SecondsSince(start);
+  seconds.read = tiler::SecondsSince(start);
 
   start = Clock::now();
   tin::TinMesh mesh = Triangulate(arguments, *field);
   // The run cannot be stopped.
   if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
-  seconds.triangulate = SecondsSince(start);
+  seconds.triangulate = tiler::SecondsSince(start);
 
   start = Clock::now();
   const Result<void> written =
       output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement), placement->grid);
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = SecondsSince(start);
+  seconds.write = tiler::SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
   ReportUnused(arguments.dem, arguments.points, mesh.vertices.size());
   return kExitOk;

@@ -24,6 +24,7 @@
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
 #include "server/cli/mesh/mesh_placement.h"
+#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -158,17 +159,17 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   if (!source) return Fail(source.error().message, kExitFailure);
   const Result<Placement> placement = PlacementFor(arguments, *source);
   if (!placement) return Fail(placement.error().message, kExitUsage);
-  seconds.read = SecondsSince(start);
+  seconds.read = tiler::SecondsSince(start);
 
   start = Clock::now();
   const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
-  seconds.triangulate = SecondsSince(start);
+  seconds.triangulate = tiler::SecondsSince(start);
 
   start = Clock::now();
   const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), *placement),
                                              TrianglesOf(mesh.tin, *placement), placement->grid, mesh.colors);
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = SecondsSince(start);
+  seconds.write = tiler::SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
   if (arguments.goal.max_points != tin::ExtendedGoal{}.max_points) {
     ReportUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());

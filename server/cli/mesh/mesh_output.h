@@ -49,8 +49,4 @@ std::string TextOfVoids(std::size_t voids);  // empty if there are none
 // requested.
 void ReportUnused(const std::string& input, std::size_t points, std::size_t vertices);
 
-inline double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 }  // namespace terrace::cli

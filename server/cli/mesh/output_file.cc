@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::cli {
 
@@ -78,12 +79,12 @@ Result<OutputFile> OutputFile::Open(const std::string& path) {
   }
   if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; remove it, or give another name", path,
-                     std::generic_category().message(errno));
+                     ErrorText());
   }
   OutputFile file(path, TargetOf(path));
   if (!file.stream_) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; choose a folder that exists and is writable", path,
-                     std::generic_category().message(errno));
+                     ErrorText());
   }
   // Set before anything is written, so that nobody can read data without permission.
   const fs::perms permissions = fs::status(file.target_, ignored).permissions();

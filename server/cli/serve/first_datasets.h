@@ -26,7 +26,8 @@ class PreparedShares {
   void Begin(const std::string& dataset);
   void Raise(const std::string& dataset, double share);
 
-  // From now on the server answers: tiles have priority over preparations, and lines of the log stand beside progress.
+  // Call when the server answers requests. From then on preparations run at low priority, and print lines instead of a
+  // line that is rewritten, because the log prints too.
   void GoToBackground();
   bool is_in_background() const;
 

@@ -15,8 +15,8 @@
 
 #include "config/common/working_directory.h"
 #include "config/config.h"
+#include "config/file/parse.h"
 #include "config/options/options.h"
-#include "config/parse.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/option_flags.h"

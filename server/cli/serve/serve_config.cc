@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "config/common/working_directory.h"
+#include "config/file/parse.h"
 #include "config/options/options.h"
-#include "config/parse.h"
 #include "engine/core/result.h"
 #include "server/cli/common/open_baked.h"
 #include "server/cli/common/source_files.h"

@@ -117,7 +117,7 @@ Result<void> ServeRun::OpenTiers(std::size_t store_files, server::ServerOptions&
 }
 
 void ServeRun::HandleEvents(server::ServerOptions& options) {
-  options.on_source_changed = config_.watch ? std::function<void()>([this] { reloader_->Look(); }) : nullptr;
+  options.on_source_changed = config_.watch ? std::function<void()>([this] { reloader_->CheckNow(); }) : nullptr;
   options.on_stop = [this] {
     watchdog_.Begin(config_.drain_delay + config_.drain_timeout + kStopTime);
     stop_opening_.request_stop();

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "config/config_watch.h"
+#include "config/file/config_watch.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "server/cli/serve/first_datasets.h"
@@ -71,7 +71,7 @@ class ServeRun {
   const ServeArguments& arguments_;
   const config::Config& config_;
   const bool is_read_once_;
-  // The server's threads use those before it, so it ends first.
+  // The server, the last member, is destroyed first: its threads use the members before it.
   ShutdownWatchdog watchdog_;  // limits how long the others take to end
   std::stop_source stop_opening_;
   const std::shared_ptr<server::BakedStore> baked_;

@@ -42,8 +42,8 @@ TEST(HeightField, TakesInfinitiesForVoids) {
 }
 
 TEST(HeightField, KnowsTheRangeOfWhatIsFinite) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kMost = std::numeric_limits<float>::max();
-  constexpr std::array<float, 6> kOdd = {kVoid, kInfinity, -kInfinity, kMost, -kMost, -0.0F};
+  constexpr float kInfinity = std::numeric_limits<float>::infinity(), kLargest = std::numeric_limits<float>::max();
+  constexpr std::array<float, 6> kOdd = {kVoid, kInfinity, -kInfinity, kLargest, -kLargest, -0.0F};
   ForEachInstructionSet([&] {
     Random random(3);
     for (int round = 0; round < 500; ++round) {

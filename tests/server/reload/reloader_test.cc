@@ -76,12 +76,15 @@ class ReloaderTest : public testing::Test {
   }
 
   void Start() {
-    std::vector<tiler::Dataset> datasets;
-    for (const config::DatasetConfig& wanted : config_.datasets) datasets.push_back(*Open(wanted, {}));
+    std::vector<DatasetSlot> slots;
+    for (const config::DatasetConfig& wanted : config_.datasets) {
+      tiler::Dataset dataset = *Open(wanted, {});
+      served_.emplace_back(dataset.name, dataset.generation);
+      slots.emplace_back(wanted, std::move(dataset));
+    }
     openings_ = 0;
-    for (const tiler::Dataset& dataset : datasets) served_.emplace_back(dataset.name, dataset.generation);
     next_ = config_;
-    reloader_ = std::make_unique<Reloader>(config_, std::move(datasets), MakeHooks());
+    reloader_ = std::make_unique<Reloader>(config_, std::move(slots), MakeHooks());
     reloader_->Start(/*watch=*/true);
   }
 
@@ -147,7 +150,7 @@ TEST_F(ReloaderTest, OpensWhatChangedAndNothingElse) {
   Start();
   const auto before = Served();
   Put("b");
-  reloader_->Look();
+  reloader_->CheckNow();
   ASSERT_TRUE(Eventually([&] { return Served() != before; }));
   EXPECT_EQ(Served()[0], before[0]);
   EXPECT_NE(Served()[1].second, before[1].second);
@@ -183,7 +186,7 @@ TEST_F(ReloaderTest, ReportsProblemsAndMendsThem) {
   const auto before = Served();
   fails_ = true;
   Put("a");
-  reloader_->Look();
+  reloader_->CheckNow();
   ASSERT_TRUE(Eventually([&] { return Problems().contains("a"); }));
   EXPECT_EQ(Served(), before) << "what there is stays";
   fails_ = false;
@@ -260,7 +263,7 @@ TEST_F(ReloaderTest, ServesWhatAStartHasNotOpened) {
   ASSERT_TRUE(Eventually([&] { return Problems()["b"] == "no block"; }));
   EXPECT_EQ(openings_, 1);
   Put("b");
-  reloader_->Look();
+  reloader_->CheckNow();
   ASSERT_TRUE(Eventually([&] { return names() == "abc" && Problems().empty(); }));
 }
 
@@ -285,7 +288,7 @@ TEST_F(ReloaderTest, OpensNothingAfterAStop) {
   Start();
   stop.request_stop();
   Put("a");
-  reloader_->Look();
+  reloader_->CheckNow();
   std::this_thread::sleep_for(500ms);
   EXPECT_EQ(openings_, 0);
 }
@@ -309,7 +312,7 @@ TEST_F(ReloaderTest, StoppingStopsAnOpening) {
   Start();
   blocks_ = true;
   Put("a");
-  reloader_->Look();
+  reloader_->CheckNow();
   ASSERT_TRUE(Eventually([&] { return openings_ == 1; }));
   reloader_.reset();  // otherwise this would never return
 }
@@ -322,7 +325,7 @@ TEST_F(ReloaderTest, WaitsForAFileThatIsBeingWritten) {
   bool is_busy = false;  // a busy machine, on which the file looks complete
   for (int i = 0; i < 30 && !is_busy; ++i) {
     fs::last_write_time(folder_ / "a.tif", fs::file_time_type::clock::now());
-    reloader_->Look();
+    reloader_->CheckNow();
     std::this_thread::sleep_for(50ms);
     const auto now = std::chrono::steady_clock::now();
     is_busy = now - std::exchange(last, now) > 500ms;

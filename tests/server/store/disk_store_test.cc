@@ -151,10 +151,10 @@ TEST_F(DiskStoreTest, KeepsTheNewestWithinItsCapacity) {
     most = std::max(most, DirectoryBytes());
   }
   store.Flush();
-  constexpr std::size_t kMost = RecordDb::kMinCapacity + (std::size_t{4} << 20);
-  EXPECT_LE(most, kMost) << "old files go a moment after they are due";
+  constexpr std::size_t kMaxBytes = RecordDb::kMinCapacity + (std::size_t{4} << 20);
+  EXPECT_LE(most, kMaxBytes) << "old files go a moment after they are due";
   EXPECT_TRUE(Eventually([this] { return DirectoryBytes() <= RecordDb::kMinCapacity; })) << DirectoryBytes();
-  EXPECT_LE(store.stats().bytes, kMost) << "of the last write, when old files may have been due";
+  EXPECT_LE(store.stats().bytes, kMaxBytes) << "of the last write, when old files may have been due";
   const int found = FoundRight(store, kCount, kBytes);
   EXPECT_GE(found, 80);
   EXPECT_LE(found, 168);

@@ -1,4 +1,4 @@
-#include "config/parse.h"
+#include "config/file/parse.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -12,6 +12,7 @@
 #include "config/input/json_text.h"
 #include "config/input/source_paths.h"
 #include "config/options/option_table.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::config {
 namespace {
@@ -39,7 +40,7 @@ tl::expected<std::string, std::string> ReadText(int descriptor, const std::files
     text.resize(std::min(std::max<std::size_t>(2 * size, 4096), kMaxConfigBytes + 1));
     const ssize_t got = ::read(descriptor, text.data() + size, text.size() - size);
     if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return tl::unexpected("cannot be read: " + std::generic_category().message(errno));
+    if (got < 0) return tl::unexpected("cannot be read: " + ErrorText());
     size += static_cast<std::size_t>(got);
     if (size > kMaxConfigBytes) return tl::unexpected(TooLarge(file));
     if (got > 0) continue;
@@ -65,7 +66,7 @@ ConfigResult ParseConfig(std::string_view text, const std::filesystem::path& dir
 
 ConfigResult LoadConfig(const std::filesystem::path& file) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return Unreadable("cannot be read: " + std::generic_category().message(errno));
+  if (descriptor < 0) return Unreadable("cannot be read: " + ErrorText());
   const tl::expected<std::string, std::string> text = ReadText(descriptor, file);
   ::close(descriptor);
   if (!text) return Unreadable(text.error());

@@ -1,4 +1,4 @@
-#include "config/config_watch.h"
+#include "config/file/config_watch.h"
 
 #include <sys/stat.h>
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "config/config.h"
-#include "config/parse.h"
+#include "config/file/parse.h"
 
 namespace terrace::config {
 

@@ -1,0 +1,21 @@
+#include "engine/sources/located_raster.h"
+
+#include <utility>
+
+#include "engine/gdal/raster_file.h"
+
+namespace terrace::dem {
+
+Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path,
+                                   const std::optional<FileStamp>& before, int bands) {
+  if (auto complete = CheckComplete(dataset, path, bands); !complete) return tl::unexpected(complete.error());
+  auto files = StampedFiles::OfOpened(FilesOf(dataset, path), before);
+  if (!files) return tl::unexpected(files.error());
+  auto georeference = Georeference::Of(dataset, path);
+  if (!georeference) return tl::unexpected(georeference.error());
+  const auto spacing = SourceSpacing::Of(*georeference, path);
+  if (!spacing) return tl::unexpected(spacing.error());
+  return LocatedRaster{*std::move(files), *std::move(georeference), *spacing};
+}
+
+}  // namespace terrace::dem

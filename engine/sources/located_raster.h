@@ -1,0 +1,28 @@
+// The checks and properties that every georeferenced file needs after it was opened: height models, images, masks.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <optional>
+#include <string>
+
+#include "engine/core/result.h"
+#include "engine/crs/georeference.h"
+#include "engine/crs/level_plan.h"
+#include "engine/gdal/file_stamp.h"
+
+namespace terrace::dem {
+
+struct LocatedRaster {
+  StampedFiles files;
+  Georeference georeference;
+  SourceSpacing spacing;
+};
+
+// `before`: the stamp of `path` before the dataset was opened. `bands`: the first ones, of which every block must be
+// there. kUnavailable: the file is truncated (CheckComplete). kChanged: it was replaced meanwhile. Other errors: those
+// of Georeference::Of and SourceSpacing::Of.
+Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path,
+                                   const std::optional<FileStamp>& before, int bands = 1);
+
+}  // namespace terrace::dem
