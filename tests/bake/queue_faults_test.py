@@ -179,6 +179,28 @@ class QueueFaults(QueueCase):
             self.end(steady)
             self.expect_equal(place)
 
+    def test_a_worker_ends_while_redis_is_frozen(self):
+        silent = Listener(lambda connection: connection.recv(4096) and time.sleep(600))
+        self.addCleanup(silent.close)
+        place = self.place("silent")
+        worker = self.start(place, "--queue-timeout", 3600, url=silent.url)  # the test would wait for an hour
+        until = time.monotonic() + 60
+        while not any(name.endswith(".lock") for name in files_of(place)):
+            self.assertLess(time.monotonic(), until)
+            time.sleep(0.01)
+        worker.send_signal(signal.SIGTERM)
+        self.end(worker, 143)
+        place = self.place()
+        worker = self.start(place, "--queue-timeout", 3600, lease=600)
+        worker.stdout.readline()
+        self.redis.process.send_signal(signal.SIGSTOP)
+        worker.send_signal(signal.SIGTERM)
+        _, errors = self.end(worker, 143)
+        self.redis.process.send_signal(signal.SIGCONT)
+        self.assertIn("Redis does not reply, so other workers get its units when their lease has ended", errors)
+        self.assertNotIn("waiting for it", errors)
+        self.assertEqual([name for name in files_of(place) if name.endswith((".partial", ".lock"))], [])
+
     def test_the_password_is_seen_nowhere(self):
         self.redis = self.start_redis("locked", "--requirepass", "open-sesame")
         place, file = self.place(), self.scratch / "password"

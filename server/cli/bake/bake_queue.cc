@@ -63,6 +63,7 @@ Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
   const archive::Manifest& manifest = bake.targets.front().manifest;
   bake::RedisQueueOptions options;
   options.place = *std::move(place);
+  options.place.stop = bake.options.stop;
   for (const auto& [what, value] : bake.identity.fields) options.identity.emplace_back(what, value);
   options.identity.emplace_back("program", manifest.product);
   options.identity.emplace_back("encoders and libraries", manifest.encoder);
@@ -169,7 +170,10 @@ int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<
     }
     std::ranges::move(taken, std::back_inserter(reports));
     if (bake.options.stop.stop_requested()) {
-      PrintMessage("stopped: other workers have its units now; run the same command again to go on");
+      PrintMessage((*queue)->Leave()
+                       ? "stopped: other workers have its units now; run the same command again to go on"
+                       : "stopped: Redis does not reply, so other workers get its units when their lease has ended; "
+                         "run the same command again to go on");
       return kExitFailure;
     }
     switch ((*queue)->end()) {
