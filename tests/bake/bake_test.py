@@ -341,7 +341,7 @@ class Bake(unittest.TestCase):
                 (("--out", other, "--error", "1", "--fraction", "1"), "0-9", "exclude each other"),
                 (("--out", other, "--extensions", "watermask"), "0-9", "no water"),
                 (("--out", other, "--update", other), "0-9", "same place"),
-                (("--out", "/vsis3/bucket/place"), "0-9", "a folder of this machine"),
+                (("--out", "/vsis3/bucket/place", "--form", "single"), "0-9", "a folder of this machine"),
                 ((), "0-9", "--out PLACE"),
         ):
             with self.subTest(arguments=arguments, levels=levels):
