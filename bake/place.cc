@@ -86,7 +86,8 @@ Result<void> MakeFolder(const std::string& place) {
                      place);
   }
   fs::create_directories(place, error);
-  if (!fs::is_directory(place)) {
+  std::error_code ignored;
+  if (!fs::is_directory(place, ignored)) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be created: {}; give a folder that can be written with --out",
                      place, error.message());
   }

@@ -319,6 +319,11 @@ class Bake(unittest.TestCase):
         (other / "photo.jpg").write_text("x")
         file = self.scratch / "a-file"
         file.write_text("x")
+        loop = self.scratch / "loop"
+        loop.symlink_to(loop)
+        done = self.run_bake("--out", loop)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"{loop}: cannot be created: Too many levels of symbolic links; give a folder", done.stderr)
         shutil.copytree(self.reference, self.place("reference"))
         reference = self.place("reference")
         for arguments, levels, said in (
