@@ -16,6 +16,7 @@
 #include "archive/files/input_file.h"
 #include "bake/find_missing.h"
 #include "bake/queue/redis_queue.h"
+#include "engine/gdal/source_policy.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
 #include "tiler/encoder_version.h"
@@ -111,8 +112,8 @@ int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
   const auto dead = queue.Dead();
   if (!dead) return Fail(dead.error());
   for (const bake::DeadUnit& unit : *dead) {
-    PrintMessage(fmt::format("unit {} failed: {} (handed out {} times, last to {})", unit.unit, unit.why,
-                             unit.deliveries, unit.worker));
+    PrintMessage(fmt::format("unit {} failed: {} (handed out {} times, last to {})", Shown(unit.unit), Shown(unit.why),
+                             unit.deliveries, Shown(unit.worker)));
   }
   PrintMessage(
       fmt::format("job {} is incomplete: {} of {} units failed, the others are done, and there is no manifest; "
@@ -136,6 +137,11 @@ Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments) {
   place.name = arguments.job;
   place.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(arguments.queue_timeout * 1000));
   return place;
+}
+
+std::string Shown(const std::string& text) {
+  constexpr std::size_t kMaxBytes = 200;
+  return dem::EscapeControls(text.size() <= kMaxBytes ? text : text.substr(0, kMaxBytes) + "...");
 }
 
 std::string WorkerName() {
