@@ -1,9 +1,7 @@
 #include "bake/find_missing.h"
 
 #include <algorithm>
-#include <filesystem>
 #include <string>
-#include <system_error>
 
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
@@ -14,8 +12,6 @@ namespace {
 
 bool IsThere(const tiler::Dataset& dataset, const Target& target, const Unit& unit) {
   const std::string path = target.place + "/" + archive::UnitPath(unit.name);
-  std::error_code ignored;
-  if (!std::filesystem::exists(path, ignored)) return false;
   const auto file = archive::PmtilesFile::Open(path);
   return file && archive::UnitKeyIn((*file)->metadata()) == UnitKey(dataset, target.manifest, unit);
 }

@@ -1,6 +1,5 @@
 #include "bake/place.h"
 
-#include <fcntl.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -9,7 +8,6 @@
 #include <cerrno>
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
@@ -17,6 +15,8 @@
 #include <system_error>
 #include <utility>
 
+#include "archive/files/bucket.h"
+#include "bake/place_files.h"
 #include "engine/core/errno_text.h"
 #include "tiler/encoder_version.h"
 
@@ -28,19 +28,6 @@ namespace fs = std::filesystem;
 constexpr const char* kIdentityFile = "bake.json";
 constexpr const char* kPlaceIdFile = "bake-place.id";
 
-std::string HostName() {
-  std::array<char, 256> name{};
-  if (::gethostname(name.data(), name.size() - 1) != 0) return "unknown";
-  return name.data();
-}
-
-std::string ReadText(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
 // The start of a process in the kernel's ticks. It differs for a later process with the same number. Empty: unknown.
 std::string StartOf(long pid) {
   const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid));
@@ -51,11 +38,6 @@ std::string StartOf(long pid) {
   constexpr int kStart = 20;  // counted after the name
   for (int i = 0; i < kStart; ++i) fields >> field;
   return field;
-}
-
-// The name of this process's temporary file, which is renamed to `file`.
-std::string OwnPartial(const std::string& file) {
-  return fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
 }
 
 // Identifies the namespace of process numbers: a container has its own.
@@ -96,13 +78,15 @@ struct Owner {
 };
 
 Result<void> MakeFolder(const std::string& place) {
+  if (archive::IsBucket(place)) return {};
   std::error_code error;
   if (fs::exists(place, error) && !fs::is_directory(place, error)) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is a file; a bake needs a folder: give another place with --out",
                      place);
   }
   fs::create_directories(place, error);
-  if (!fs::is_directory(place)) {
+  std::error_code ignored;
+  if (!fs::is_directory(place, ignored)) {
     return MakeError(ErrorCode::kUnavailable, "{}: cannot be created: {}; give a folder that can be written with --out",
                      place, error.message());
   }
@@ -113,33 +97,8 @@ Result<void> MakeFolder(const std::string& place) {
   return {};
 }
 
-// Creates a file together with its content, so that no process reads it empty. Fails with EEXIST if it exists. Returns
-// errno.
-int CreateFile(const std::string& file, const std::string& content) {
-  const std::string own = OwnPartial(file);
-  {
-    std::ofstream out(own, std::ios::binary);
-    out << content << '\n';
-    out.flush();
-    if (!out) {
-      const int error = errno != 0 ? errno : EIO;
-      ::unlink(own.c_str());
-      return error;
-    }
-  }
-  int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
-  if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links
-    const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-    error = made < 0 ? errno : 0;
-    if (made >= 0) ::close(made);
-    if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) error = errno;
-  }
-  ::unlink(own.c_str());
-  return error;
-}
-
-// Creates the lock file. Returns errno.
-int CreateLock(const std::string& file) {
+// Creates the lock file.
+Result<bool> CreateLock(const std::string& file) {
   return CreateFile(
       file, fmt::format("{} {} {} {} {}", HostName(), ::getpid(), StartOf(::getpid()), BootOf(), NumberSpace()));
 }
@@ -160,11 +119,10 @@ std::string OtherLock(const std::string& place, const std::string& own) {
     const std::size_t of = name.rfind("-of-");
     return of == std::string::npos ? name : name.substr(of);
   };
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(place, error)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
     if (!IsLock(name) || name == own || (division(name) == division(own) && name != "bake.lock")) continue;
-    if (!Owner::Parse(ReadText(entry.path())).HasEnded()) return entry.path().string();
+    const std::string file = place + "/" + name;
+    if (!Owner::Parse(ReadText(file)).HasEnded()) return file;
   }
   return {};
 }
@@ -223,8 +181,8 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
   const std::string file = fmt::format("{}/bake{}{}.lock", place, shard.empty() ? "" : "-", shard);
   constexpr int kTries = 3;
   for (int i = 0; i < kTries; ++i) {
-    const int error = CreateLock(file);
-    if (error == 0) {
+    const Result<bool> created = CreateLock(file);
+    if (created && *created) {
       PlaceLock lock(file);
       const std::string other = OtherLock(place, fs::path(file).filename().string());
       if (other.empty()) return lock;
@@ -234,10 +192,10 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
                        "it, or remove {} if that process has ended",
                        place, owner.pid, owner.host, other);
     }
-    if (error != EEXIST) {
+    if (!created) {
       return MakeError(ErrorCode::kUnavailable,
                        "{}: cannot be written: {}; give a folder with room that can be written", file,
-                       ErrorText(error));
+                       created.error().message);
     }
     const std::string text = ReadText(file);
     const Owner owner = Owner::Parse(text);
@@ -247,6 +205,10 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
                        place, owner.pid, owner.host, file);
     }
     // Removes the lock that was read, but not one with which another process has replaced it meanwhile.
+    if (archive::IsBucket(file)) {
+      Remove(file);
+      continue;
+    }
     const std::string stale = OwnPartial(file);
     if (::rename(file.c_str(), stale.c_str()) != 0) continue;
     if (ReadText(stale) != text) ::link(stale.c_str(), file.c_str());
@@ -258,29 +220,28 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
 PlaceLock::PlaceLock(PlaceLock&& other) noexcept : file_(std::exchange(other.file_, {})) {}
 
 PlaceLock::~PlaceLock() {
-  if (!file_.empty()) ::unlink(file_.c_str());
+  if (!file_.empty()) Remove(file_);
 }
 
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
-  std::error_code error;
+  const Result<std::vector<std::string>> names = NamesIn(place);
+  if (!names) return tl::unexpected(names.error());
   std::string content;
-  for (const auto& entry : fs::directory_iterator(place, error)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : *names) {
     if (IsContent(name)) content = name;
     if (IsOurs(name)) continue;
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: holds something that is no bake ({}); give an empty or a new folder with --out", place, name);
   }
-  if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", place, error.message());
   const fs::path file = fs::path(place) / kIdentityFile;
-  bool is_known = fs::exists(file, error);
+  bool is_known = Exists(file);
   if (is_known) {
     if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
   }
   std::vector<std::string> archives = {place};
   for (const auto& [format, name] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
   for (const std::string& archive : archives) {
-    if (!fs::exists(fs::path(archive) / archive::kManifestFile, error)) continue;
+    if (!Exists(fs::path(archive) / archive::kManifestFile)) continue;
     is_known = true;
     const auto manifest = archive::ReadManifest(archive);
     if (!manifest) return tl::unexpected(manifest.error());
@@ -297,10 +258,12 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
                      "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
                      place, content);
   }
-  if (fs::exists(file, error)) return {};
-  const int why = CreateFile(file.string(), ToJson(identity));
-  if (why == EEXIST) return CheckSame(place, ReadText(file), identity, file.string());  // of another shard
-  if (why != 0) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), ErrorText(why));
+  const Result<bool> created = CreateFile(file.string(), ToJson(identity));
+  if (!created) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", file.string(), created.error().message);
+  }
+  if (!*created)
+    return CheckSame(place, ReadText(file), identity, file.string());  // it was there, or is of another shard
   return {};
 }
 
@@ -309,26 +272,24 @@ namespace {
 // Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock
 // of another host stays, because it is not known here whether its owner still runs.
 void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
-  std::error_code ignored;
   std::vector<fs::path> leftovers;
   for (const fs::path& folder : folders) {
     for (const fs::path& within : {folder, folder / "units"}) {
-      for (const auto& entry : fs::directory_iterator(within, ignored)) {
-        if (IsPartial(entry.path().filename().string())) leftovers.push_back(entry.path());
+      for (const std::string& name : NamesIn(within).value_or(std::vector<std::string>())) {
+        if (IsPartial(name)) leftovers.push_back(within / name);
       }
     }
   }
-  for (const auto& entry : fs::directory_iterator(place, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (IsLock(name) && Owner::Parse(ReadText(entry.path())).HasEnded()) leftovers.push_back(entry.path());
+  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
+    const fs::path file = fs::path(place) / name;
+    if (IsLock(name) && Owner::Parse(ReadText(file)).HasEnded()) leftovers.push_back(file);
   }
-  for (const fs::path& file : leftovers) fs::remove(file, ignored);
+  for (const fs::path& file : leftovers) Remove(file);
 }
 
 }  // namespace
 
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests) {
-  std::error_code ignored;
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     const fs::path folder = ArchivePlace(place, manifest, manifests.size() == 1);
@@ -339,62 +300,55 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
     }
     std::vector<fs::path> unknown;
     for (const fs::path& within : {folder, folder / "units"}) {
-      for (const auto& entry : fs::directory_iterator(within, ignored)) {
-        const std::string name = entry.path().filename().string();
-        if (name.ends_with(".pmtiles") && !wanted.contains(name)) unknown.push_back(entry.path());
+      for (const std::string& name : NamesIn(within).value_or(std::vector<std::string>())) {
+        if (name.ends_with(".pmtiles") && !wanted.contains(name)) unknown.push_back(within / name);
       }
     }
-    for (const fs::path& file : unknown) fs::remove(file, ignored);
+    for (const fs::path& file : unknown) Remove(file);
   }
   RemoveLeftovers(place, folders);
-  fs::remove(fs::path(place) / kPlaceIdFile, ignored);
-  fs::remove(fs::path(place) / kIdentityFile, ignored);
+  Remove(fs::path(place) / kPlaceIdFile);
+  Remove(fs::path(place) / kIdentityFile);
 }
 
 Result<std::string> PlaceId(const std::string& place) {
+  if (archive::IsBucket(place)) return place;  // has the same name everywhere
   const fs::path file = fs::path(place) / kPlaceIdFile;
   std::random_device random;
-  const int error = CreateFile(file.string(), fmt::format("{:08x}{:08x}", random(), random()));
+  const Result<bool> created = CreateFile(file.string(), fmt::format("{:08x}{:08x}", random(), random()));
   std::string id;
   std::istringstream(ReadText(file)) >> id;
   if (!id.empty()) return id;
-  return MakeError(ErrorCode::kUnavailable, "{}: cannot be {}: {}", file.string(),
-                   error != 0 && error != EEXIST ? "written" : "read", ErrorText(error == EEXIST ? EIO : error));
+  return MakeError(ErrorCode::kUnavailable, "{}: cannot be {}: {}", file.string(), created ? "read" : "written",
+                   created ? ErrorText(EIO) : created.error().message);
 }
 
 bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
-  std::error_code ignored;
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
-    if (!fs::exists(folders.back() / archive::kManifestFile, ignored)) return false;
+    if (!Exists(folders.back() / archive::kManifestFile)) return false;
   }
   RemoveLeftovers(place, folders);
-  fs::remove(fs::path(place) / kPlaceIdFile, ignored);
-  fs::remove(fs::path(place) / kIdentityFile, ignored);
+  Remove(fs::path(place) / kPlaceIdFile);
+  Remove(fs::path(place) / kIdentityFile);
   return true;
 }
 
 void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock) {
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(place, error)) {
-    const std::string name = entry.path().filename().string();
+  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
     if (name != kIdentityFile && name != kPlaceIdFile && name != fmt::format("bake-{}.lock", own_lock)) return;
   }
-  fs::remove(fs::path(place) / kPlaceIdFile, error);
-  fs::remove(fs::path(place) / kIdentityFile, error);
+  Remove(fs::path(place) / kPlaceIdFile);
+  Remove(fs::path(place) / kIdentityFile);
 }
 
 void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker) {
   const std::string own = fmt::format("bake-{}.lock", LockOfWorker(but_of_worker, job));
   const std::string ending = LockOfWorker("", job) + ".lock";
-  std::error_code ignored;
-  std::vector<fs::path> locks;
-  for (const auto& entry : fs::directory_iterator(place, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (IsLock(name) && name.ends_with(ending) && name != own) locks.push_back(entry.path());
+  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
+    if (IsLock(name) && name.ends_with(ending) && name != own) Remove(fs::path(place) / name);
   }
-  for (const fs::path& lock : locks) fs::remove(lock, ignored);
 }
 
 std::string LockOfWorker(const std::string& worker, const std::string& job) {

@@ -38,6 +38,8 @@ void* CreateBoundedArray(const redisReadTask* task, int elements) {
   return elements > kMaxElements ? nullptr : ReplyFunctions::Get().of_hiredis.createArray(task, elements);
 }
 
+constexpr std::string_view kTooManyClients = "ERR max number of clients";
+
 std::string Encoded(std::span<const Command> commands) {
   std::string bytes;
   for (const Command& command : commands) {
@@ -69,7 +71,7 @@ Connection::~Connection() = default;
 
 Result<std::unique_ptr<Connection>> Connection::Open(const Address& address, const ConnectionOptions& options) {
   const Deadline deadline = Clock::now() + options.connect_timeout;
-  auto socket = Socket::Connect(address, options.ca_file, deadline);
+  auto socket = Socket::Connect(address, options.ca_file, deadline, options.stop);
   if (!socket) return tl::unexpected(socket.error());
   std::unique_ptr<Connection> connection(new Connection(*std::move(socket), address, options));
   if (auto greeted = connection->Greet(address, deadline); !greeted) return tl::unexpected(greeted.error());
@@ -85,29 +87,35 @@ Result<void> Connection::Greet(const Address& address, Deadline deadline) {
   }
   if (address.database != 0) commands.push_back({"SELECT", std::to_string(address.database)});
   commands.push_back({"PING"});
-  const auto replies = CallAll(commands, deadline);
-  if (!replies) return tl::unexpected(replies.error());
-  for (std::size_t i = 0; i < commands.size(); ++i) {
-    if (!(*replies)[i].is_error()) continue;
-    Error error = Refusal(commands[i].front(), (*replies)[i]);
-    if (commands[i].front() != "PING") error.code = ErrorCode::kInvalidArgument;
+  std::vector<Reply> replies;
+  const Result<void> done = CallAll(commands, deadline, replies);
+  for (std::size_t i = 0; i < replies.size(); ++i) {  // a Redis without room for a client says so, and closes
+    if (!replies[i].is_error()) continue;
+    Error error = Refusal(commands[i].front(), replies[i]);
+    const bool is_lasting = commands[i].front() != "PING" && replies[i].text().starts_with("ERR") &&
+                            !replies[i].text().starts_with(kTooManyClients);
+    if (is_lasting) error.code = ErrorCode::kInvalidArgument;
     return tl::unexpected(std::move(error));
   }
-  if (replies->back().text() == "PONG") return {};
+  if (!done) return done;
+  if (replies.back().text() == "PONG") return {};
   return MakeError(ErrorCode::kUnavailable, "Redis at {}: what answers there is no Redis; correct the URL", name_);
 }
 
 Result<std::vector<Reply>> Connection::CallAll(std::span<const Command> commands) {
-  return CallAll(commands, Clock::now() + options_.command_timeout);
+  std::vector<Reply> replies;
+  if (auto done = CallAll(commands, Clock::now() + options_.command_timeout, replies); !done) {
+    return tl::unexpected(done.error());
+  }
+  return replies;
 }
 
-Result<std::vector<Reply>> Connection::CallAll(std::span<const Command> commands, Deadline deadline) {
+Result<void> Connection::CallAll(std::span<const Command> commands, Deadline deadline, std::vector<Reply>& replies) {
   if (!is_open_ || !reader_) {
     return MakeError(ErrorCode::kUnavailable, "Redis at {}: the connection is broken", name_);
   }
   is_open_ = false;  // unless every reply comes
-  if (auto written = socket_.Write(Encoded(commands), deadline); !written) return tl::unexpected(written.error());
-  std::vector<Reply> replies;
+  if (auto written = socket_.Write(Encoded(commands), deadline); !written) return written;
   std::size_t bytes_left = options_.max_reply_bytes;
   while (replies.size() < commands.size()) {
     auto reply = ReadReply(deadline, bytes_left);
@@ -115,7 +123,7 @@ Result<std::vector<Reply>> Connection::CallAll(std::span<const Command> commands
     replies.push_back(*std::move(reply));
   }
   is_open_ = true;
-  return replies;
+  return {};
 }
 
 Result<Reply> Connection::ReadReply(Deadline deadline, std::size_t& bytes_left) {
@@ -164,6 +172,12 @@ Error Connection::Refusal(const std::string& command, const ReplyView& error) co
     return make(ErrorCode::kInvalidArgument,
                 "is in protected mode, and answers its own machine only; give it a password (requirepass)");
   }
+  if (kind == "LOADING") {
+    return make(ErrorCode::kUnavailable, "is reading its data after a start; it will be ready soon");
+  }
+  if (starts(kTooManyClients)) {
+    return make(ErrorCode::kUnavailable, "has as many clients as it may have (maxclients); raise that");
+  }
   if (kind == "NOAUTH") return make(ErrorCode::kInvalidArgument, "wants a password; give one");
   if (kind == "NOPERM") {
     return make(ErrorCode::kInvalidArgument, fmt::format("the user may not use {} there; extend its ACL", command));
@@ -176,18 +190,26 @@ Error Connection::Refusal(const std::string& command, const ReplyView& error) co
   if (kind == "READONLY") {
     return make(ErrorCode::kUnavailable, "is a read-only replica; give the URL of the primary");
   }
-  if (kind == "LOADING")
-    return make(ErrorCode::kUnavailable, "is reading its data after a start; it will be ready soon");
   if (kind == "MISCONF") {
     return make(ErrorCode::kUnavailable, "cannot save its data and refuses writes; look into its log");
   }
   if (starts("ERR unknown command")) {
     return make(ErrorCode::kInvalidArgument, fmt::format("does not know {}; it is too old, or no Redis", command));
   }
+  if (kind == "MOVED" || kind == "ASK" || kind == "CLUSTERDOWN" || kind == "CROSSSLOT") {
+    return make(ErrorCode::kInvalidArgument, "is a node of a cluster; take a Redis without cluster-enabled");
+  }
+  if (kind == "MASTERDOWN") {
+    return make(ErrorCode::kUnavailable, "is a replica that has lost its primary; give the URL of the primary");
+  }
+  if (kind == "BUSY") return make(ErrorCode::kUnavailable, "is busy with somebody's script; look who uses it");
   if (kind == "WRONGTYPE") {
     return make(ErrorCode::kInvalidArgument, "the key belongs to something else; take another name or database");
   }
-  return make(ErrorCode::kUnavailable, fmt::format("refuses {} ({})", command, kind));
+  // What is no Redis may send anything, of any length: a kind has capital letters.
+  const std::size_t end = kind.find_first_not_of("ABCDEFGHIJKLMNOPQRSTUVWXYZ");
+  return make(ErrorCode::kUnavailable,
+              fmt::format("refuses {} ({})", command, kind.substr(0, std::min<std::size_t>(end, 32))));
 }
 
 }  // namespace terrace::redis

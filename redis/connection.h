@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct ConnectionOptions {
   std::chrono::milliseconds command_timeout{2000};  // of a Call or CallAll: from the first byte out to the last in
   std::string ca_file = {};  // PEM; the certificates that may sign that of a rediss:// server; empty: the system's
   std::size_t max_reply_bytes = std::size_t{64} << 20;  // of a Call or CallAll
+  std::stop_token stop = {};                            // once requested, calls end soon: Socket::Connect
 };
 
 // The name and the arguments; bytes, not text.
@@ -59,7 +61,8 @@ class Connection {
 
  private:
   Connection(Socket socket, const Address& address, const ConnectionOptions& options);
-  Result<std::vector<Reply>> CallAll(std::span<const Command> commands, Deadline deadline);
+  // `replies`: those that came, also if the others did not.
+  Result<void> CallAll(std::span<const Command> commands, Deadline deadline, std::vector<Reply>& replies);
   Result<void> Greet(const Address& address, Deadline deadline);
   Result<Reply> ReadReply(Deadline deadline, std::size_t& bytes_left);
 

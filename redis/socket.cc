@@ -42,10 +42,13 @@ std::string TlsError() {
 void Socket::FreeTls::operator()(ssl_ctx_st* context) const { ::SSL_CTX_free(context); }
 void Socket::FreeTls::operator()(ssl_st* tls) const { ::SSL_free(tls); }
 
-Socket::Socket(int fd, std::string name) : fd_(fd), name_(std::move(name)) {}
+Socket::Socket(int fd, std::string name, std::stop_token stop)
+    : fd_(fd), stop_(std::move(stop)), name_(std::move(name)) {}
 
 Socket::Socket(Socket&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
+      stop_(std::move(other.stop_)),
+      stop_end_(other.stop_end_),
       name_(std::move(other.name_)),
       context_(std::move(other.context_)),
       tls_(std::move(other.tls_)) {}
@@ -59,8 +62,10 @@ tl::unexpected<Error> Socket::Failed(std::string_view why) const {
   return MakeError(ErrorCode::kUnavailable, "Redis at {}: {}", name_, why);
 }
 
-Result<Socket> Socket::Connect(const Address& address, const std::string& ca_file, Deadline deadline) {
+Result<Socket> Socket::Connect(const Address& address, const std::string& ca_file, Deadline deadline,
+                               const std::stop_token& stop) {
   const std::string name = address.Text();
+  if (stop.stop_requested()) deadline = std::min(deadline, Clock::now() + kAfterStop);
   const auto found = Resolver::OfSystem().Resolve(address.host, address.port, deadline);
   if (!found) return MakeError(ErrorCode::kUnavailable, "Redis at {}: {}", name, found.error().message);
   std::string why = "the host has no address";
@@ -74,7 +79,7 @@ Result<Socket> Socket::Connect(const Address& address, const std::string& ca_fil
       why = ErrorText();
       continue;
     }
-    Socket socket(fd, name);
+    Socket socket(fd, name, stop);
     const int on = 1;
     ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     int error = ::connect(fd, reinterpret_cast<const sockaddr*>(one->data()), static_cast<socklen_t>(one->size())) == 0
@@ -138,9 +143,14 @@ Result<void> Socket::StartTls(const Address& address, const std::string& ca_file
 }
 
 Result<void> Socket::WaitFor(short events, Deadline deadline) const {
+  constexpr long long kLookAgain = 100;  // ms; whether the stop is requested
   while (true) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()).count();
+    const auto now = Clock::now();
+    if (!stop_end_ && stop_.stop_requested()) stop_end_ = now + kAfterStop;
+    const Deadline end = stop_end_ ? std::min(deadline, *stop_end_) : deadline;
+    long long left = std::chrono::ceil<std::chrono::milliseconds>(end - now).count();
     if (left <= 0) return Failed("did not reply in time; it is overloaded, stopped, or the network is slow");
+    if (!stop_end_ && stop_.stop_possible()) left = std::min(left, kLookAgain);
     pollfd wait{fd_, events, 0};
     const int ready = ::poll(&wait, 1, static_cast<int>(std::min<long long>(left, INT_MAX)));
     if (ready > 0) return {};

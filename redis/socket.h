@@ -4,7 +4,9 @@
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <string_view>
 
@@ -24,10 +26,14 @@ class Socket {
   // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The deadline includes the
   // look-up of the host's name (Resolver). kUnavailable: no server listens, the deadline passed, or the certificate
   // does not fit; kInvalidArgument: the file.
-  static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline);
+  // Once `stop` is requested, the waits for the peer end after kAfterStop, all together, even if a deadline is later.
+  static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline,
+                                const std::stop_token& stop = {});
   Socket(Socket&& other) noexcept;
   Socket& operator=(Socket&&) = delete;
   ~Socket();
+
+  static constexpr std::chrono::milliseconds kAfterStop{2'000};
 
   // kUnavailable: the connection ended, or the deadline passed. The socket cannot be used afterwards.
   Result<void> Write(std::string_view bytes, Deadline deadline);
@@ -40,7 +46,7 @@ class Socket {
   void Interrupt() const;
 
  private:
-  Socket(int fd, std::string name);
+  Socket(int fd, std::string name, std::stop_token stop);
   Result<void> StartTls(const Address& address, const std::string& ca_file, Deadline deadline);
   Result<void> WaitFor(short events, Deadline deadline) const;
   // After an operation of TLS that returned `result`: waits until it can be repeated.
@@ -53,7 +59,9 @@ class Socket {
   };
 
   int fd_ = -1;
-  std::string name_;  // the address for messages
+  std::stop_token stop_;
+  mutable std::optional<Deadline> stop_end_;  // once a wait has seen that the stop is requested
+  std::string name_;                          // the address for messages
   std::unique_ptr<ssl_ctx_st, FreeTls> context_;
   std::unique_ptr<ssl_st, FreeTls> tls_;
 };

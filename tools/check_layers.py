@@ -104,7 +104,7 @@ LIBRARIES = [
     Library("expected", r"tl/.*", r"."),
     Library("fmt", r"fmt/.*", r"."),
     Library("Highway", r"hwy/.*", r"(engine/(bound|geo|raster|tin)|proto/(error|mesh))/.*(\.cc|-inl\.h)"),
-    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"engine/(gdal|crs|raster|statistics|sources|image|export)/"),
+    Library("GDAL", r"(gdal|cpl|ogr|vrt)\w*\.h|(proj|geodesic)\.h", r"(engine/(gdal|crs|raster|statistics|sources|image|export)/|archive/files/bucket\.cc)"),
     Library("nlohmann_json", r"nlohmann/.*", r"(config/|engine/edits/|(archive|bake|fly|proto|server)/.*\.cc)"),
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),

@@ -11,6 +11,7 @@
 #include <tuple>
 #include <utility>
 
+#include "archive/files/bucket.h"
 #include "engine/common/content_hash.h"
 #include "engine/core/errno_text.h"
 
@@ -46,8 +47,24 @@ std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
 }
 
 std::string ParentOf(const std::string& path) {
+  if (IsBucket(path)) {
+    std::error_code error;
+    const std::string folder = std::filesystem::temp_directory_path(error).string();
+    return error ? "/tmp" : folder;
+  }
   const std::string folder = std::filesystem::path(path).parent_path().string();
   return folder.empty() ? "." : folder;
+}
+
+// A nameless file in a folder. `name`: one that it may have for a moment on file systems without nameless files. Below
+// 0: errno says why.
+int CreateNameless(const std::string& folder, const std::string& name) {
+  int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
+  if (descriptor >= 0) return descriptor;
+  std::string partial;
+  std::tie(descriptor, partial) = CreatePartial(name, O_RDWR);
+  if (descriptor >= 0) ::unlink(partial.c_str());
+  return descriptor;
 }
 
 Result<void> MakeFolder(const std::string& path) {
@@ -64,7 +81,7 @@ struct OutputFile::Impl {
   ~Impl() {
     if (descriptor < 0) return;
     ::close(descriptor);
-    ::unlink(partial.c_str());
+    if (!is_object) ::unlink(partial.c_str());
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -76,7 +93,8 @@ struct OutputFile::Impl {
   }
 
   const std::string path;
-  std::string partial;
+  std::string partial;  // of objects: the folder of the nameless file
+  bool is_object = false;
   dem::ContentHasher hasher;
   int descriptor = -1;
   std::uint64_t size = 0;
@@ -90,6 +108,13 @@ OutputFile::~OutputFile() = default;
 Result<OutputFile> OutputFile::Create(const std::string& path) {
   if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
   auto impl = std::make_unique<Impl>(path);
+  if (IsBucket(path)) {
+    impl->is_object = true;
+    impl->partial = ParentOf(path);
+    impl->descriptor = CreateNameless(impl->partial, impl->partial + "/terrace");
+    if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
+    return OutputFile(std::move(impl));
+  }
   std::tie(impl->descriptor, impl->partial) = CreatePartial(path, O_WRONLY);
   if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
   return OutputFile(std::move(impl));
@@ -112,6 +137,7 @@ Result<void> OutputFile::Skip(std::uint64_t bytes) {
 
 Result<void> OutputFile::Finish() {
   if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
+  if (impl_->is_object) return PutFile(impl_->descriptor, impl_->path);
   if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);
   if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
   ::close(std::exchange(impl_->descriptor, -1));
@@ -156,13 +182,8 @@ SpoolFile::~SpoolFile() {
 Result<SpoolFile> SpoolFile::Create(const std::string& path) {
   if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
   const std::string folder = ParentOf(path);
-  int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
-  if (descriptor < 0) {  // a file system without nameless files
-    std::string name;
-    std::tie(descriptor, name) = CreatePartial(path, O_RDWR);
-    if (descriptor < 0) return CannotWrite(name, errno);
-    ::unlink(name.c_str());
-  }
+  const int descriptor = CreateNameless(folder, IsBucket(path) ? folder + "/terrace" : path);
+  if (descriptor < 0) return CannotWrite(path, errno);
   return SpoolFile(descriptor, folder);
 }
 

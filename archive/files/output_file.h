@@ -1,4 +1,5 @@
-// Writes a file that is complete or absent: under another name, then renamed.
+// Writes a file that is complete or absent: under another name, then renamed; or an object of a bucket, put when it is
+// complete.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,8 @@ inline constexpr std::string_view kPartial = ".partial";
 // kUnavailable: the file cannot be written; the message names it and the reason. Used by one thread at a time.
 class OutputFile {
  public:
-  // Creates the folders of `path`. Unfinished files have unique names: several may write the same file at a time.
+  // Creates the folders of `path`. Objects of buckets (IsBucket) wait in a nameless file of TMPDIR, else /tmp.
+  // Unfinished files have unique names: several may write the same file at a time.
   static Result<OutputFile> Create(const std::string& path);
   ~OutputFile();  // removes an unfinished file
   OutputFile(OutputFile&&) noexcept;
@@ -41,7 +43,8 @@ class OutputFile {
 // Writes a file without waiting for the disk: for many small files. Makes its folder. kUnavailable: as OutputFile.
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
 
-// An unnamed temporary file in the folder of `path`. The system removes it when the process ends.
+// An unnamed temporary file in the folder of `path`, or in that of temporary files if the path is in a bucket. The
+// system removes it when the process ends.
 class SpoolFile {
  public:
   static Result<SpoolFile> Create(const std::string& path);

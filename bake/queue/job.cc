@@ -59,6 +59,7 @@ Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place) {
   redis::ConnectionOptions options;
   options.connect_timeout = options.command_timeout = place.timeout;
   options.ca_file = place.ca_file;
+  options.stop = place.stop;
   auto connection = redis::Connection::Open(place.address, options);
   if (!connection) return connection;
   if (auto checked = CheckVersion(**connection, place); !checked) return tl::unexpected(checked.error());

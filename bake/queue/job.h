@@ -4,6 +4,7 @@
 #include <chrono>
 #include <initializer_list>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ struct JobPlace {
   std::string name;
   // For connecting, and for each call. A Redis that replies a second late is slow but works.
   std::chrono::milliseconds timeout{10'000};
+  std::stop_token stop = {};  // as in redis::ConnectionOptions
 
   std::string Key(const std::string& what) const;
 };

@@ -41,7 +41,9 @@ RedisQueue::RedisQueue(RedisQueueOptions options) : options_(std::move(options))
   for (std::size_t i = 0; i < options_.units.size(); ++i) index_.emplace(options_.units[i], i);
 }
 
-RedisQueue::~RedisQueue() {
+RedisQueue::~RedisQueue() { Leave(); }
+
+bool RedisQueue::Leave() {
   beat_ = {};
   std::vector<std::size_t> left;
   {
@@ -54,9 +56,13 @@ RedisQueue::~RedisQueue() {
     if (finish_) {
       Send(*finish_, scripts::kGiveBack, {scripts::kFinishUnit, options_.worker, "", "0", Millis(lease_)});
     }
+    finish_.reset();
   }
   const std::lock_guard calls(calls_);
-  Flush();
+  const bool is_given_back = Flush().has_value();
+  const std::lock_guard lock(mutex_);
+  outbox_.clear();
+  return is_given_back;
 }
 
 Result<void> RedisQueue::Connect() {
@@ -156,7 +162,7 @@ void RedisQueue::NoteAway(const Error& why) {
   next_connect_ = now + kPauseWithoutRedis;
   if (!away_since_) {
     away_since_ = now;
-    if (options_.on_message) {
+    if (options_.on_message && !options_.place.stop.stop_requested()) {
       options_.on_message(fmt::format("{}; waiting for it up to {} s", why.message, options_.patience.count() / 1000));
     }
   }
@@ -364,12 +370,14 @@ void RedisQueue::Beat() {
   }
 }
 
-void RedisQueue::Flush() {
+Result<void> RedisQueue::Flush() {
   const bool is_empty = [&] {
     const std::lock_guard lock(mutex_);
     return outbox_.empty();
   }();
-  if (!is_empty) (void)Exchange({"PING"});
+  if (is_empty) return {};
+  if (const auto pong = Exchange({"PING"}); !pong) return tl::unexpected(pong.error());
+  return {};
 }
 
 milliseconds RedisQueue::Lease() const {
@@ -389,7 +397,7 @@ Error RedisQueue::Why() const {
 
 Result<std::vector<DeadUnit>> RedisQueue::Dead() {
   const std::lock_guard calls(calls_);
-  Flush();
+  (void)Flush();
   if (!connection_) {
     if (auto connected = Connect(); !connected) return tl::unexpected(connected.error());
   }
@@ -404,7 +412,7 @@ void RedisQueue::Finished() {
     finish_.reset();
     end_ = End::kFinished;
   }
-  Flush();
+  (void)Flush();
 }
 
 void RedisQueue::AddMissing(const std::vector<std::size_t>& units) {

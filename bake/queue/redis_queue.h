@@ -44,7 +44,7 @@ class RedisQueue : public UnitQueue {
   // tries them again. kInvalidArgument: the job bakes something else; the message says what differs. Errors of
   // ConnectToJob.
   static Result<std::unique_ptr<RedisQueue>> Join(RedisQueueOptions options);
-  // Gives back the units that were not done.
+  // Leaves.
   ~RedisQueue() override;
 
   Taken Take() override;
@@ -64,6 +64,9 @@ class RedisQueue : public UnitQueue {
   Error Why() const;
   // The units that were given up.
   Result<std::vector<DeadUnit>> Dead();
+  // Gives back the units that were not done, and makes no call afterwards. False: Redis does not reply, so that others
+  // get them when their lease has ended. Called when no other call is under way.
+  bool Leave();
   // After kFinish: the manifest is written.
   void Finished();
   // After kFinish: these units are absent although they were done. The job continues with them.
@@ -92,7 +95,7 @@ class RedisQueue : public UnitQueue {
   std::optional<Taken> Accept(const redis::ReplyView& reply);
   Taken WaitOrOver();
   void EndBecause(End end, const Error& why);
-  void Flush();
+  Result<void> Flush();
   // Takes over the job's values in Redis.
   void SetJob(const std::string& incarnation, std::chrono::milliseconds lease);
   std::string Incarnation() const;

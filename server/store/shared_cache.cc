@@ -103,6 +103,7 @@ class SharedCache final : public tiler::TileStore {
 
   // Bytes of a value in addition to the tile's.
   static constexpr std::size_t kRecordBytes = 512;
+  static constexpr int kLeasesOff = 10;  // lease times
 
  private:
   std::optional<tiler::EncodedTile> Read(const std::string& record_key) {
@@ -115,9 +116,12 @@ class SharedCache final : public tiler::TileStore {
   }
 
   // If another server builds the tile, waits for it, at most for the time of a lease. Returns nothing if this server is
-  // to build it.
+  // to build it. After a wait in vain there are no others for a while: if Redis says of every lease that it is held, or
+  // many servers are killed, a wait in ten lease times is lost and not one for each tile.
   std::optional<tiler::EncodedTile> AwaitOther(const std::string& record_key) {
-    const auto end = std::chrono::steady_clock::now() + lease_;
+    using Clock = std::chrono::steady_clock;
+    if (Clock::now().time_since_epoch().count() < no_leases_until_) return std::nullopt;
+    const auto end = Clock::now() + lease_;
     milliseconds pause{1};
     while (true) {
       const SharedTier::Lease lease = tier_.Take(record_key, lease_);
@@ -128,7 +132,11 @@ class SharedCache final : public tiler::TileStore {
         if (tile) tier_.Release(record_key);
         return tile;
       }
-      if (is_abandoned_ || std::chrono::steady_clock::now() + pause >= end) return std::nullopt;
+      if (is_abandoned_) return std::nullopt;
+      if (Clock::now() + pause >= end) {
+        no_leases_until_ = (Clock::now() + kLeasesOff * lease_).time_since_epoch().count();
+        return std::nullopt;
+      }
       std::this_thread::sleep_for(pause);
       pause = std::min(2 * pause, milliseconds(20));
       if (std::optional<tiler::EncodedTile> tile = Read(record_key)) return tile;
@@ -141,6 +149,8 @@ class SharedCache final : public tiler::TileStore {
   LookUpGate gate_;
   std::atomic<std::uint64_t> not_asked_{0};
   std::atomic<bool> is_abandoned_{false};
+  std::atomic<std::chrono::steady_clock::rep> no_leases_until_{
+      std::chrono::steady_clock::time_point::min().time_since_epoch().count()};
   SharedTier tier_;
 };
 

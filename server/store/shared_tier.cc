@@ -16,6 +16,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kWriteTimeout{1'000}, kLastWrites{500};
 constexpr milliseconds kReportAgain{60'000};
+constexpr std::size_t kMaxReports = 4;  // within kReportAgain: reasons may take turns, or contain random bytes
 constexpr std::size_t kBatchBytes = std::size_t{1} << 20, kBatchValues = 64;
 constexpr std::size_t kChecksumBytes = 8;
 constexpr std::size_t kScanReplyBytes = std::size_t{64} << 20;  // names of keys: COUNT of SCAN is only a hint
@@ -111,12 +112,15 @@ void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
   changed_.notify_all();
 }
 
-// `mutex_` is held. A Redis that fails every second makes a line a minute.
+// `mutex_` is held. A Redis that fails every second for one reason makes a line a minute.
 void SharedTier::Report(const std::string& why, bool is_off) {
   const auto now = Clock::now();
-  if (why == reported_ && now - reported_at_ < kReportAgain) return;
-  reported_ = why;
-  reported_at_ = now;
+  if (now - reported_at_ >= kReportAgain) {
+    reported_.clear();
+    reported_at_ = now;
+  }
+  if (reported_.size() >= kMaxReports || std::ranges::find(reported_, why) != reported_.end()) return;
+  reported_.push_back(why);
   if (is_off) {
     spdlog::warn("shared cache: {}; it is switched off until Redis answers, tiles are built meanwhile", why);
   } else {

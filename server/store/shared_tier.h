@@ -127,8 +127,8 @@ class SharedTier {
   std::size_t queued_bytes_ = 0;
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
-  std::string reported_;                         // the last reason in the log
-  Clock::time_point reported_at_, answered_at_;  // when the log last reported a failure; that Redis answers
+  std::vector<std::string> reported_;            // the reasons in the log since reported_at_
+  Clock::time_point reported_at_, answered_at_;  // when the log first reported one of them; that Redis answers
 
   ConnectionPtr writer_;          // of the store's thread
   Clock::time_point written_at_;  // when the writer was used last

@@ -319,6 +319,11 @@ class Bake(unittest.TestCase):
         (other / "photo.jpg").write_text("x")
         file = self.scratch / "a-file"
         file.write_text("x")
+        loop = self.scratch / "loop"
+        loop.symlink_to(loop)
+        done = self.run_bake("--out", loop)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"{loop}: cannot be created: Too many levels of symbolic links; give a folder", done.stderr)
         shutil.copytree(self.reference, self.place("reference"))
         reference = self.place("reference")
         for arguments, levels, said in (
@@ -341,7 +346,7 @@ class Bake(unittest.TestCase):
                 (("--out", other, "--error", "1", "--fraction", "1"), "0-9", "exclude each other"),
                 (("--out", other, "--extensions", "watermask"), "0-9", "no water"),
                 (("--out", other, "--update", other), "0-9", "same place"),
-                (("--out", "/vsis3/bucket/place"), "0-9", "a folder of this machine"),
+                (("--out", "/vsis3/bucket/place", "--form", "single"), "0-9", "a folder of this machine"),
                 ((), "0-9", "--out PLACE"),
         ):
             with self.subTest(arguments=arguments, levels=levels):

@@ -98,10 +98,14 @@ class QueueFaults(QueueCase):
         worker.stdout.readline()
         self.redis("XADD", self.key("units"), "*", "unit", "terrain/7-999-1")
         self.redis("XADD", self.key("units"), "*", "what", "else")
-        self.redis("XADD", self.key("units"), "*", "unit", "x" * 100_000)
+        self.redis("XADD", self.key("units"), "*", "unit", "\x1b[2J" + "x" * 100_000)
         out, errors = self.end(worker, 1)
         self.assertIn("unit terrain/7-999-1 failed: is no unit of this job", errors)
         self.assertIn("3 of 17 units failed", errors)
+        listed = errors + self.status(code=1)
+        self.assertIn("unit \\x1b[2Jxxx", listed)
+        self.assertNotIn("\x1b", listed)
+        self.assertLess(len(listed), 5000)
         self.run_bake(place)
         self.expect_equal(place)
         for key in ("job", "units", "dead"):
@@ -178,6 +182,28 @@ class QueueFaults(QueueCase):
             self.assertTrue(other.returncode == 0 or "closed the connection" in errors, errors)
             self.end(steady)
             self.expect_equal(place)
+
+    def test_a_worker_ends_while_redis_is_frozen(self):
+        silent = Listener(lambda connection: connection.recv(4096) and time.sleep(600))
+        self.addCleanup(silent.close)
+        place = self.place("silent")
+        worker = self.start(place, "--queue-timeout", 3600, url=silent.url)  # the test would wait for an hour
+        until = time.monotonic() + 60
+        while not any(name.endswith(".lock") for name in files_of(place)):
+            self.assertLess(time.monotonic(), until)
+            time.sleep(0.01)
+        worker.send_signal(signal.SIGTERM)
+        self.end(worker, 143)
+        place = self.place()
+        worker = self.start(place, "--queue-timeout", 3600, lease=600)
+        worker.stdout.readline()
+        self.redis.process.send_signal(signal.SIGSTOP)
+        worker.send_signal(signal.SIGTERM)
+        _, errors = self.end(worker, 143)
+        self.redis.process.send_signal(signal.SIGCONT)
+        self.assertIn("Redis does not reply, so other workers get its units when their lease has ended", errors)
+        self.assertNotIn("waiting for it", errors)
+        self.assertEqual([name for name in files_of(place) if name.endswith((".partial", ".lock"))], [])
 
     def test_the_password_is_seen_nowhere(self):
         self.redis = self.start_redis("locked", "--requirepass", "open-sesame")

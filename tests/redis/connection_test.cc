@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <functional>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -123,6 +124,49 @@ TEST(RedisConnection, ErrorsOfTheServerSayTheRemedyAndNoArgument) {
   expect("LOADING Redis is loading", ErrorCode::kUnavailable, "soon");
   expect("ERR unknown command `GET`", ErrorCode::kInvalidArgument, "does not know GET");
   expect("ERR something", ErrorCode::kUnavailable, "refuses GET (ERR)");
+  expect("ERR max number of clients reached", ErrorCode::kUnavailable, "maxclients");
+  expect("MOVED 3999 10.0.0.7:6381", ErrorCode::kInvalidArgument, "node of a cluster");
+  expect("CLUSTERDOWN Hash slot not served", ErrorCode::kInvalidArgument, "node of a cluster");
+  expect("MASTERDOWN Link with MASTER is down", ErrorCode::kUnavailable, "URL of the primary");
+  expect("BUSY Redis is busy running a script", ErrorCode::kUnavailable, "script");
+  expect("\x1b[2J" + std::string(50'000, 'x'), ErrorCode::kUnavailable, "refuses GET ()");
+}
+
+// A Redis without room for another client says so before it has read anything, and closes the connection.
+TEST(RedisConnection, ARedisWithoutRoomForAClientIsNoWrongPassword) {
+  for (const bool has_password : {false, true}) {
+    const FakeServer server([](int fd) {
+      Send(fd, "-ERR max number of clients reached\r\n");
+      Receive(fd);
+    });
+    Address address = server.address();
+    if (has_password) address.password = "secret";
+    address.database = 3;
+    const auto connection = Connection::Open(address, Quick());
+    ASSERT_FALSE(connection);
+    EXPECT_EQ(connection.error().code, ErrorCode::kUnavailable);
+    EXPECT_NE(connection.error().message.find("maxclients"), std::string::npos) << connection.error().message;
+  }
+}
+
+TEST(RedisConnection, AStopEndsItsWaits) {
+  const FakeServer server([](int fd) {
+    Receive(fd);
+    Send(fd, kGreeting);
+    while (!Receive(fd).empty()) {
+    }
+  });
+  std::stop_source stop;
+  ConnectionOptions options;
+  options.connect_timeout = options.command_timeout = std::chrono::hours(1);
+  options.stop = stop.get_token();
+  auto connection = Connection::Open(server.address(), options);
+  ASSERT_TRUE(connection) << connection.error().message;
+  const std::jthread stops([&] {
+    std::this_thread::sleep_for(milliseconds(50));
+    stop.request_stop();
+  });
+  EXPECT_FALSE((*connection)->Call({"GET", "a"}));  // the test would wait for an hour
 }
 
 TEST(RedisConnection, PeersThatAreNoRedisAreRefused) {

@@ -125,7 +125,11 @@ class Deploy(unittest.TestCase):
         config = json.loads((ROOT / "deploy/kubernetes/terrace.json").read_text())
         pod = next(m for m in manifests() if m["kind"] == "Deployment")["spec"]["template"]["spec"]
         container = pod["containers"][0]
+        # A pod must not replace another while it has only some of the datasets: /readyz would be 200 then.
+        started = container["startupProbe"]["httpGet"]["path"]
+        self.assertIn(started, [f"/{dataset['name']}/layer.json" for dataset in config["datasets"]])
         readiness = container["readinessProbe"]
+        self.assertEqual(readiness["httpGet"]["path"], "/readyz")
         self.assertGreater(config["drain_delay_s"], readiness["periodSeconds"] * readiness["failureThreshold"] + readiness["timeoutSeconds"])
         self.assertGreater(pod["terminationGracePeriodSeconds"], config["drain_delay_s"] + config["drain_timeout_s"] + 1)
         self.assertIn(f":{container['ports'][0]['containerPort']}", config["listen"])

@@ -9,8 +9,10 @@ import json
 import os
 import pathlib
 import random
+import re
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -352,6 +354,26 @@ class SharedCache(unittest.TestCase):
             redis.ask(b"SET", key.replace(b"terrace:tile:", b"terrace:lease:"), b"1")  # of nobody, and without an end
             redis.ask(b"DEL", key)
         self.assertEqual(self.bodies_of(node), self.truth)
+
+    def test_leases_that_are_always_held_cost_one_wait_now_and_then(self):
+        redis = self.redis()
+        proxy = self.proxy(redis)
+        node = self.node(proxy.port, lease_ms=1000)
+        monitor = self.stack.enter_context(socket.create_connection(("127.0.0.1", redis.port), 30))
+        monitor.sendall(b"MONITOR\r\n")
+        proxy.change = lambda piece: piece.replace(b"+OK\r\n", b"$-1\r\n")  # another holds the lease
+        begun = time.monotonic()
+        self.assertEqual(self.bodies_of(node), self.truth)
+        waits = 1 + (time.monotonic() - begun) / 11  # after a wait of a second there are no leases for ten
+        proxy.close()
+        redis.stop()
+        commands = b""
+        with contextlib.suppress(ConnectionError):
+            while piece := monitor.recv(1 << 16):
+                commands += piece
+        leases = set(re.findall(rb'"SET" "(terrace:lease:[^ ]*)', commands))
+        self.assertGreater(len(leases), 0)
+        self.assertLessEqual(len(leases), waits)
 
     def test_a_purge_erases_there_too(self):
         redis = self.redis()

@@ -46,7 +46,10 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
       ->type_name("FILE");
   command.add_option("--dataset", arguments.dataset, "The dataset of the configuration that is baked")
       ->type_name("NAME");
-  command.add_option("-o,--out", arguments.out, "Where the bake goes: a folder, or for --form single and 3tz a file")
+  command
+      .add_option(
+          "-o,--out", arguments.out,
+          "Where the bake goes: a folder, a bucket such as /vsis3/BUCKET/FOLDER, or for --form single and 3tz a file")
       ->type_name("PLACE");
   command
       .add_option("--into-cache", arguments.into_cache,

@@ -16,6 +16,7 @@
 #include "archive/files/input_file.h"
 #include "bake/find_missing.h"
 #include "bake/queue/redis_queue.h"
+#include "engine/gdal/source_policy.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
 #include "tiler/encoder_version.h"
@@ -63,6 +64,7 @@ Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
   const archive::Manifest& manifest = bake.targets.front().manifest;
   bake::RedisQueueOptions options;
   options.place = *std::move(place);
+  options.place.stop = bake.options.stop;
   for (const auto& [what, value] : bake.identity.fields) options.identity.emplace_back(what, value);
   options.identity.emplace_back("program", manifest.product);
   options.identity.emplace_back("encoders and libraries", manifest.encoder);
@@ -110,8 +112,8 @@ int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
   const auto dead = queue.Dead();
   if (!dead) return Fail(dead.error());
   for (const bake::DeadUnit& unit : *dead) {
-    PrintMessage(fmt::format("unit {} failed: {} (handed out {} times, last to {})", unit.unit, unit.why,
-                             unit.deliveries, unit.worker));
+    PrintMessage(fmt::format("unit {} failed: {} (handed out {} times, last to {})", Shown(unit.unit), Shown(unit.why),
+                             unit.deliveries, Shown(unit.worker)));
   }
   PrintMessage(
       fmt::format("job {} is incomplete: {} of {} units failed, the others are done, and there is no manifest; "
@@ -135,6 +137,11 @@ Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments) {
   place.name = arguments.job;
   place.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(arguments.queue_timeout * 1000));
   return place;
+}
+
+std::string Shown(const std::string& text) {
+  constexpr std::size_t kMaxBytes = 200;
+  return dem::EscapeControls(text.size() <= kMaxBytes ? text : text.substr(0, kMaxBytes) + "...");
 }
 
 std::string WorkerName() {
@@ -169,7 +176,10 @@ int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<
     }
     std::ranges::move(taken, std::back_inserter(reports));
     if (bake.options.stop.stop_requested()) {
-      PrintMessage("stopped: other workers have its units now; run the same command again to go on");
+      PrintMessage((*queue)->Leave()
+                       ? "stopped: other workers have its units now; run the same command again to go on"
+                       : "stopped: Redis does not reply, so other workers get its units when their lease has ended; "
+                         "run the same command again to go on");
       return kExitFailure;
     }
     switch ((*queue)->end()) {

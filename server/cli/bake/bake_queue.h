@@ -16,6 +16,10 @@ namespace terrace::cli {
 // The place of the job, with its credentials. kInvalidArgument: the flags are wrong; the message has no secret.
 Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments);
 
+// What Redis says of a unit or a worker, for people: anybody may have written it. At most 200 bytes, without control
+// characters.
+std::string Shown(const std::string& text);
+
 // A new name at each call: host, process and a random number, because processes of several containers may have equal
 // numbers.
 std::string WorkerName();

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "archive/files/bucket.h"
 #include "archive/files/input_file.h"
 #include "bake/cell_list.h"
 #include "bake/estimate.h"
@@ -64,11 +65,19 @@ int PlanFromCells(const BakeArguments& arguments, const bake::BakeRequest& reque
   return kExitOk;
 }
 
-Result<tiler::Dataset> OpenDataset(const BakeInput& input, const StopSignals& signals) {
-  const Result<void> policy = input.config.datasets.empty()
-                                  ? dem::AllowVrts()
-                                  : dem::SetSourcePolicy({input.config.data_roots, input.config.allowed_prefixes,
-                                                          input.config.allowed_drivers});
+// Whoever names a bucket in the command line allows it.
+Result<void> SetPolicy(const BakeArguments& arguments, const config::Config& config) {
+  dem::SourcePolicy policy{config.data_roots, config.allowed_prefixes, config.allowed_drivers};
+  for (const std::string& place : {arguments.out, arguments.update}) {
+    if (!archive::IsBucket(place)) continue;
+    archive::LimitRequests();
+    policy.prefixes.push_back(place + "/");
+  }
+  return config.datasets.empty() && policy.prefixes.empty() ? dem::AllowVrts() : dem::SetSourcePolicy(policy);
+}
+
+Result<tiler::Dataset> OpenDataset(const BakeArguments& arguments, const BakeInput& input, const StopSignals& signals) {
+  const Result<void> policy = SetPolicy(arguments, input.config);
   if (!policy) return tl::unexpected(policy.error());
   if (const auto readable = CheckReadable(input.dataset); !readable) return tl::unexpected(readable.error());
   if (const auto allowed = CheckSourcePolicy(input.dataset); !allowed) return tl::unexpected(allowed.error());
@@ -106,9 +115,12 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
 Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
   for (bake::Target& target : targets) {
     const std::string folder = bake::ArchivePlace(place, target.manifest, false);
-    std::error_code ignored;
-    target.old_place = std::filesystem::exists(folder + "/" + archive::kManifestFile, ignored) ? folder : place;
-    auto manifest = archive::ReadManifest(target.old_place);
+    target.old_place = folder;
+    auto manifest = archive::ReadManifest(folder);
+    if (!manifest && manifest.error().code == ErrorCode::kNotFound) {
+      target.old_place = place;
+      manifest = archive::ReadManifest(place);
+    }
     if (!manifest) return MakeError(manifest.error().code, "--update: {}", manifest.error().message);
     if (manifest->units.empty()) {
       return MakeError(ErrorCode::kInvalidArgument, "--update {}: is one file without units; give a bake in chunks",
@@ -332,8 +344,14 @@ std::string WrongTogether(const BakeArguments& arguments) {
   }
   if (given(arguments.codings)) return "--codings is for --into-cache";
   if (!arguments.dry_run && !given(arguments.out)) return "--out PLACE is missing: where the bake goes";
-  if (arguments.out.starts_with("/vsi")) {
-    return "--out: a bake is written into a folder of this machine; copy it to a bucket when it is complete";
+  if (arguments.out.starts_with("/vsi") && !archive::IsBucket(arguments.out)) {
+    return "--out: a bake is written into a folder, or into a bucket such as /vsis3/BUCKET/FOLDER";
+  }
+  if (archive::IsBucket(arguments.out) && arguments.form != kChunks) {
+    return fmt::format(
+        "--form {} is written into a folder of this machine; copy it to the bucket when it is complete, "
+        "or bake chunks there",
+        arguments.form);
   }
   if (given(arguments.queue) != given(arguments.job)) return "--queue and --job belong together: give both";
   if (given(arguments.queue) && (given(arguments.shard) || arguments.finish)) {
@@ -358,7 +376,11 @@ std::string WrongTogether(const BakeArguments& arguments) {
 
 }  // namespace
 
-int Bake(const BakeArguments& arguments) {
+int Bake(const BakeArguments& given) {
+  BakeArguments arguments = given;
+  for (std::string* const place : {&arguments.out, &arguments.update}) {  // "a//b" is another object than "a/b"
+    while (archive::IsBucket(*place) && place->ends_with('/')) place->pop_back();
+  }
   tiler::BuildId();  // before GDAL loads further libraries, as the server takes it: it is part of the keys of a cache
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
@@ -380,7 +402,7 @@ int Bake(const BakeArguments& arguments) {
   const auto input = InputOf(arguments, errors);
   if (!errors.empty()) return Report(errors);
   if (!input) return Fail(input.error());
-  auto dataset = OpenDataset(*input, signals);
+  auto dataset = OpenDataset(arguments, *input, signals);
   if (signals.signal() != 0) return StopCode(signals);
   if (!dataset) return cli::Fail(dataset.error().message, kExitFailure);
   const auto manifests = bake::PlanArchives(*dataset, *request, "terrace " TERRACE_VERSION);

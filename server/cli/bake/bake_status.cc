@@ -54,21 +54,21 @@ std::string StatusJson(const bake::JobStatus& status, const std::string& job) {
 }
 
 std::string StatusText(const bake::JobStatus& status, const std::string& job) {
-  std::string text = fmt::format("job {}: {}; {} of {} units done, {} running, {} waiting, {} dead", job, status.state,
-                                 Grouped(status.done), Grouped(status.units), Grouped(status.running.size()),
-                                 Grouped(status.waiting), Grouped(status.dead.size()));
+  std::string text = fmt::format("job {}: {}; {} of {} units done, {} running, {} waiting, {} dead", job,
+                                 Shown(status.state), Grouped(status.done), Grouped(status.units),
+                                 Grouped(status.running.size()), Grouped(status.waiting), Grouped(status.dead.size()));
   const auto out = std::back_inserter(text);
   if (status.units_per_hour > 0) fmt::format_to(out, "; {:.0f} units/h", status.units_per_hour);
   if (status.seconds_left >= 0) fmt::format_to(out, ", {} left", Duration(status.seconds_left));
   text += '\n';
   for (const auto& one : status.running) {
-    fmt::format_to(out, "  {:<28} {:<24} {:>8}{}{}\n", one.worker, one.unit, Duration(one.seconds),
+    fmt::format_to(out, "  {:<28} {:<24} {:>8}{}{}\n", Shown(one.worker), Shown(one.unit), Duration(one.seconds),
                    one.deliveries > 1 ? fmt::format(", delivery {}", one.deliveries) : "",
                    one.silent_seconds > status.lease_seconds
                        ? fmt::format(", not heard of for {}", Duration(one.silent_seconds))
                        : "");
   }
-  for (const auto& one : status.dead) fmt::format_to(out, "  dead: {}: {}\n", one.unit, one.why);
+  for (const auto& one : status.dead) fmt::format_to(out, "  dead: {}: {}\n", Shown(one.unit), Shown(one.why));
   return text;
 }
 

@@ -64,6 +64,13 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
     return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
                        folder.empty() ? "." : folder);
   }
+  if (written.starts_with("/vsi") && !place.has_extension()) {
+    return fmt::format(
+        "{} has no extension, so it is no raster; name an archive in a bucket in a configuration: \"baked\": \"{}\", "
+        "and "
+        "its bucket in allowed_prefixes",
+        written, written);
+  }
   if (written.ends_with(".json")) {
     return fmt::format("{} looks like a configuration: terrace serve --config {}", written, written);
   }

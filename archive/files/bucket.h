@@ -1,0 +1,32 @@
+// Objects of a bucket, written, listed and removed through GDAL's file systems (/vsis3/, /vsigs/ ...). Read them with
+// InputFile. The source policy decides which names are allowed.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+
+namespace terrace::archive {
+
+// Whether a place is in one of GDAL's file systems that can be written.
+bool IsBucket(const std::string& place);
+
+// For programs that write to buckets, before the first request: requests that the store refuses for want of time are
+// repeated, and those that stand still for 20 s end. GDAL waits for ever by default.
+void LimitRequests();
+
+// Writes an object that is there as a whole or not at all: one request, or an upload in parts that is completed at the
+// end. `descriptor`: a file, read from its beginning. kInvalidArgument: the policy does not allow the name.
+// kUnavailable: the store refuses it, or does not answer; the message says why.
+Result<void> PutFile(int descriptor, const std::string& object);
+Result<void> PutText(std::string_view text, const std::string& object);
+
+// The names directly below a folder. A folder that cannot be listed is as one without names.
+std::vector<std::string> NamesInBucket(const std::string& folder);
+
+// An object that is not there is no error; others are ignored as well.
+void RemoveObject(const std::string& object);
+
+}  // namespace terrace::archive

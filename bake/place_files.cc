@@ -1,0 +1,96 @@
+#include "bake/place_files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "archive/files/bucket.h"
+#include "archive/files/input_file.h"
+
+namespace terrace::bake {
+
+namespace fs = std::filesystem;
+
+std::string HostName() {
+  std::array<char, 256> name{};
+  if (::gethostname(name.data(), name.size() - 1) != 0) return "unknown";
+  return name.data();
+}
+
+std::string OwnPartial(const std::string& file) {
+  return fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
+}
+
+bool Exists(const fs::path& file) {
+  std::error_code ignored;
+  return archive::IsBucket(file.string()) ? archive::InputFile::Open(file.string()).has_value()
+                                          : fs::exists(file, ignored);
+}
+
+std::string ReadText(const fs::path& file) {
+  if (archive::IsBucket(file.string())) {
+    constexpr std::uint64_t kMaxBytes = std::uint64_t{1} << 20;
+    return archive::ReadFile(file.string(), kMaxBytes).value_or("");
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+Result<std::vector<std::string>> NamesIn(const fs::path& folder) {
+  if (archive::IsBucket(folder.string())) return archive::NamesInBucket(folder.string());
+  std::error_code error;
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder, error)) names.push_back(entry.path().filename().string());
+  if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", folder.string(), error.message());
+  return names;
+}
+
+void Remove(const fs::path& file) {
+  std::error_code ignored;
+  if (archive::IsBucket(file.string())) return archive::RemoveObject(file.string());
+  fs::remove(file, ignored);
+}
+
+Result<bool> CreateFile(const std::string& file, const std::string& content) {
+  const auto why = [](int error) {
+    return MakeError(ErrorCode::kUnavailable, "{}", std::generic_category().message(error));
+  };
+  if (archive::IsBucket(file)) {
+    const auto there = archive::InputFile::Open(file);
+    if (there) return false;
+    if (there.error().code != ErrorCode::kNotFound) return tl::unexpected(there.error());
+    if (auto put = archive::PutText(content + '\n', file); !put) return tl::unexpected(put.error());
+    return true;
+  }
+  const std::string own = OwnPartial(file);
+  {
+    std::ofstream out(own, std::ios::binary);
+    out << content << '\n';
+    out.flush();
+    if (!out) {
+      const int error = errno != 0 ? errno : EIO;
+      ::unlink(own.c_str());
+      return why(error);
+    }
+  }
+  int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
+  if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links
+    const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+    error = made < 0 ? errno : 0;
+    if (made >= 0) ::close(made);
+    if (error == 0 && ::rename(own.c_str(), file.c_str()) != 0) error = errno;
+  }
+  ::unlink(own.c_str());
+  if (error == 0) return true;
+  if (error == EEXIST) return false;
+  return why(error);
+}
+
+}  // namespace terrace::bake

@@ -1,0 +1,239 @@
+"""`terrace bake` into a bucket, with a store of this folder: bucket_test.py BINARY."""
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+import urllib.request
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
+import in_parallel  # noqa: E402
+from fake_s3 import FakeS3  # noqa: E402
+from redis_process import Redis, free_port  # noqa: E402
+from srtm import write_hgt  # noqa: E402
+
+BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
+PLACE, BELOW = "/vsis3/terrain/maps/alps", "terrain/maps/alps"
+UNIT = "units/7-132-96.pmtiles"
+
+
+class Bucket(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.scratch = pathlib.Path(scratch.name)
+        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
+        cls.config = cls.scratch / "dems/terrace.json"
+        cls.config.parent.mkdir()
+        for cell in ("N46E006", "N46E012"):
+            write_hgt(cls.config.parent / f"{cell}.hgt")
+        cls.config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
+        done = subprocess.run(cls.command(cls.scratch / "reference"), env=cls.environment, text=True, stderr=subprocess.PIPE)
+        assert done.returncode == 0, done.stderr
+        cls.reference = {file.relative_to(cls.scratch / "reference").as_posix(): file.read_bytes()
+                         for file in (cls.scratch / "reference").rglob("*") if file.is_file()}
+
+    @classmethod
+    def command(cls, place, *arguments, levels="0-11"):
+        return [str(part) for part in (BINARY, "bake", "--config", cls.config, "--levels", levels, "--out", place, "--threads", 1, *arguments)]
+
+    def setUp(self):
+        self.store = FakeS3()
+        self.addCleanup(self.store.close)
+
+    def start(self, *arguments, place=PLACE, environment=None, before=(), **options):
+        process = subprocess.Popen([*before, *self.command(place, *arguments, **options)], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   env={**self.environment, **self.store.environment(), **(environment or {})})
+
+        def end():
+            if process.poll() is None:
+                process.kill()
+            process.communicate()
+        self.addCleanup(end)
+        return process
+
+    def bake(self, *arguments, code=0, **options):
+        process = self.start(*arguments, **options)
+        out, errors = process.communicate(timeout=150)
+        self.assertEqual(process.returncode, code, errors)
+        self.assertNotIn("a-secret-key", out + errors)
+        return out, errors
+
+    def files(self, place=BELOW):
+        return self.store.files(place)
+
+    def expect_all(self, place=BELOW):
+        files = self.files(place)
+        self.assertEqual(set(files), set(self.reference))
+        self.assertEqual([name for name in files if files[name] != self.reference[name]], [])
+
+    def outcomes(self, out):
+        return sorted(line["outcome"] for line in map(json.loads, out.splitlines()) if "unit" in line)
+
+    def test_objects_are_the_files_of_a_folder_and_are_served(self):
+        self.bake(place=PLACE + "/")
+        self.expect_all()
+        out, _ = self.bake("--json")
+        self.assertEqual(self.outcomes(out), ["kept"] * 9)
+        self.expect_all()
+        port = free_port()
+        environment = {**self.environment, **self.store.environment()}
+        config = self.scratch / "baked.json"
+        config.write_text(json.dumps({"listen": f"127.0.0.1:{port}", "allowed_prefixes": ["/vsis3/terrain/"],
+                                      "datasets": [{"name": "cells", "baked": PLACE}]}))
+        refused = subprocess.run([BINARY, "serve", PLACE, "--allowed-prefixes", "/vsis3/terrain/"], text=True, stderr=subprocess.PIPE,
+                                 env=environment)
+        self.assertEqual(refused.returncode, 2)
+        self.assertIn(f'"baked": "{PLACE}"', refused.stderr)
+        server = subprocess.Popen([BINARY, "serve", "--config", config], text=True, env=environment, stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE)
+        self.addCleanup(server.communicate)
+        self.addCleanup(server.terminate)
+        self.assertIn("serving", server.stdout.readline())
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/cells/layer.json") as reply:
+            self.assertEqual(json.load(reply)["available"][0], [{"startX": 0, "startY": 0, "endX": 1, "endY": 0}])
+        for key in ("0/1/0", "9/530/388"):
+            with urllib.request.urlopen(f"http://127.0.0.1:{port}/cells/{key}.terrain") as reply:
+                self.assertGreater(len(reply.read()), 88)
+
+    def test_killed_at_any_moment_it_goes_on_to_the_same_objects(self):
+        for after in (1, 2, 3, 3, 3):  # writes: the lock, the identity, the units
+            writes = sum(method == "PUT" for method, _, _ in self.store.requests) + after
+            process = self.start()
+            until = time.monotonic() + 60
+            while sum(method == "PUT" for method, _, _ in self.store.requests) < writes and process.poll() is None:
+                self.assertLess(time.monotonic(), until)
+                time.sleep(0.002)
+            process.kill()
+            process.communicate()
+            self.assertNotIn("manifest.json", set(self.files()))
+            for name, data in self.files().items():
+                self.assertTrue(data == self.reference.get(name, data), name)
+        process = self.start("--json")
+        process.stdout.readline()
+        process.send_signal(signal.SIGTERM)
+        process.communicate()
+        self.assertEqual(process.returncode, 143)
+        self.assertNotIn("bake.lock", set(self.files()))
+        self.bake()
+        self.expect_all()
+
+    def test_a_store_that_refuses_a_unit(self):
+        self.store.refuse = lambda method, key, query: 403 if method == "PUT" and key.endswith(UNIT) else None
+        out, errors = self.bake(code=1)
+        self.assertIn("unit 7-132-96 of terrain failed: /vsis3/terrain/maps/alps/units/7-132-96.pmtiles cannot be written", errors)
+        self.assertIn("check the bucket, the credentials and their right to write", errors)
+        self.assertEqual(set(self.files()), set(self.reference) - {UNIT, "manifest.json"} | {"bake.json"})
+        refused = []
+
+        def refuse_now_and_then(method, key, query):
+            if method != "PUT" or len(refused) % 3 == 2:
+                refused.append(None) if method == "PUT" else None
+                return None
+            refused.append(key)
+            return 503
+        self.store.refuse = refuse_now_and_then
+        out, _ = self.bake("--json")
+        self.assertEqual(self.outcomes(out), ["baked"] + ["kept"] * 8)
+        self.assertGreater(len(refused), 3)
+        self.expect_all()
+
+    def test_a_store_that_refuses_a_part(self):
+        small = {"VSIS3_CHUNK_SIZE_BYTES": "50000"}  # several parts
+        self.store.refuse = lambda method, key, query: 403 if query.get("partNumber") == "2" and key.endswith(UNIT) else None
+        _, errors = self.bake(code=1, environment=small)
+        self.assertIn("unit 7-132-96 of terrain failed", errors)
+        self.assertEqual(self.store.uploads, {}, "what was begun is cancelled")
+        self.assertNotIn(UNIT, set(self.files()))
+        self.store.refuse = lambda method, key, query: None
+        self.bake(environment=small)
+        self.assertTrue(any(query.get("partNumber") == "2" for _, _, query in self.store.requests))
+        self.expect_all()
+
+    def test_a_store_that_cannot_be_used(self):
+        self.store.refuse = lambda method, key, query: 403
+        _, errors = self.bake(code=1)
+        self.assertIn("bake.lock", errors)
+        self.assertIn("AccessDenied", errors)
+        self.store.close()
+        _, errors = self.bake(code=1)
+        self.assertIn("/vsis3/terrain/maps/alps/bake.lock: cannot be written", errors)
+        self.store = FakeS3()
+        self.addCleanup(self.store.close)
+        nowhere = self.scratch / "full"
+        nowhere.mkdir()
+        _, errors = self.bake(code=1, environment={"TMPDIR": str(nowhere)}, before=("prlimit", "--fsize=1000", "--"))
+        self.assertIn(f"{nowhere} cannot be written", errors)
+        self.assertNotIn("manifest.json", set(self.files()))
+
+    def test_places_that_hold_something_else(self):
+        self.store.objects[BELOW + "/photo.jpg"] = b"x"
+        _, errors = self.bake(code=2)
+        self.assertIn("holds something that is no bake (photo.jpg)", errors)
+        self.assertEqual(set(self.files()), {"photo.jpg"})
+        del self.store.objects[BELOW + "/photo.jpg"]
+        self.store.objects[BELOW + "-2/photo.jpg"] = b"x"  # another place
+        self.bake()
+        _, errors = self.bake("--error", "5", code=2)
+        self.assertIn('error "default", not "5 m"', errors)
+        self.store.objects[BELOW + "/bake.lock"] = b"another-host 1 2 boot space\n"
+        _, errors = self.bake(code=1)
+        self.assertIn("process 1 on host another-host is baking there", errors)
+        self.assertIn("remove /vsis3/terrain/maps/alps/bake.lock", errors)
+        del self.store.objects[BELOW + "/bake.lock"]
+        self.expect_all()
+
+    def test_damaged_objects_are_baked_again(self):
+        self.bake()
+        changed = bytearray(self.reference[UNIT])
+        changed[len(changed) // 2] ^= 1
+        self.store.objects[f"{BELOW}/{UNIT}"] = bytes(changed)
+        self.store.objects[BELOW + "/top.pmtiles"] = self.reference["top.pmtiles"][:-1]
+        _, errors = self.bake("--finish", code=1)
+        self.assertIn("unit 7-132-96 of terrain is missing", errors)
+        out, _ = self.bake("--json")
+        self.assertEqual(self.outcomes(out), ["baked"] * 2 + ["kept"] * 7)
+        self.expect_all()
+
+    def test_shards_updates_and_two_formats(self):
+        for index in (0, 1):
+            self.bake("--shard", f"{index}/2")
+        self.assertNotIn("manifest.json", set(self.files()))
+        self.bake("--finish")
+        self.expect_all()
+        out, _ = self.bake("--json", "--update", PLACE, place=PLACE + "-new")
+        self.assertEqual(self.outcomes(out), ["copied"] * 9)
+        self.expect_all(BELOW + "-new")
+        self.bake("--format", "terrain,png", place=PLACE + "-both", levels="0-8")
+        self.assertIn("png/manifest.json", self.files(BELOW + "-both"))
+        self.assertNotIn("bake.json", self.files(BELOW + "-both"))
+
+    @unittest.skipUnless(shutil.which("redis-server"), "redis-server is not installed")
+    def test_workers_of_a_queue(self):
+        redis = Redis(self.scratch / "redis")
+        self.addCleanup(redis.kill)
+        workers = [self.start("--queue", redis.url, "--job", "bucket", "--json") for _ in range(3)]
+        outs = []
+        for worker in workers:
+            out, errors = worker.communicate(timeout=150)
+            self.assertEqual(worker.returncode, 0, errors)
+            outs.append(out)
+        self.expect_all()
+
+    def test_arguments(self):
+        for arguments, place, part in ((("--form", "single"), PLACE, "--form single is written into a folder of this machine"),
+                                       ((), "/vsicurl/http://127.0.0.1/x", "or into a bucket such as /vsis3/BUCKET/FOLDER"),
+                                       (("--update", PLACE + "/"), PLACE, "name the same place")):
+            _, errors = self.bake(*arguments, place=place, code=2)
+            self.assertIn(part, errors)
+
+
+if __name__ == "__main__":
+    in_parallel.main()
