@@ -3,7 +3,7 @@ import { heightTicks, kColourings } from "/viewer/colours.js";
 import { formatHeight } from "/viewer/numbers.js";
 
 const kNames = { height: "Colours by height", slope: "Colours by slope, degrees", aspect: "Colours by the direction that the ground faces" };
-const kShareOfLetter = 0.024;  // of the width of the strip
+const kShareOfLetter = 0.028;  // of the width of the strip
 
 // `colouring`: a key of kColourings. `heights`: {min, max} of the dataset.
 export function drawLegend(figure, colouring, heights) {
