@@ -28,7 +28,7 @@ function colourAt(stops, t) {
 
 // sRGB colour of a height in a dataset whose heights run from `min` to `max`, metres.
 export function heightColour(height, { min, max }) {
-  if (min > kShallowestSeaFloor) return colourAt(kLand, (height - min) / (max - min));
+  if (min > kShallowestSeaFloor) return colourAt(kLand, (height - min) / Math.max(max - min, 1));
   return height < 0 ? colourAt(kSea, 1 - height / min) : colourAt(kLand, Math.pow(height / Math.max(max, 1), 0.8));
 }
 
@@ -84,6 +84,7 @@ export function niceInterval(metres) {
 
 // Round heights for the legend as [fraction of the range, metres]; the highest and lowest are at round numbers inside.
 export function heightTicks({ min, max }) {
+  if (max <= min) return [];
   const step = niceInterval((max - min) / 4);
   const ticks = [];
   for (let height = Math.ceil(min / step) * step; height <= max; height += step) {

@@ -3,6 +3,7 @@
 import { Cartesian2, Cartesian3, Cartographic, Math as CesiumMath, SceneTransforms } from "/viewer/cesium/index.js";
 
 const kSpacing = 150;  // pixels between labels
+const kHalfWidth = 32;  // pixels of a label
 const kMaxTriangles = 4000;  // of one tile that are looked at
 const kMaxLabels = 28;
 
@@ -29,7 +30,7 @@ export function placeLabels(scene, spacing, format) {
   const taken = [];
   const labels = [];
   const isFree = ({ x, y }) => x > 40 && y > 40 && x < canvas.clientWidth - 40 && y < canvas.clientHeight - 40 &&
-    document.elementFromPoint(x, y) === canvas &&  // not below the panel
+    [-kHalfWidth, 0, kHalfWidth].every((across) => document.elementFromPoint(x + across, y) === canvas) &&  // not below the panel
     taken.every((other) => Math.hypot(other.x - x, other.y - y) > kSpacing);
   for (const tile of globe._surface._tilesToRender) {
     const mesh = tile.data?.renderedMesh;

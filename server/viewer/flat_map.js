@@ -2,7 +2,7 @@
 // colours by height or the dataset's image, shading, and contours. Drag and wheel or arrow keys, plus and minus move it; a
 // click reads a height.
 import { pendingText } from "/viewer/access.js";
-import { heightColour, niceInterval } from "/viewer/colours.js";
+import { heightColour, niceInterval, waterline } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
 import { drawLegend } from "/viewer/legend.js";
 import { formatPosition } from "/viewer/numbers.js";
@@ -10,6 +10,7 @@ import { formatPosition } from "/viewer/numbers.js";
 const kTile = 256;
 const kPendingMs = 1500;
 const kMaxTiles = 300;  // in memory
+const kWater = [51, 115, 158];
 const byId = (id) => document.getElementById(id);
 
 // Web Mercator: the whole world is 1 wide and 1 high.
@@ -31,6 +32,7 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
   for (let i = 0; i < height.length; ++i) {
     height[i] = -10000 + (data[4 * i] * 65536 + data[4 * i + 1] * 256 + data[4 * i + 2]) * 0.1;
   }
+  const water = waterline(heights);
   const relief = Math.max(1.2, Math.min(12, metres / 40));
   for (let y = 0; y < width; ++y) {
     for (let x = 0; x < width; ++x) {
@@ -41,7 +43,8 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
       const light = (0.643 + 0.766 * (-0.707 * east + 0.707 * north)) / (0.643 * Math.hypot(east, north, 1));
       const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
       const isPhoto = photo?.data[4 * i + 3] > 0;
-      const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : heightColour(height[i], heights);
+      const isWater = height[i] < water && [w, e, n, s].every((beside) => beside === height[i]);
+      const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : isWater ? kWater : heightColour(height[i], heights);
       // A line lies between two pixels on both sides of its height.
       const crossed = interval > 0 ? lineBetween(height[i], [e, s], interval) : undefined;
       const ink = crossed === undefined ? 1 : crossed % 5 === 0 ? 0.4 : 0.7;
@@ -265,7 +268,9 @@ export async function startFlatMap() {
       byId("readout").hidden = false;
       byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
     };
-    await show(new URLSearchParams(location.hash.slice(1)).get("dataset"));
+    const wanted = new URLSearchParams(location.hash.slice(1)).get("dataset");
+    await show(wanted);
+    if (wanted && wanted !== map.dataset.name) fail(new Error(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`));
   } catch (error) {
     fail(error);
   }

@@ -203,8 +203,8 @@ export class Globe {
     }
     const size = extent(region);
     const pitch = -28 - 45 * Math.min(1, size / 5e6);
-    const { min, max } = region.heights;
-    const ground = region.ground ?? Math.max(0, min) * 0.6 + Math.max(0, max) * 0.2;
+    const [min, max] = [region.heights.min, region.heights.max].map((height) => Math.max(0, height));
+    const ground = this.exaggeration * (region.ground ?? min + 0.2 * (max - min));
     const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
     const [heading, tilt] = [32, pitch].map(CesiumMath.toRadians);
     const offset = new HeadingPitchRange(heading, tilt, viewDistance(region) * narrow);

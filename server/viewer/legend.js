@@ -3,7 +3,7 @@ import { heightTicks, kColourings } from "/viewer/colours.js";
 import { formatHeight } from "/viewer/numbers.js";
 
 const kNames = { height: "Colours by height", slope: "Colours by slope, degrees", aspect: "Colours by the direction that the ground faces" };
-const kShareOfLetter = 0.024;  // of the width of the strip
+const kShareOfLetter = 0.028;  // of the width of the strip
 
 // `colouring`: a key of kColourings. `heights`: {min, max} of the dataset.
 export function drawLegend(figure, colouring, heights) {
@@ -18,13 +18,16 @@ export function drawLegend(figure, colouring, heights) {
   }));
 }
 
-// The ends are the dataset's own; round heights between them where there is room.
+// The ends are the dataset's own; round heights between them where there is room, first of all zero.
 function ticksOfHeights(heights) {
   const text = (metres) => formatHeight(metres);
   const room = (a, b) => (kShareOfLetter * (text(a).length + text(b).length)) / 2 + kShareOfLetter;
   const ticks = [[0, heights.min]];
   const end = (metres) => kShareOfLetter * (text(metres).length / 2);  // the texts at the ends are inside
-  for (const [at, metres] of heightTicks(heights)) {
+  const rounds = heightTicks(heights);
+  const zero = rounds.find(([, metres]) => metres === 0);
+  for (const [at, metres] of rounds) {
+    if (zero && at < zero[0] && zero[0] - at <= room(metres, 0)) continue;
     const [last, value] = ticks.at(-1);
     const before = last + (ticks.length === 1 ? end(value) : 0);
     if (at - before > room(value, metres) && 1 - end(heights.max) - at > room(metres, heights.max)) ticks.push([at, metres]);

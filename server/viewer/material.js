@@ -61,8 +61,10 @@ vec3 terrainColour(float metres, vec3 positionToEyeEC, vec3 normalEC, bool tiles
   vec3 position = positionToEyeEC;
   float slope = fwidth(metres) / max(length(dFdx(position)) + length(dFdy(position)), 1e-6);
   float level = 1.0 - smoothstep(0.0003, 0.0015, slope);
-  float towardsShore = (metres - heightRange.x) / max(water - heightRange.x, 1e-3);
-  colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, towardsShore)));
+  if (water > heightRange.x) {
+    float towardsShore = (metres - heightRange.x) / (water - heightRange.x);
+    colour = mix(colour, kWater, level * (1.0 - smoothstep(0.7, 1.0, towardsShore)));
+  }
 
   // Slope and aspect of the ground itself: without exaggeration, and from the triangle where tiles have no normals.
   vec3 facet = czm_inverseViewRotation * cross(dFdx(position), dFdy(position));

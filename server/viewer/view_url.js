@@ -1,6 +1,9 @@
 // A view as the page's URL fragment: #dataset=maui&fraction=0.25&camera=-156.2,20.6,9000,30,-25&contours&wireframe
 // With another error to the right of the line it also has &right=2, with 3D Tiles &tiles3d, and &split=0.4 if the line was
 // moved. &colours=slope, &sun=2026-06-21T18:30 in the dataset's local mean time.
+import { fractionOfStep, kCoarsest, kFinest } from "/viewer/framing.js";
+
+const kFractions = [fractionOfStep(kFinest), fractionOfStep(kCoarsest)];
 const kSwitches = ["contours", "wireframe", "tiles3d", "edits", "imagery"];
 const kColourings = ["height", "slope", "aspect"];
 
@@ -16,21 +19,27 @@ export function encodeView({ dataset, fraction, exaggeration, camera, split, rig
   return `#${parts.join("&")}`;
 }
 
-// Leaves out values that are missing or invalid.
+const within = (value, [low, high]) => Math.min(high, Math.max(low, value));
+// A camera below all ground or far beyond the Earth would show nothing.
+const kCameraRanges = [[-360, 360], [-90, 90], [-12000, 1e8], [-360, 360], [-90, 90]];
+
+// Leaves out values that are missing or invalid, and a camera that would see nothing. Takes errors and exaggeration to the
+// nearest ends of their sliders.
 export function decodeView(fragment) {
   const query = new URLSearchParams(fragment.replace(/^#/, ""));
   const view = {};
   const camera = query.get("camera")?.split(",").map(Number);
+  const kRanges = { fraction: kFractions, right: kFractions, exaggeration: [1, 10] };
   if (query.get("dataset")) view.dataset = query.get("dataset");
-  if (Number(query.get("fraction")) > 0) view.fraction = Number(query.get("fraction"));
-  if (Number(query.get("exaggeration")) > 0) view.exaggeration = Number(query.get("exaggeration"));
-  if (Number(query.get("right")) > 0) view.right = Number(query.get("right"));
+  for (const [name, range] of Object.entries(kRanges)) {
+    if (Number(query.get(name)) > 0) view[name] = within(Number(query.get(name)), range);
+  }
   view.colouring = kColourings.includes(query.get("colours")) ? query.get("colours") : "height";
   const sun = query.get("sun") ?? "";
   if (/^\d{4}-\d\d-\d\dT\d\d:\d\d$/.test(sun) && Date.parse(`${sun}:00Z`)) view.sun = sun;
   const split = Number(query.get("split") ?? 0.5);
   view.split = split >= 0 && split <= 1 ? split : 0.5;
-  if (camera?.length === 5 && camera.every(Number.isFinite)) view.camera = camera;
+  if (camera?.length === 5 && camera.every((value, i) => value === within(value, kCameraRanges[i]))) view.camera = camera;
   for (const name of kSwitches) view[name] = query.has(name);
   return view;
 }

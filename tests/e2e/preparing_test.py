@@ -126,7 +126,7 @@ class Server:
             return found
 
     def wait_until_it_answers(self):
-        self.port = int(self.wait_for(r"127\.0\.0\.1:(\d+)/ answers; being prepared: ")[1])
+        self.port = int(self.wait_for(r"127\.0\.0\.1:(\d+)/ answers; being prepared: \w+ \(\d+ %\)")[1])
 
     def wait_until_complete(self):
         line = self.process.stdout.readline()

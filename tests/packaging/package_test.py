@@ -71,6 +71,18 @@ class Package(unittest.TestCase):
         self.assertIn("User=terrace", unit)
         self.assertIn("u terrace", (self.root / "usr/lib/sysusers.d/terrace.conf").read_text())
 
+    def test_systemd_accepts_the_units_and_rates_them_well(self):
+        folder = pathlib.Path(self.scratch.name) / "units"
+        folder.mkdir()
+        units = [folder / "terrace.service", folder / "terrace.socket"]
+        for unit in units:
+            text = (self.root / "lib/systemd/system" / unit.name).read_text()
+            unit.write_text(text.replace("/usr/bin/terrace", str(self.terrace)))
+        done = subprocess.run(["systemd-analyze", "verify", "--man=no", *units], text=True, capture_output=True)
+        self.assertEqual((done.returncode, [line for line in done.stderr.splitlines() if str(folder) in line or "terrace" in line]), (0, []))
+        # Exposure of at most 2.0 of 10; the threshold is in tenths.
+        run("systemd-analyze", "security", "--offline=yes", "--threshold=20", units[0])
+
     def test_the_bill_of_materials_has_what_the_package_needs_and_contains(self):
         texts = []
         for name in ("a.json", "b.json"):

@@ -46,7 +46,7 @@ void Progress::Update(double share) {
   if (share_ == 0) first_share_ = share;
   share_ = std::max(share_, share);
   const Clock::time_point now = Clock::now();
-  const auto pause = std::chrono::milliseconds(!terminal_ ? 10'000 : shown_ ? 100 : 1'000);
+  const auto pause = std::chrono::milliseconds(!shown_ && !is_quiet_ ? 1'000 : terminal_ ? 100 : 10'000);
   if (now - last_ < pause) return;
   const std::string done =
       count_ > 1 ? Grouped(static_cast<std::size_t>(share_ * static_cast<double>(count_))) + " of " + Grouped(count_)
@@ -61,6 +61,7 @@ void Progress::Update(double share) {
 void Progress::UseLines() {
   if (shown_ && terminal_) std::fputs("\r\033[K", stderr);
   terminal_ = false;
+  is_quiet_ = true;
 }
 
 std::function<void(double)> Progress::Callback() {

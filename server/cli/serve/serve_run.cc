@@ -150,8 +150,12 @@ int ServeRun::ServeDatasets() {
   if (is_announced_) {
     AnnounceAll();
   } else {
+    std::vector<std::string> shares;
+    for (const std::string& name : first->pending) {
+      shares.push_back(fmt::format("{} ({:.0f} %)", name, 100 * shares_->Of(name)));
+    }
     std::fprintf(stderr, "%sterrace: %s answers; being prepared: %s\n", ::isatty(STDERR_FILENO) != 0 ? "\r\033[K" : "",
-                 server_->url().c_str(), fmt::format("{}", fmt::join(first->pending, ", ")).c_str());
+                 server_->url().c_str(), fmt::format("{}", fmt::join(shares, ", ")).c_str());
   }
   NotifyReady(ServedText());  // before the reloader's thread may notify newer texts
   reloader_->Start(config_.watch);

@@ -1,0 +1,122 @@
+// The viewer with what nobody wishes for: odd rasters, garbage in the address, very small windows.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { chromium } from 'playwright-core';
+import { samples, serve } from './harness.mjs';
+import { heightColour, heightTicks } from '../../server/viewer/colours.js';
+
+const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
+const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
+                '--disable-background-networking', '--no-first-run'];
+const kWait = { timeout: 90000, polling: 200 };
+
+// An ASCII grid in degrees; `height(x, y)` of each sample, -9999 is a void.
+function writeGrid(file, side, height) {
+  const rows = Array.from({ length: side }, (_, y) => Array.from({ length: side }, (_, x) => height(x, y)).join(' '));
+  fs.writeFileSync(file, `ncols ${side}\nnrows ${side}\nxllcorner 10\nyllcorner 45\ncellsize 0.001\nNODATA_value -9999\n${rows.join('\n')}\n`);
+  fs.writeFileSync(file.replace(/asc$/, 'prj'), 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],' +
+    'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]');
+  return file;
+}
+
+describe('a level raster', () => {
+  it('has one colour and no ticks between its ends', () => {
+    assert.deepEqual(heightColour(500, { min: 500, max: 500 }), heightColour(500, { min: 500, max: 501 }));
+    assert.deepEqual(heightTicks({ min: 500, max: 500 }), []);
+    assert.deepEqual(heightTicks({ min: 0, max: 0 }), []);
+  });
+});
+
+describe('the viewer', () => {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-odd-'));
+  let server, browser, page;
+
+  const settled = () => page.waitForFunction(() => window.terrace?.state.ready && terrace.globe.drawn().tiles > 1 && !terrace.globe.loading &&
+    !document.querySelector('.curtain'), undefined, kWait);
+  const open = async (hash) => {
+    await page.goto('about:blank');
+    await page.goto(`${server.url}/${hash}`);
+    await settled();
+  };
+
+  before(async () => {
+    // An island of data far above its floor, a raster of few metres, and one of two samples on a high plain.
+    const isle = writeGrid(path.join(folder, 'isle.asc'), 60, (x, y) => ((x - 30) ** 2 + (y - 30) ** 2 < 200 ? 1200 + x : -9999));
+    const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
+    const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
+    server = await serve(isle, level, small, path.join(samples, 'jacksboro.tif'));
+    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    page = await browser.newPage({ viewport: { width: 640, height: 400 }, deviceScaleFactor: 0.5 });
+    page.wrongs = [];
+    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+  });
+
+  after(async () => {
+    await browser?.close();
+    await server?.stop();
+    fs.rmSync(folder, { recursive: true });
+  });
+
+  it('draws the floor around an inland raster as ground, not as water', async () => {
+    await open('#dataset=isle&camera=10.03,45.03,9000,0,-90');
+    await page.locator('#panel > summary').click();
+    const png = (await page.screenshot({ clip: { x: 200, y: 80, width: 240, height: 240 } })).toString('base64');
+    const blue = await page.evaluate(async (base64) => {
+      const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${base64}`)).blob());
+      const context = new OffscreenCanvas(image.width, image.height).getContext('2d');
+      context.drawImage(image, 0, 0);
+      const { data } = context.getImageData(0, 0, image.width, image.height);
+      let count = 0;
+      for (let i = 0; i < data.length; i += 4) count += data[i + 2] > 1.3 * data[i + 1] && data[i + 2] > 90;
+      return count / (data.length / 4);
+    }, png);
+    assert.ok(blue < 0.001, `${blue} of the picture is blue`);
+  });
+
+  for (const name of ['small', 'level']) {
+    it(`shows the raster ${name} from above its ground`, async () => {
+      await open(`#dataset=${name}`);
+      const [longitude, latitude, height] = await page.evaluate(() => terrace.globe.camera);
+      const ground = name === 'small' ? 3001 : 2500;
+      assert.ok(height > ground && height < ground + 5000, `${height} m`);
+      assert.ok(Math.hypot(longitude - 10, latitude - 45) < 0.1);
+    });
+  }
+
+  it('takes garbage in the address for what is nearest to it, or for nothing', async () => {
+    await open('#%%%&&==&dataset&fraction=1e300&right=-1&exaggeration=1e9&split=-7&colours=plaid&sun=2026-99-99T99:99&camera=1e9,-1e9,1e99,1e9,1e9');
+    const view = await page.evaluate(() => ({ fraction: terrace.state.fraction, right: terrace.state.right, sun: terrace.state.sun,
+      exaggeration: terrace.globe.exaggeration, colouring: terrace.state.colouring, split: terrace.globe.split }));
+    assert.deepEqual({ ...view, fraction: 0 }, { fraction: 0, right: undefined, sun: undefined, exaggeration: 10, colouring: 'height', split: 0.5 });
+    assert.match(page.url(), /camera=(9|10)\.\d+,4[45]\.\d+,/, 'the first dataset is in view');
+    const decoded = (hash) => page.evaluate(async (text) => (await import('/viewer/view_url.js')).decodeView(text), hash);
+    for (const camera of ['a,b,c,d,e', '1,2,3', '', 'NaN,0,0,0,0', '1,2,3,4,5,6', '8,46,1e9,0,0', '8,46,-1e5,0,0', '8,91,5000,0,0']) {
+      assert.equal((await decoded(`#dataset=x&camera=${camera}`)).camera, undefined, camera);
+    }
+    const { camera, fraction, right } = await decoded('#dataset=x&camera=-179.5,-80,-4000,359.9,12.5&fraction=1e-300&right=1e300');
+    assert.deepEqual({ camera, fraction, right }, { camera: [-179.5, -80, -4000, 359.9, 12.5], fraction: 1 / 32, right: 4 });
+    assert.deepEqual(page.wrongs, []);
+  });
+
+  it('keeps the panel, the tools and its messages apart', async () => {
+    const apart = async (first, second) => {
+      const [a, b] = [await page.locator(first).boundingBox(), await page.locator(second).boundingBox()];
+      const isApart = a.x + a.width <= b.x || b.x + b.width <= a.x || a.y + a.height <= b.y || b.y + b.height <= a.y;
+      assert.ok(isApart, `${first} ${JSON.stringify(a)} is over ${second} ${JSON.stringify(b)}`);
+    };
+    for (const [width, height] of [[640, 400], [800, 300], [240, 240]]) {
+      await page.setViewportSize({ width, height });
+      await page.goto('about:blank');
+      await page.goto(`${server.url}/#dataset=nowhere`);
+      await page.locator('#message').waitFor({ timeout: 90000 });
+      if (width > 560) await apart('#message', '#panel');
+      await apart('#tools', '#panel');
+      await apart('#tools', '#message');
+      const tools = await page.locator('#tools').boundingBox();
+      assert.ok(tools.x >= 0 && tools.x + tools.width <= width && tools.y + tools.height <= height, JSON.stringify(tools));
+    }
+  });
+});
