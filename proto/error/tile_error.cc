@@ -239,8 +239,9 @@ class TileErrorMeter::Impl {
     const Linear plane = PlaneOf(t, p, twice_area);
     const double unit = static_cast<double>(surface_.unit);
     const double x = bounds.shift.x * unit, y = bounds.shift.y * unit;
-    return {LargestNear(p, plane, bounds.shift) + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y,
-            false};
+    const double beyond = bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y;
+    if (beyond > min_allowed_) return kUnknown;  // measured in any case: beside cliffs half of all triangles
+    return {LargestNear(p, plane, bounds.shift) + beyond, false};
   }
 
   // An upper bound on the difference between the plane and the samples of all nodes that lie beside the triangle by at
