@@ -230,8 +230,11 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
       const std::int64_t column = tile_.window.column + 1 + i, row = tile_.window.row + 1 + j;
       // The places of a pole's nodes are those of the rows beside it, and far from the middle turns may be added.
       if (has_turns && (row <= 0 || row >= tile_.lattice.rows())) return false;
-      const Position corner = trace_.cells.positions().OfNode(column, row);
+      Position corner = trace_.cells.positions().OfNode(column, row);
       if (!std::isfinite(corner.x) || !std::isfinite(corner.y)) return false;
+      // Nodes west of the raster may have places east of it, nearly a turn further on.
+      const double turns = has_turns && turn > 0 ? (middle - corner.x) / turn : 0;
+      if (std::abs(turns) >= 0.5) corner.x += turn * std::round(turns);
       if (has_turns && turn > 0 && std::abs(corner.x - middle) >= turn / 4) return false;
       at.Add(corner.x, corner.y);
     }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -101,7 +102,15 @@ class GridErrorBound {
   Result<void> Add(const std::stop_token& stop) {
     constexpr int kGroup = SourceErrorBound::kGroup;
     const int cells = nodes_.cells();
+    bool may_rest_be_bounded = true;
     for (int south = 0; south < cells; south += kGroup) {
+      const int north = std::min(south + kGroup, cells);
+      if (AddRows({0, south, cells, north})) {
+        // Most often on the sea, where the rest of the tile is like its first rows.
+        if (north < cells && may_rest_be_bounded && AddRows({0, north, cells, cells})) break;
+        may_rest_be_bounded = false;
+        continue;
+      }
       for (int west = 0; west < cells; west += kGroup) {
         AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
       }
@@ -171,10 +180,31 @@ class GridErrorBound {
   bool IsPartlyCovered(const CellBox& box) const { return HasCell(box, 1); }
   bool IsCovered(const CellBox& box) const { return !HasCell(box, 0); }
 
+  // Adds whole rows of cells at once if their bound is not above the known one. Then those of the groups are not
+  // either: every part of the bound grows with the box, except that of a geoid. Where positions are not separable, the
+  // bound of rows takes as long as those of their groups, and is seldom small enough.
+  bool AddRows(const CellBox& box) {
+    if (!trace_.cells.is_separable() || tile_.blends_ || geoid_.is_added() || IsCovered(box) || !Touches(box)) {
+      return false;
+    }
+    Prepare(box);
+    const double error = smooth_.BoundOver(box);
+    if (!(error <= tile_.bound_)) return false;
+    const auto first = tile_.covered_.begin() + static_cast<std::ptrdiff_t>(CellIndex(0, box.south));
+    std::fill_n(first, Area(box.north - box.south, nodes_.cells()), std::uint8_t{1});
+    return true;
+  }
+
+  void Prepare(const CellBox& box) {
+    if (prepared_south_ == box.south && prepared_north_ == box.north) return;
+    smooth_.PrepareRows(box.south, box.north);
+    prepared_south_ = box.south;
+    prepared_north_ = box.north;
+  }
+
   void AddGroup(const CellBox& box) {
     if (IsCovered(box) || !Touches(box)) return;
-    if (prepared_south_ != box.south) smooth_.PrepareRows(box.south, box.north);
-    prepared_south_ = box.south;
+    Prepare(box);
     has_loose_group_ = false;
     AddBox(box, true);
   }
@@ -268,8 +298,8 @@ class GridErrorBound {
   SmoothErrorBound smooth_;
   const CellErrorBound single_;
   LooseCells loose_;
-  int prepared_south_ = -1;       // of smooth_
-  bool has_loose_group_ = false;  // the current group
+  int prepared_south_ = -1, prepared_north_ = -1;  // of smooth_
+  bool has_loose_group_ = false;                   // the current group
 };
 
 SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,
@@ -284,8 +314,6 @@ Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trac
   return GridErrorBound(*this, grid, trace).Add(stop);
 }
 
-bool SourceErrorBound::is_covered() const {
-  return std::ranges::all_of(covered_, [](std::uint8_t covered) { return covered != 0; });
-}
+bool SourceErrorBound::is_covered() const { return std::memchr(covered_.data(), 0, covered_.size()) == nullptr; }
 
 }  // namespace terrace::dem

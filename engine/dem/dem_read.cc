@@ -86,14 +86,18 @@ Result<void> FillAny(const RasterGrid& grid, const NodeGrid& node_grid, const No
     return some;
   };
   const auto copy_back = [&](const std::vector<float>& some, std::span<float> all) {
-    if (!all.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
+    if (!some.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
-  std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth = copy(nodes.smooth);
-  const auto filled = grid.Fill(node_grid, part, datum, {heights, weights, smooth}, stop, trace);
+  std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth;
+  if (nodes.smooth != nullptr) smooth = copy(*nodes.smooth);
+  const auto filled =
+      grid.Fill(node_grid, part, datum, {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void},
+                stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
-  copy_back(smooth, nodes.smooth);
+  if (!smooth.empty() && nodes.smooth->empty()) *nodes.smooth = VoidHeights(nodes.heights.size());
+  if (!smooth.empty()) copy_back(smooth, *nodes.smooth);
   if (traced != nullptr) {
     traced->part = part;
     trace->cells = {};  // can be located again
@@ -180,10 +184,11 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
                                                       const std::stop_token& stop,
                                                       std::vector<PartTrace>* traces) const {
   const std::size_t nodes = Area(window.columns, window.rows);
-  std::vector<float> heights(nodes, SampleRules::kVoid), smooth = heights;
+  std::vector<float> heights = VoidHeights(nodes), smooth;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);
+  bool are_void = true, has_voids = true;
   for (const std::size_t i : order) {
     std::vector<float> weights;
     if (feathers) {
@@ -192,16 +197,18 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
     const auto filled =
-        FillAny(grids[i], node_grid, window, order.size(), datum, {heights, weights, smooth}, stop, trace);
+        FillAny(grids[i], node_grid, window, order.size(), datum, {heights, weights, &smooth, are_void}, stop, trace);
     if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
     }
     if (feathers) blend.Add(heights, weights);
-    if (feathers ? blend.is_done() : !HasVoids(heights)) break;
+    are_void = false;
+    if (!feathers) has_voids = HasVoids(heights);
+    if (feathers ? blend.is_done() : !has_voids) break;
   }
   if (feathers) heights = blend.Heights();
   // A coarse measurement in a hole is better than a surface between the heights around it.
-  if (!HasVoids(heights)) return heights;
+  if (smooth.empty() || !has_voids) return heights;
   for (std::size_t i = 0; i < nodes; ++i) {
     if (IsVoid(heights[i])) heights[i] = smooth[i];
   }
@@ -373,7 +380,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
     std::ranges::fill(marks, std::uint8_t{0});
-    const auto read = grids.front().FillPoints(points, datum, {heights, {}, smooth}, marks, stop);
+    const auto read = grids.front().FillPoints(points, datum, {heights, {}, &smooth}, marks, stop);
     if (!read) return tl::unexpected(read.error());
     take_smooth();
     return heights;
@@ -393,7 +400,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, found_smooth}, found_filled, stop);
+    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];

@@ -67,9 +67,16 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
       columns[c] = x >= box.west && x <= box.east ? 1 : 0;
       if (columns[c] != 0) first = std::min(first, c), end = c + 1;
     }
+    const bool is_one_run = std::find(columns.begin() + static_cast<std::ptrdiff_t>(first),
+                                      columns.begin() + static_cast<std::ptrdiff_t>(end),
+                                      0) == columns.begin() + static_cast<std::ptrdiff_t>(end);
     for (std::size_t j = 0; j < positions.rows() && first < end; ++j) {
       if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
       std::uint8_t* const row = inside.data() + j * columns.size();
+      if (is_one_run) {
+        std::fill(row + first, row + end, std::uint8_t{1});
+        continue;
+      }
       for (std::size_t c = first; c < end; ++c) row[c] |= columns[c];
     }
   }

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "engine/crs/node_positions.h"
+#include "engine/mosaic/feather_weights.h"
 #include "engine/mosaic/void_fill.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/node_rows.h"
@@ -39,59 +40,15 @@ int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
   return MercatorFactor(grid.depth, spacing);
 }
 
-void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, GridTrace& trace) {
-  if (std::memchr(wanted.data(), 0, wanted.size()) == nullptr) {
+void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, bool are_all, GridTrace& trace) {
+  if (are_all) {
     trace.heights.assign(heights.begin(), heights.end());
     return;
   }
+  trace.heights.resize(wanted.size());
   for (std::size_t n = 0; n < wanted.size(); ++n) {
     trace.heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
   }
-}
-
-// Rows from each sample to the nearest void in its column, at most `most` + 1. One void row lies above and below all.
-std::vector<int> RowsToVoid(const std::vector<float>& heights, std::int64_t columns, std::int64_t rows, int most) {
-  std::vector<int> steps(heights.size());
-  for (std::int64_t c = 0; c < columns; ++c) {
-    const auto at = [&](std::int64_t r) { return static_cast<std::size_t>(r * columns + c); };
-    int here = 0;
-    for (std::int64_t r = 0; r < rows; ++r) {
-      here = std::isnan(heights[at(r)]) ? 0 : std::min(here + 1, most + 1);
-      steps[at(r)] = here;
-    }
-    here = 0;
-    for (std::int64_t r = rows - 1; r >= 0; --r) {
-      here = std::isnan(heights[at(r)]) ? 0 : std::min(here + 1, most + 1);
-      steps[at(r)] = std::min(steps[at(r)], here);
-    }
-  }
-  return steps;
-}
-
-// For each sample of `core`: the distance to the nearest void of `wide`, or to the outside of `wide`, divided by
-// `length`, at most 1; 0 for voids. Distances are between sample centres, `column_step` and `row_step` apart. Exact if
-// `wide` exceeds `core` by length / step samples on every side, or ends where the raster ends.
-std::vector<float> FeatherWeights(const std::vector<float>& wide_heights, const GridWindow& wide,
-                                  const GridWindow& core, double column_step, double row_step, double length) {
-  const int max_columns = static_cast<int>(std::ceil(length / column_step));
-  const int max_rows = static_cast<int>(std::ceil(length / row_step));
-  const std::vector<int> rows = RowsToVoid(wide_heights, wide.columns, wide.rows, max_rows);
-  std::vector<float> weights;
-  weights.reserve(static_cast<std::size_t>(core.columns * core.rows));
-  for (std::int64_t r = core.row - wide.row; r < core.row - wide.row + core.rows; ++r) {
-    const int* const row = rows.data() + r * wide.columns;
-    for (std::int64_t c = core.column - wide.column; c < core.column - wide.column + core.columns; ++c) {
-      double nearest = length * length;
-      for (int dx = -max_columns; dx <= max_columns; ++dx) {
-        const std::int64_t column = c + dx;
-        const double x = dx * column_step;
-        const double y = column < 0 || column >= wide.columns ? 0 : row[column] * row_step;
-        nearest = std::min(nearest, x * x + y * y);
-      }
-      weights.push_back(static_cast<float>(std::sqrt(nearest) / length));
-    }
-  }
-  return weights;
 }
 
 std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::int64_t row) {
@@ -125,12 +82,20 @@ GridWindow HullOfVoids(const std::vector<float>& heights, const GridWindow& wind
   return {window.column + west, window.row + north, east - west + 1, south - north + 1};
 }
 
+// Whether all samples are equal, as on the sea: then the heights between them are, too. Zero with a sign may lose it.
+bool IsOneHeight(const std::vector<float>& samples) {
+  const float first = samples.front();
+  return !std::isnan(first) && !std::signbit(first) &&
+         std::memcmp(samples.data(), samples.data() + 1, (samples.size() - 1) * sizeof(float)) == 0;
+}
+
 // Interpolates whole rows at a time, for requested nodes that have valid samples around them.
 void FillRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells,
-              std::span<const std::uint8_t> wanted, std::span<const double> undulations, std::span<float> heights) {
+              std::span<const std::uint8_t> wanted, bool are_all, std::span<const double> undulations,
+              std::span<float> heights) {
   const std::size_t stride = cells.positions().columns(), rows = cells.positions().rows();
-  std::vector<std::uint8_t> of_column(stride);
-  for (std::size_t n = 0; n < wanted.size(); n += stride) {
+  std::vector<std::uint8_t> of_column(stride, are_all ? 1 : 0);
+  for (std::size_t n = 0; n < wanted.size() && !are_all; n += stride) {
     for (std::size_t i = 0; i < stride; ++i) of_column[i] |= wanted[n + i];
   }
   const auto first = static_cast<std::size_t>(std::ranges::find(of_column, std::uint8_t{1}) - of_column.begin());
@@ -141,10 +106,10 @@ void FillRows(const std::vector<float>& samples, const GridWindow& window, const
   for (std::size_t j = 0; j < rows; ++j) {
     const std::size_t of_row = j * stride + first;
     const auto row = wanted.subspan(of_row, rounded.size());
-    if (std::ranges::find(row, std::uint8_t{1}) == row.end()) continue;
+    if (!are_all && std::ranges::find(row, std::uint8_t{1}) == row.end()) continue;
     RoundHeights(lines.Row(j), undulations.empty() ? undulations : undulations.subspan(of_row, rounded.size()),
                  rounded);
-    if (std::memchr(row.data(), 0, row.size()) == nullptr) {
+    if (are_all || std::memchr(row.data(), 0, row.size()) == nullptr) {
       std::ranges::copy(rounded, heights.begin() + static_cast<std::ptrdiff_t>(of_row));
     } else {
       for (std::size_t i = 0; i < row.size(); ++i) {
@@ -345,17 +310,28 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
 Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::uint8_t> inside,
                                 std::span<const double> undulations, int factor, const NodeHeights& nodes,
                                 const std::stop_token& stop, GridTrace* trace) const {
-  const std::span<float> heights = nodes.heights, weights = nodes.weights, smooth = nodes.smooth;
+  const std::span<float> heights = nodes.heights, weights = nodes.weights;
   const bool traces_others = trace != nullptr && !weights.empty();
-  std::vector<std::uint8_t> wanted(inside.size());
-  const bool is_any_wanted = WantVoids(inside, heights, wanted);
+  std::vector<std::uint8_t> wanted;
+  bool is_any_wanted = true;
+  if (nodes.are_void) {
+    wanted.assign(inside.begin(), inside.end());
+    is_any_wanted = std::memchr(wanted.data(), 1, wanted.size()) != nullptr;
+  } else {
+    wanted.resize(inside.size());
+    is_any_wanted = WantVoids(inside, heights, wanted);
+  }
+  const bool are_all = std::memchr(wanted.data(), 0, wanted.size()) == nullptr;
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   NodeCells cells(std::move(positions), Axes(factor));
   if (!is_any_wanted) {
-    if (trace != nullptr) trace->cells = std::move(cells);
+    if (trace != nullptr) {
+      trace->heights = VoidHeights(inside.size());
+      trace->cells = std::move(cells);
+    }
     return CheckUnread();
   }
-  GridWindow window = cells.MoveIntoWindow(wanted);
+  GridWindow window = cells.MoveIntoWindow(wanted, are_all);
   // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
@@ -386,7 +362,9 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     if (!height || (!undulations.empty() && std::isnan(undulations[node]))) return;
     const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
     if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may have a height
-      if (!smooth.empty() && std::isnan(smooth[node])) smooth[node] = rounded;
+      if (nodes.smooth == nullptr) return;
+      if (nodes.smooth->empty()) *nodes.smooth = VoidHeights(heights.size());
+      if (float& smooth = (*nodes.smooth)[node]; std::isnan(smooth)) smooth = rounded;
       return;
     }
     heights[node] = rounded;
@@ -399,9 +377,14 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     weights[node] = static_cast<float>(std::max(kMinWeight, std::nearbyint(weight * 1024) / 1024));
   };
   if (!has_holes && weights.empty()) {
-    FillRows(samples, window, cells, wanted, undulations, heights);
-    if (trace != nullptr) TraceWanted(heights, wanted, *trace);
+    if (are_all && undulations.empty() && IsOneHeight(samples)) {
+      FillWith(RoundHeight(samples.front()), heights);
+    } else {
+      FillRows(samples, window, cells, wanted, are_all, undulations, heights);
+    }
+    if (trace != nullptr) TraceWanted(heights, wanted, are_all, *trace);
   } else {
+    if (trace != nullptr) trace->heights = VoidHeights(inside.size());
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;
     for (std::size_t j = 0; node < wanted.size(); ++j) {
@@ -459,10 +442,7 @@ Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& windo
   const int factor = FactorOf(node_grid, spacing_);
   NodePositions positions = PositionsOf(node_grid, window, factor);
   std::vector<std::uint8_t> inside = cover_.Inside(positions);
-  if (trace != nullptr) {
-    trace->heights.assign(inside.size(), SampleRules::kVoid);
-    trace->factor = factor;
-  }
+  if (trace != nullptr) trace->factor = factor;
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
     if (!IsPoleRow(node_grid, global)) continue;

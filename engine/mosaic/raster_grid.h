@@ -68,8 +68,10 @@ struct NodeHeights {
   // Blend weights of the heights filled in, greater than 0, up to 1; the raster grids below have the rest. Empty:
   // all 1.
   std::span<float> weights = {};
-  // Smooth surface for holes where no raster grid has a height. NaN: not filled yet. Empty: not wanted.
-  std::span<float> smooth = {};
+  // Smooth surface for holes where no raster grid has a height. NaN: not filled yet. Null: not wanted. Empty: no node
+  // has one yet.
+  std::vector<float>* smooth = nullptr;
+  bool are_void = false;  // all heights are NaN
 };
 
 class RasterGrid {

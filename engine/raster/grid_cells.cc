@@ -113,7 +113,7 @@ GridWindow NodeCells::WindowOfNodes(std::span<const std::uint8_t> wanted) const 
   return window.Window(axes_);
 }
 
-GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
+GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted, bool are_all) {
   const std::size_t stride = positions_.columns();
   if (axes_.columns.wraps()) {
     // The middle column, so that columns over half a turn stay in order; else the column of the nearest requested node.
@@ -126,8 +126,12 @@ GridWindow NodeCells::MoveIntoWindow(std::span<const std::uint8_t> wanted) {
   }
   if (!is_separable()) return WindowOfNodes(wanted);
   CellWindow window;
-  std::vector<std::uint8_t> of_column(stride);
+  std::vector<std::uint8_t> of_column(stride, are_all ? 1 : 0);
   for (std::size_t j = 0; j < rows_.size(); ++j) {
+    if (are_all) {
+      window.AddRow(rows_[j].index);
+      continue;
+    }
     std::uint8_t of_row = 0;
     for (std::size_t i = 0; i < stride; ++i) {
       of_row |= wanted[j * stride + i];

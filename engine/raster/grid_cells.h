@@ -66,7 +66,8 @@ class NodeCells {
   // Returns the smallest window of averages with the cells of the nodes that are `wanted`, one entry per node. Where
   // columns wrap, moves all cells to within half a turn of the one in the middle. Precondition: a node is wanted, and
   // those that are have a position.
-  GridWindow MoveIntoWindow(std::span<const std::uint8_t> wanted);
+  // `are_all`: all nodes are wanted.
+  GridWindow MoveIntoWindow(std::span<const std::uint8_t> wanted, bool are_all = false);
   // Moves cells to within half a turn of a column.
   void MoveNear(std::int64_t column);
 

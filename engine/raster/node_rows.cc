@@ -308,6 +308,29 @@ bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, st
   return HWY_DYNAMIC_DISPATCH(Places)(nodes.data(), nodes.size(), axes, heights.data(), limit, x.data(), y.data());
 }
 
+// Copies are several times as fast as loops that store one height at a time.
+std::vector<float> VoidHeights(std::size_t count) {
+  static const std::vector<float> row(1024, std::numeric_limits<float>::quiet_NaN());
+  std::vector<float> heights;
+  heights.reserve(count);
+  while (heights.size() < count) {
+    const std::size_t more = std::min(row.size(), count - heights.size());
+    heights.insert(heights.end(), row.begin(), row.begin() + static_cast<std::ptrdiff_t>(more));
+  }
+  return heights;
+}
+
+void FillWith(float height, std::span<float> heights) {
+  constexpr std::size_t kFirst = 256;
+  std::size_t done = std::min(kFirst, heights.size());
+  std::fill_n(heights.begin(), done, height);
+  while (done < heights.size()) {
+    const std::size_t more = std::min(kFirst, heights.size() - done);
+    std::copy_n(heights.begin(), more, heights.begin() + static_cast<std::ptrdiff_t>(done));
+    done += more;
+  }
+}
+
 bool HasVoids(std::span<const float> heights) {
   return !HWY_DYNAMIC_DISPATCH(AreAllKnown)(heights.data(), heights.size());
 }

@@ -47,6 +47,12 @@ class NodeRows {
 // one entry per height.
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
 
+// As many NaN.
+std::vector<float> VoidHeights(std::size_t count);
+
+// Makes all heights equal to one.
+void FillWith(float height, std::span<float> heights);
+
 // Whether a height is NaN.
 bool HasVoids(std::span<const float> heights);
 

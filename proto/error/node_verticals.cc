@@ -27,8 +27,10 @@ NodeVerticals::NodeVerticals(const LatticeView& lattice)
     const Vec3 surface = geo::ToEcef({0, 1}, row, 0);
     rows_.push_back({row.sin, row.cos, surface.x, surface.z});
   }
-  const auto [lowest, highest] = ExtentOf(lattice.heights);
-  tilt_ = (static_cast<double>(highest) - lowest + 1) / kMinRadius;  // vertices are rounded
+  const HeightExtent extent = ExtentOf(lattice.heights);
+  lowest_ = extent.lowest;
+  highest_ = extent.highest;
+  tilt_ = (highest_ - lowest_ + 1) / kMinRadius;  // vertices are rounded
   narrowest_ = std::min(rows_.front().cos, rows_.back().cos);
   per_narrowest_ = 1 / std::max(narrowest_, 1e-12);
   per_step_ = 1 / step_;

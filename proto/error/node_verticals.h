@@ -93,6 +93,9 @@ class NodeVerticals {
   std::array<int, 2> RowsReached(double columns, double low_row, double high_row) const;
 
   int cells() const { return cells_; }
+  // Of all samples of the lattice and its halo, metres.
+  double lowest() const { return lowest_; }
+  double highest() const { return highest_; }
 
  private:
   struct Parallel {
@@ -122,6 +125,7 @@ class NodeVerticals {
   double step_ = 0;  // radians between two nodes
   double per_step_ = 0;
   double narrowest_ = 0, per_narrowest_ = 0;  // the smallest cosine of a row's latitude
+  double lowest_ = 0, highest_ = 0;
   double tilt_ = 0;   // between the highest and the lowest vertex, over the radius of curvature, at most
   double south_ = 0;  // radians: the latitude of row 0
   std::vector<geo::SinCos> columns_;

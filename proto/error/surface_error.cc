@@ -294,10 +294,16 @@ double LargestOfLine(const EdgeMeter& meter, LatticePoint a, LatticePoint b, dou
 
 // The same for a chord whose points deviate from the line by at most `shift`. If its heights between the ends of pieces
 // are no quadratics, the caller bounds them.
-double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, LatticePoint shift,
-                      double known) {
+double LargestOfChord(const EdgeMeter& meter, const EdgeBound& bound, const Ground& ground, const End& a, const End& b,
+                      LatticePoint shift, double known) {
   const Chord chord = ChordOf(ground, a, b);
   const double slack = chord.slack + meter.LargestChange(shift);
+  // A quadratic leaves the line between its ends by at most a quarter of its bend.
+  const auto at_most = [&] {
+    return bound.Over(bound.EndAt(a.place, a.height), bound.EndAt(b.place, b.height)) + std::abs(chord.bend) / 4 +
+           slack;
+  };
+  if (chord.is_quadratic && at_most() <= known) return std::max(known, known - slack + slack);  // as is rounded below
   double before = chord.first - meter.SampleAt(a.place), max_deviation = known - slack;
   meter.ForEachPiece(a.place, b.place, [&](const Piece& piece) {
     const double length = piece.end - piece.begin, bend = chord.bend - piece.bend;
@@ -311,20 +317,20 @@ double LargestOfChord(const EdgeMeter& meter, const Ground& ground, const End& a
 }
 
 // Chords that deviate from the line between the positions of their ends are halved until the deviation is small.
-double LargestOfHalves(const EdgeMeter& meter, const Ground& ground, const End& a, const End& b, int depth,
-                       double known) {
+double LargestOfHalves(const EdgeMeter& meter, const EdgeBound& bound, const Ground& ground, const End& a, const End& b,
+                       int depth, double known) {
   constexpr double kSmall = 1e-3;  // of a lattice step
   constexpr int kDeepest = 8;
   const LatticePoint shift = ground.Shift(a.place, b.place, a.height - b.height);
   if ((shift.x <= kSmall && shift.y <= kSmall) || depth == kDeepest) {
-    return LargestOfChord(meter, ground, a, b, shift, known);
+    return LargestOfChord(meter, bound, ground, a, b, shift, known);
   }
   End middle;
   middle.point = (a.point + b.point) * 0.5;
   middle.place = ground.PlaceOf(middle.point, Between(a.place, b.place, 0.5));
   middle.height = ground.HeightOf(middle.point, middle.place);
-  known = LargestOfHalves(meter, ground, a, middle, depth + 1, known);
-  return LargestOfHalves(meter, ground, middle, b, depth + 1, known);
+  known = LargestOfHalves(meter, bound, ground, a, middle, depth + 1, known);
+  return LargestOfHalves(meter, bound, ground, middle, b, depth + 1, known);
 }
 
 // A bound on the deviation of a chord's height from a linear one, between the ends of pieces and on the triangles
@@ -369,12 +375,19 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
       rounding = std::max(std::abs(heights[a] - ends[a].height), std::abs(heights[b] - ends[b].height));
     const double beyond = sagitta + meter.LargestChange(shift) + rounding + deviation;
     const double known = std::max(largest - beyond, 0.0);
-    const double linear = bound.Over(bounded[a], bounded[b]) <= known
-                              ? known
-                              : LargestOfLine(meter, places[a], places[b], bounded[a].height, bounded[b].height, known);
-    if (linear <= known && known + beyond <= largest) return;
+    // Beside cliffs `beyond` is large, so that the chord is measured in any case. Then the linear height counts only if
+    // it is the largest.
+    const bool may_stay = known + beyond <= largest;
+    double linear = known;
+    if (may_stay || !heights.empty()) {
+      const double least = may_stay ? known : largest;
+      if (bound.Over(bounded[a], bounded[b]) > least) {
+        linear = LargestOfLine(meter, places[a], places[b], bounded[a].height, bounded[b].height, least);
+      }
+    }
+    if (linear <= known && may_stay) return;
     if (!heights.empty() && linear > known) largest = std::max(largest, linear);
-    largest = LargestOfHalves(meter, ground, ends[a], ends[b], 0, largest - deviation) + deviation;
+    largest = LargestOfHalves(meter, bound, ground, ends[a], ends[b], 0, largest - deviation) + deviation;
   });
   return largest;
 }

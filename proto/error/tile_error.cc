@@ -126,6 +126,8 @@ class TileErrorMeter::Impl {
   struct TriangleError {
     double max_m = std::numeric_limits<double>::infinity();
     bool is_exact = false;
+    // A bound on the error of the height that is linear in longitude and latitude.
+    double linear_m = std::numeric_limits<double>::infinity();
   };
 
   std::size_t NodeIndex(std::int64_t i, std::int64_t j) const {
@@ -239,8 +241,23 @@ class TileErrorMeter::Impl {
     const Linear plane = PlaneOf(t, p, twice_area);
     const double unit = static_cast<double>(surface_.unit);
     const double x = bounds.shift.x * unit, y = bounds.shift.y * unit;
-    return {LargestNear(p, plane, bounds.shift) + bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y,
-            false};
+    const double beyond = bounds.sagitta_m + std::abs(plane.dx) * x + std::abs(plane.dy) * y;
+    if (beyond > min_allowed_) return kUnknown;  // measured in any case: beside cliffs half of all triangles
+    double near = FromLevel(t);
+    constexpr double kLevel_m = 1e-3;  // on the sea
+    if (near > kLevel_m) near = LargestNear(p, plane, bounds.shift);
+    return {near + beyond, false, near};
+  }
+
+  // An upper bound on the difference between the plane and all samples of the tile, anywhere in the triangle.
+  double FromLevel(std::size_t t) const {
+    constexpr double kRounding = 1e-9;
+    double most = 0;
+    for (const std::uint32_t k : surface_.triangles[t]) {
+      const double height = surface_.heights[k];
+      most = std::max({most, height - verticals_.lowest(), verticals_.highest() - height});
+    }
+    return most + kRounding * (most + 1);
   }
 
   // An upper bound on the difference between the plane and the samples of all nodes that lie beside the triangle by at
@@ -289,7 +306,8 @@ class TileErrorMeter::Impl {
     const std::array<NodePoint, 3> p = CornersOf(t);
     Found found(bound_);
     const std::int64_t twice_area = TwiceArea(p);
-    if (surface_.is_planar && twice_area > 0) {
+    const auto measure_linear = [&] {
+      if (!surface_.is_planar || twice_area <= 0) return;
       const std::array<EdgeRows, 3> edges = EdgesOf(p);
       const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
       const Linear plane = PlaneOf(t, p, twice_area);
@@ -307,8 +325,13 @@ class TileErrorMeter::Impl {
               Take(std::abs(height - lattice_.At(i, j)), i, j, found);
             }
           });
-    }
+    };
+    // Linear heights that have no sample with too large an error are needed only if they may have the largest one.
+    const double linear_m = errors_[t].linear_m;
+    const bool is_linear_first = linear_m > min_allowed_;
+    if (is_linear_first) measure_linear();
     MeasureFlat(surface_.triangles[t], p, found);
+    if (!is_linear_first && linear_m > found.largest) measure_linear();
     if (found.sample.error > bound_) samples.push_back(found.sample.at);
     if (found.vertex.error > bound_) vertices.push_back({found.vertex.at, t});
     return {found.largest, true};
@@ -337,8 +360,6 @@ class TileErrorMeter::Impl {
     for (int j = footprint.first_row(); j <= footprint.last_row(); ++j) {
       const VerticalsInTriangle::Columns columns = footprint.ColumnsOf(j);
       if (columns.first > columns.last) continue;
-      const double largest = verticals_.LargestOfRow(plane, j, columns.first, columns.last, lattice_.Row(j));
-      if (largest <= found.largest && largest <= min_allowed_) continue;
       const auto measure = [&](std::int64_t from, std::int64_t to) {
         for (int i = static_cast<int>(from); i <= to; ++i) {
           const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
@@ -356,7 +377,6 @@ class TileErrorMeter::Impl {
           has_inner ? verticals_.LargestOfRow(plane, j, columns.inner_first, columns.inner_last, lattice_.Row(j)) : 0;
       if (has_inner && inner <= min_allowed_) {
         found.largest = std::max(found.largest, inner);
-        if (inner == largest) continue;
         measure(columns.first, columns.inner_first - 1);
         measure(columns.inner_last + 1, columns.last);
       } else {

@@ -1,8 +1,10 @@
 // terrace_cold_tiles measures how many tiles a second the pipeline builds on a number of threads, without HTTP, caches
-// or queues, and how long the stages of a tile take. tests/load/cold_storm.py compares a server with it. "hash" is one
-// of all tiles and their errors: builds of the same bytes print the same.
+// or queues, and how long the stages of a tile take: milliseconds a tile on the clock, and of the processor in user
+// mode. tests/load/cold_storm.py compares a server with it. "hash" is one of all tiles and their errors: builds of the
+// same bytes print the same.
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
 #include <xxhash.h>
 
 #include <CLI/CLI.hpp>
@@ -29,7 +31,15 @@ struct Arguments {
   std::string config, dataset, tiles;
   unsigned threads = std::max(std::thread::hardware_concurrency(), 1u);
   unsigned rounds = 1;
+  bool normals = false;
 };
+
+// Processor time of this process in user mode, milliseconds.
+double UserTime() {
+  rusage used{};
+  getrusage(RUSAGE_SELF, &used);
+  return static_cast<double>(used.ru_utime.tv_sec) * 1e3 + static_cast<double>(used.ru_utime.tv_usec) / 1e3;
+}
 
 // Does not depend on the order of the tiles.
 std::uint64_t HashOf(const geo::TileKey& key, const tiler::EncodedTile& tile) {
@@ -84,6 +94,7 @@ Result<void> Run(const Arguments& arguments) {
       tiler::TileRequest request;
       request.key = (*keys)[i % keys->size()];
       request.coding = tiler::Coding::kGzip;
+      request.normals = arguments.normals;
       const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) ++failed;
       if (!tile) continue;
@@ -96,6 +107,7 @@ Result<void> Run(const Arguments& arguments) {
     }
   };
   const auto begun = std::chrono::steady_clock::now();
+  const double used_before = UserTime();
   std::vector<std::jthread> threads;
   for (unsigned i = 0; i < arguments.threads; ++i) threads.emplace_back(work);
   threads.clear();  // joins
@@ -105,9 +117,10 @@ Result<void> Run(const Arguments& arguments) {
   };
   fmt::print(
       "{{\"tiles\": {}, \"bytes\": {}, \"hash\": \"{:016x}\", \"errors\": {}, \"seconds\": {:.3f}, "
-      "\"read_ms\": {:.3f}, \"refine_ms\": {:.3f}, \"encode_ms\": {:.3f}, \"compress_ms\": {:.3f}}}\n",
+      "\"read_ms\": {:.3f}, \"refine_ms\": {:.3f}, \"encode_ms\": {:.3f}, \"compress_ms\": {:.3f}, \"user_ms\": "
+      "{:.4f}}}\n",
       builds, bytes.load(), hash.load(), failed.load(), seconds.count(), each(read), each(refine), each(encode),
-      each(compress));
+      each(compress), (UserTime() - used_before) / static_cast<double>(builds));
   return {};
 }
 
@@ -122,6 +135,7 @@ int main(int argc, char** argv) {
   app.add_option("tiles", arguments.tiles, "A file of paths, one a line")->required()->check(CLI::ExistingFile);
   app.add_option("--threads", arguments.threads, "As many builds at a time")->check(CLI::PositiveNumber);
   app.add_option("--rounds", arguments.rounds, "Builds each tile as many times")->check(CLI::PositiveNumber);
+  app.add_flag("--normals", arguments.normals, "Tiles with octvertexnormals");
   CLI11_PARSE(app, argc, argv);
   spdlog::set_level(spdlog::level::err);
   const terrace::Result<void> done = terrace::bench::Run(arguments);

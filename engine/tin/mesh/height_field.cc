@@ -52,7 +52,7 @@ HeightField::HeightField(int width, int height, std::vector<float> heights, bool
     : width_(width),
       height_(height),
       has_voids_(has_voids),
-      quantum_(QuantumOf(heights.data(), heights.size())),
+      quantum_(QuantumOf(heights.data(), relief_m > 0 || has_voids ? heights.size() : 1)),
       stride_(StrideFor(width)),
       heights_(std::move(heights)),
       patches_along_x_((width - 1) / kPatchSide + 1),
