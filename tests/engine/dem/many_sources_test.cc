@@ -467,10 +467,10 @@ TEST(OneSource, WhatIsLeftOfAFullTurnCountsAsMisplacement) {
 TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
   for (const int width : {360, 361, 540}) {  // pixels, nodes at -180 and 180 degrees, one and a half turns
     const TempDir dir;
-    const std::string path = WriteRaster(dir, {.width = width,
-                                               .height = 180,
-                                               .geo_transform = {-180, 1, 0, 90, 0, -1},
-                                               .value = [](int col, int row) { return col + row; }});
+    const std::string path = WriteRaster(
+        dir, {.width = width, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}, .value = [](int col, int row) {
+                return col + row;
+              }});
     const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(path).has_value()); });
     EXPECT_EQ(log.find("its last 180 columns") != std::string::npos, width == 540) << log;
     EXPECT_EQ(log.find("more than once around the Earth") != std::string::npos, width == 540) << log;
