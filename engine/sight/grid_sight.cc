@@ -267,7 +267,32 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRang
   const float* const largest = block.largest().data();
   const std::int64_t stride = window.columns;
   double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
+  // Whether `steps` steps from here lie above the highest corner of the square of cells around them, which is known to
+  // contain them. Then goes behind them.
+  const auto skips = [&](int i, int steps, const SightBlock::Squares& squares) {
+    const double more = static_cast<double>(steps) * steps - 1;  // bulges grow with the square of the length
+    const int end = std::min(i + steps, count);
+    const double next = end == count ? last : first + step * end;
+    const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
+    const auto column = static_cast<std::int64_t>(std::max(std::min(x, next_x) - more * bulge(on_x), 0.0));
+    const auto row = static_cast<std::int64_t>(std::max(std::min(y, next_y) - more * bulge(on_y), 0.0));
+    const double lowest_m = std::min(h, next_h) - more * bulge(height_m);
+    const double highest_m = static_cast<double>(squares.At(column, row));
+    if (!scan.search.IsSettled(lowest_m - highest_m, scan.ShareOf(s))) return false;
+    s = next, x = next_x, y = next_y, h = next_h;
+    return true;
+  };
+  // Steps are at most 8/9 of a sample long, so runs of 4 and 8 keep this much of their squares' sides on both sides.
+  const bool has_runs = 64 * std::max(bulge(on_x), bulge(on_y)) < 0.2;
   for (int i = 1; i <= count; ++i) {
+    if (has_runs && i % 8 == 1 && skips(i - 1, 8, block.squares_of_8())) {
+      i += 7;
+      continue;
+    }
+    if (has_runs && i % 4 == 1 && skips(i - 1, 4, block.squares_of_4())) {
+      i += 3;
+      continue;
+    }
     const double next = i == count ? last : first + step * i;
     const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
     // Positions before the window's first sample are cut off by no more than the bulge.

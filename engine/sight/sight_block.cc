@@ -81,6 +81,25 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     }
     levels_.push_back(std::move(coarse));
   }
+  squares_of_4_ = SquaresOf(2);
+  squares_of_8_ = SquaresOf(3);
+}
+
+SightBlock::Squares SightBlock::SquaresOf(int shift) const {
+  // A small block has no level with cells of this size: its coarsest one is one cell.
+  const Level& of = levels_[std::min(static_cast<std::size_t>(shift) - 1, levels_.size() - 1)];
+  Squares squares{shift, of.columns, {}};
+  squares.largest.reserve(of.cells.size());
+  for (std::int64_t row = 0; row < of.rows; ++row) {
+    const CellsBound* const here = &of.cells[static_cast<std::size_t>(row * of.columns)];
+    const CellsBound* const below = row + 1 < of.rows ? here + of.columns : here;
+    for (std::int64_t column = 0; column < of.columns; ++column) {
+      const std::int64_t east = std::min(column + 1, of.columns - 1);
+      squares.largest.push_back(
+          std::max(std::max(here[column].max, here[east].max), std::max(below[column].max, below[east].max)));
+    }
+  }
+  return squares;
 }
 
 CellsBound SightBlock::Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const {
