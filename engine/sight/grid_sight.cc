@@ -17,13 +17,24 @@ constexpr double kUndulationPart = 500;
 // Samples between places that are measured first.
 constexpr double kProbes = 24;
 // Samples: parts of a ray that cross at most this many, none of them void, are walked along.
-constexpr double kWalked = 64;
+constexpr double kWalked = 256;
 // Metres: over the rounding of heights.
 constexpr double kSlack = 1e-6;
 // Parts of a cell with voids: its heights are no polynomial.
 constexpr int kRimParts = 16;
 
 double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
+
+// The first place where a part of less than a block crosses a line between two blocks; its end if it crosses none.
+double FirstBlockLine(const PieceOnGrid& on_grid, double first, double last) {
+  double at = last;
+  for (const Quadratic* const axis : {&on_grid.x, &on_grid.y}) {
+    const double from = std::floor(axis->At(first) / kPointBlockCells),
+                 to = std::floor(axis->At(last) / kPointBlockCells);
+    if (from != to) at = std::min(at, axis->Solve(std::max(from, to) * kPointBlockCells, first, last));
+  }
+  return at;
+}
 
 // The samples of a block, cells among them without voids, and places of a ray over them.
 struct SampleView {
@@ -234,6 +245,18 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   const double length_m = (last - first) * scan.piece.length_m;
   if (size <= kMeasured && (blocks_.includes_undulations() || length_m <= kUndulationPart)) {
     return Measure(scan, first, last);
+  }
+  // Where a part crosses a line between two blocks, it is divided there instead of in many halves.
+  if (!is_in_block && size <= kPointBlockCells && size > kMeasured && !grid_.wraps()) {
+    const double at = FirstBlockLine(scan.on_grid, first, last), beside = (last - first) * 0.25 / size;
+    if (at > first && at < last) {
+      const double before = std::max(first, at - beside), after = std::min(last, at + beside);
+      if (before > first) {
+        if (const Result<void> done = Halve(scan, first, before); !done) return done;
+      }
+      if (const Result<void> done = Halve(scan, before, after); !done) return done;
+      return after < last ? Halve(scan, after, last) : Result<void>();
+    }
   }
   const double middle = (first + last) / 2;
   if (const Result<void> done = Halve(scan, first, middle); !done) return done;
