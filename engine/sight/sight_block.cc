@@ -36,7 +36,9 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
-    : window_(source.window), heights_(source.Samples()), owned_(source.smooth.empty() ? heights_ : source.Bridged()) {
+    : window_(source.window),
+      heights_(source.Samples()),
+      owned_(source.smooth.empty() ? std::vector<float>() : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
@@ -54,8 +56,7 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     return has;
   };
   for (const std::vector<float>* const heights : {&heights_, &owned_}) {
-    // Without a smooth surface both have the same voids.
-    if ((heights == &owned_ && source.smooth.empty()) || !has_voids(*heights)) continue;
+    if (!has_voids(*heights)) continue;
     for (std::int64_t y = 0; y < height; ++y) {
       for (std::int64_t x = 0; x < width; ++x) {
         if (!std::isnan((*heights)[static_cast<std::size_t>(y * width + x)])) continue;

@@ -31,7 +31,8 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  const std::vector<float>& owned() const { return owned_; }      // NaN: voids that are not narrow, and holes
+  // NaN: voids that are not narrow, and holes. Only voids count.
+  const std::vector<float>& owned() const { return owned_.empty() ? heights_ : owned_; }
 
   // A bound over the cells between two cells of the block, inclusive; possibly over more cells.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
@@ -61,8 +62,8 @@ class SightBlock {
   };
 
   GridWindow window_;
-  std::vector<float> heights_, owned_, largest_;
-  std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
+  std::vector<float> heights_, owned_, largest_;  // owned_: empty if its voids are those of heights_
+  std::vector<Level> levels_;                     // cells of 2, 4, 8 .. cells a side
   Squares squares_of_4_, squares_of_8_;
 
   Squares SquaresOf(int shift) const;
