@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace terrace::dem {
 
@@ -21,8 +22,11 @@ class SourceLog {
   static constexpr std::size_t kMaxLines = 5;  // per kind
 
   SourceLog() = default;
+  // If `is_held`, lines are kept until Release; without it they are never written.
+  explicit SourceLog(bool is_held) : is_held_(is_held) {}
   // Writes how many lines of each kind were left out.
   ~SourceLog();
+  void Release();
   SourceLog(const SourceLog&) = delete;
   SourceLog& operator=(const SourceLog&) = delete;
 
@@ -47,10 +51,16 @@ class SourceLog {
     std::size_t count = 0;
     std::string example;  // the last text that was written
   };
-  bool Admits(Level level, std::string_view kind, const std::string& text);
+  struct Line {
+    Level level;
+    std::string text;
+  };
+  void Add(Level level, std::string_view kind, const std::string& path, const std::string& text);
 
   std::mutex mutex_;
-  std::map<std::pair<Level, std::string>, Lines> lines_;  // guarded by mutex_
+  bool is_held_ = false;  // guarded by mutex_, as are these
+  std::vector<Line> held_;
+  std::map<std::pair<Level, std::string>, Lines> lines_;
 };
 
 // The format string is the kind of the line.

@@ -4,19 +4,15 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/geometry/algorithms/correct.hpp>
-#include <boost/geometry/algorithms/intersects.hpp>
-#include <boost/geometry/algorithms/is_valid.hpp>
-#include <boost/geometry/geometries/point_xy.hpp>
-#include <boost/geometry/geometries/polygon.hpp>
-#include <boost/geometry/strategies/strategies.hpp>
 #include <cmath>
 #include <filesystem>
 #include <limits>
 #include <numeric>
+#include <span>
 #include <string_view>
 #include <utility>
 
+#include "engine/edits/edit_polygon.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/ellipsoid.h"
 
@@ -24,8 +20,6 @@ namespace terrace::dem {
 namespace {
 
 using nlohmann::json;
-using Point = boost::geometry::model::d2::point_xy<double>;
-using Polygon = boost::geometry::model::polygon<Point>;
 
 constexpr double kMaxHeight_m = 20'000;
 constexpr double kMaxWidth_m = 100'000;
@@ -91,7 +85,7 @@ class Parser {
   std::optional<double> Number(const json& terrain, const char* key, double low, double high);
   void ReadGeometry(const json& geometry);
   void AddRing(const json& points);
-  void CheckPolygon(std::size_t first_ring);
+  void CheckPolygons(std::span<const std::size_t> first_rings);
   void ReadOptions(const json& terrain);
   void ReadDatum(const json& terrain);
   void ReadHeights(const json& terrain);
@@ -110,8 +104,17 @@ class Parser {
 
 std::optional<Edit> Parser::Parse(const json& feature) {
   if (!feature.contains("properties") || !feature["properties"].is_object()) return std::nullopt;
-  const auto terrain = feature["properties"].find("terrain");
-  if (terrain == feature["properties"].end()) return std::nullopt;
+  const json& properties = feature["properties"];
+  const auto terrain = properties.find("terrain");
+  if (terrain == properties.end()) {
+    const auto op = properties.find("op");
+    if (op != properties.end() && std::ranges::find(kEditOpNames, *op) != kEditOpNames.end()) {
+      first_ = FirstPosition(feature);
+      Fail(fmt::format("\"op\" belongs into \"terrain\": \"properties\": {{\"terrain\": {{\"op\": {}, ...}}}}",
+                       op->dump()));
+    }
+    return std::nullopt;
+  }
   edit_.file = file_;
   edit_.feature = feature_;
   first_ = FirstPosition(feature);
@@ -188,7 +191,11 @@ void Parser::AddRing(const json& points) {
       return Fail("crosses the antimeridian; divide it into two features (RFC 7946, section 3.1.9)", at);
     }
     std::optional<double> height;
-    if (point.size() > 2 && point[2].is_number()) height = point[2].get<double>();
+    if (point.size() > 2 && point[2].is_number()) {
+      height = point[2].get<double>();
+    } else if (point.size() > 2 && !point[2].is_null()) {
+      return Fail(fmt::format("{} is no height: a number, or null for none", point[2].dump()), at);
+    }
     ring.push_back({at, height});
   }
   if (!edit_.is_area) {
@@ -204,24 +211,26 @@ void Parser::AddRing(const json& points) {
   rings_.push_back(std::move(ring));
 }
 
-// Self-intersections, spikes, holes outside their polygon.
-void Parser::CheckPolygon(std::size_t first_ring) {
+std::vector<GeoPosition> PositionsOf(const Ring& ring) {
+  std::vector<GeoPosition> positions;
+  for (const Vertex& vertex : ring) positions.push_back(vertex.at);
+  return positions;
+}
+
+// `first_rings`: of the parts, each an outer ring and its holes.
+void Parser::CheckPolygons(std::span<const std::size_t> first_rings) {
   if (has_failed()) return;
-  Polygon polygon;
-  for (std::size_t r = first_ring; r < rings_.size(); ++r) {
-    if (r > first_ring) polygon.inners().emplace_back();
-    auto& ring = r == first_ring ? polygon.outer() : polygon.inners().back();
-    for (const Vertex& vertex : rings_[r]) ring.emplace_back(vertex.at.longitude, vertex.at.latitude);
-    ring.push_back(ring.front());
+  std::vector<RingsOfPart> parts;
+  for (std::size_t r = 0; r < rings_.size(); ++r) {
+    if (parts.size() < first_rings.size() && first_rings[parts.size()] == r) parts.emplace_back();
+    parts.back().push_back(PositionsOf(rings_[r]));
   }
-  boost::geometry::correct(polygon);
-  if (boost::geometry::intersects(polygon))
-    return Fail("the polygon is not valid: its rings intersect themselves or each other");
-  std::string why;
-  boost::geometry::validity_failure_type type{};
-  if (boost::geometry::is_valid(polygon, type) || type == boost::geometry::failure_duplicate_points) return;
-  boost::geometry::is_valid(polygon, why);
-  Fail(fmt::format("the polygon is not valid: {}", why));
+  for (const RingsOfPart& part : parts) {
+    if (const std::string fault = FaultOf(part); !fault.empty()) return Fail("the polygon is not valid: " + fault);
+  }
+  if (const auto place = FirstOverlap(parts)) {
+    Fail("parts of the polygon overlap; merge them, or divide them into features", *place);
+  }
 }
 
 void Parser::ReadGeometry(const json& geometry) {
@@ -233,19 +242,22 @@ void Parser::ReadGeometry(const json& geometry) {
   const json& coordinates = geometry["coordinates"];
   const bool takes_area = edit_.op != EditOp::kCarve && edit_.op != EditOp::kRaise && edit_.op != EditOp::kBreakline;
   const bool takes_line = !takes_area || edit_.op == EditOp::kPrecision;
+  std::vector<std::size_t> first_rings;
   const auto add_polygon = [&](const json& polygon) {
-    const std::size_t first = rings_.size();
+    first_rings.push_back(rings_.size());
     if (!polygon.is_array() || polygon.empty()) return Fail("a polygon needs a ring");
     for (const json& ring : polygon) AddRing(ring);
-    CheckPolygon(first);
   };
   if ((type == "Polygon" || type == "MultiPolygon") && takes_area) {
     edit_.is_area = true;
-    if (type == "Polygon") return add_polygon(coordinates);
-    // The heights of a slope are those of one ring.
-    if (edit_.op == EditOp::kSlope && coordinates.size() > 1)
-      return Fail("slope takes one polygon; divide the parts into features");
-    for (const json& polygon : coordinates) add_polygon(polygon);
+    if (type == "Polygon") {
+      add_polygon(coordinates);
+    } else if (edit_.op == EditOp::kSlope && coordinates.size() > 1) {
+      return Fail("slope takes one polygon; divide the parts into features");  // its heights are those of one ring
+    } else {
+      for (const json& polygon : coordinates) add_polygon(polygon);
+    }
+    CheckPolygons(first_rings);
   } else if ((type == "LineString" || type == "MultiLineString") && takes_line) {
     edit_.is_area = false;
     if (type == "LineString") return AddRing(coordinates);
@@ -277,7 +289,9 @@ void Parser::ReadOptions(const json& terrain) {
     if (!error && !factor && !has_failed()) Fail("precision needs \"error_m\" or \"factor\"");
     edit_.error_m = error.value_or(edit_.error_m);
     edit_.factor = factor.value_or(1);
-    edit_.min_level = static_cast<int>(Number(terrain, "min_level", 0, 30).value_or(0));
+    const double min_level = Number(terrain, "min_level", 0, 30).value_or(0);
+    edit_.min_level = static_cast<int>(min_level);
+    if (min_level != edit_.min_level) Fail(fmt::format("min_level is {}; it must be a whole number", min_level));
   }
   if (edit_.op == EditOp::kReplace) {
     const auto source = terrain.find("source");
@@ -328,7 +342,12 @@ std::vector<std::optional<double>> Parser::HeightsOf(const json& terrain, const 
   } else if (given->is_array() &&
              (given->size() == ring.size() || (edit_.is_area && given->size() == ring.size() + 1))) {
     for (std::size_t i = 0; i < ring.size(); ++i) {
-      if ((*given)[i].is_number()) heights[i] = (*given)[i].get<double>();
+      const json& height = (*given)[i];
+      if (height.is_number()) {
+        heights[i] = height.get<double>();
+      } else if (!height.is_null()) {
+        Fail(fmt::format("{} has {}; heights are numbers, or null where none is given", key, height.dump()));
+      }
     }
   } else {
     Fail(fmt::format("{} must be {} heights, one for each position", key, ring.size()));

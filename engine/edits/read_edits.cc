@@ -7,17 +7,33 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <span>
+#include <stdexcept>
 #include <utility>
 
 #include "engine/edits/parse_edit.h"
 
 namespace terrace::dem {
+namespace {
+
+// Deeper values are refused: GeoJSON needs 9 levels, and the parser's values are written recursively.
+constexpr int kMaxNesting = 64;
+
+// Messages quote the file, and what they quote may be as long as the file.
+std::string Shortened(const std::string& message) {
+  constexpr std::size_t kMaxBytes = 500;
+  if (message.size() <= kMaxBytes) return message;
+  std::size_t size = kMaxBytes;
+  while ((static_cast<unsigned char>(message[size]) & 0xC0) == 0x80) --size;  // between characters of UTF-8
+  return message.substr(0, size) + " ...";
+}
+
+}  // namespace
 
 std::string EditFault::Text() const {
   std::string text = file;
   if (feature) text += fmt::format(": feature {}", *feature);
   if (place) text += fmt::format(" at {:.6f}, {:.6f} (lat, lon)", place->latitude, place->longitude);
-  return text + ": " + message;
+  return text + ": " + Shortened(message);
 }
 
 std::string TextOf(const std::vector<EditFault>& faults) {
@@ -62,18 +78,28 @@ void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<Ed
   }
   std::size_t features = 0;
   const std::size_t first = edits.size();
-  bool in_features = false, has_features = false;
+  bool is_features = false, in_features = false, has_features = false;  // the key, its list, any list
   const auto take = [&](const json& feature) {
     if (auto edit = ParseEdit(feature, path, features, faults)) edits.push_back(*std::move(edit));
     ++features;
   };
   // The features of a collection are parsed one by one, and not kept.
   const json::parser_callback_t each = [&](int depth, json::parse_event_t event, json& value) {
-    if (event == json::parse_event_t::key && depth == 1) {
-      in_features = value == "features";
-      has_features |= in_features;
+    using Event = json::parse_event_t;
+    if (depth > kMaxNesting) throw std::length_error(fmt::format("values are nested deeper than {}", kMaxNesting));
+    if (event == Event::key && depth == 1) {
+      is_features = value == "features";
+      in_features = false;
     }
-    if (event == json::parse_event_t::object_end && depth == 2 && in_features) {
+    if (event == Event::array_start && depth == 1) {
+      in_features = is_features;
+      has_features |= is_features;
+    }
+    if (in_features && depth == 2 && (event == Event::value || event == Event::array_start)) {
+      faults.push_back({path, features, {}, "is no object of the type \"Feature\""});
+      ++features;
+    }
+    if (event == Event::object_end && depth == 2 && in_features) {
       take(value);
       return false;
     }

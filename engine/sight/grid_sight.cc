@@ -17,13 +17,24 @@ constexpr double kUndulationPart = 500;
 // Samples between places that are measured first.
 constexpr double kProbes = 24;
 // Samples: parts of a ray that cross at most this many, none of them void, are walked along.
-constexpr double kWalked = 64;
+constexpr double kWalked = 256;
 // Metres: over the rounding of heights.
 constexpr double kSlack = 1e-6;
 // Parts of a cell with voids: its heights are no polynomial.
 constexpr int kRimParts = 16;
 
 double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
+
+// The first place where a part of less than a block crosses a line between two blocks; its end if it crosses none.
+double FirstBlockLine(const PieceOnGrid& on_grid, double first, double last) {
+  double at = last;
+  for (const Quadratic* const axis : {&on_grid.x, &on_grid.y}) {
+    const double from = std::floor(axis->At(first) / kPointBlockCells),
+                 to = std::floor(axis->At(last) / kPointBlockCells);
+    if (from != to) at = std::min(at, axis->Solve(std::max(from, to) * kPointBlockCells, first, last));
+  }
+  return at;
+}
 
 // The samples of a block, cells among them without voids, and places of a ray over them.
 struct SampleView {
@@ -235,6 +246,18 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
   if (size <= kMeasured && (blocks_.includes_undulations() || length_m <= kUndulationPart)) {
     return Measure(scan, first, last);
   }
+  // Where a part crosses a line between two blocks, it is divided there instead of in many halves.
+  if (!is_in_block && size <= kPointBlockCells && size > kMeasured && !grid_.wraps()) {
+    const double at = FirstBlockLine(scan.on_grid, first, last), beside = (last - first) * 0.25 / size;
+    if (at > first && at < last) {
+      const double before = std::max(first, at - beside), after = std::min(last, at + beside);
+      if (before > first) {
+        if (const Result<void> done = Halve(scan, first, before); !done) return done;
+      }
+      if (const Result<void> done = Halve(scan, before, after); !done) return done;
+      return after < last ? Halve(scan, after, last) : Result<void>();
+    }
+  }
   const double middle = (first + last) / 2;
   if (const Result<void> done = Halve(scan, first, middle); !done) return done;
   return Halve(scan, middle, last);
@@ -267,7 +290,32 @@ Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRang
   const float* const largest = block.largest().data();
   const std::int64_t stride = window.columns;
   double s = first, x = on_x.At(s) - west, y = on_y.At(s) - north, h = height_m.At(s) - slack_m;
+  // Whether `steps` steps from here lie above the highest corner of the square of cells around them, which is known to
+  // contain them. Then goes behind them.
+  const auto skips = [&](int i, int steps, const SightBlock::Squares& squares) {
+    const double more = static_cast<double>(steps) * steps - 1;  // bulges grow with the square of the length
+    const int end = std::min(i + steps, count);
+    const double next = end == count ? last : first + step * end;
+    const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
+    const auto column = static_cast<std::int64_t>(std::max(std::min(x, next_x) - more * bulge(on_x), 0.0));
+    const auto row = static_cast<std::int64_t>(std::max(std::min(y, next_y) - more * bulge(on_y), 0.0));
+    const double lowest_m = std::min(h, next_h) - more * bulge(height_m);
+    const double highest_m = static_cast<double>(squares.At(column, row));
+    if (!scan.search.IsSettled(lowest_m - highest_m, scan.ShareOf(s))) return false;
+    s = next, x = next_x, y = next_y, h = next_h;
+    return true;
+  };
+  // Steps are at most 8/9 of a sample long, so runs of 4 and 8 keep this much of their squares' sides on both sides.
+  const bool has_runs = 64 * std::max(bulge(on_x), bulge(on_y)) < 0.2;
   for (int i = 1; i <= count; ++i) {
+    if (has_runs && i % 8 == 1 && skips(i - 1, 8, block.squares_of_8())) {
+      i += 7;
+      continue;
+    }
+    if (has_runs && i % 4 == 1 && skips(i - 1, 4, block.squares_of_4())) {
+      i += 3;
+      continue;
+    }
     const double next = i == count ? last : first + step * i;
     const double next_x = on_x.At(next) - west, next_y = on_y.At(next) - north, next_h = height_m.At(next) - slack_m;
     // Positions before the window's first sample are cut off by no more than the bulge.

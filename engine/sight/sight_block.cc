@@ -36,7 +36,9 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 }  // namespace
 
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
-    : window_(source.window), heights_(source.Samples()), owned_(source.smooth.empty() ? heights_ : source.Bridged()) {
+    : window_(source.window),
+      heights_(source.Samples()),
+      owned_(source.smooth.empty() ? std::vector<float>() : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
@@ -54,8 +56,7 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     return has;
   };
   for (const std::vector<float>* const heights : {&heights_, &owned_}) {
-    // Without a smooth surface both have the same voids.
-    if ((heights == &owned_ && source.smooth.empty()) || !has_voids(*heights)) continue;
+    if (!has_voids(*heights)) continue;
     for (std::int64_t y = 0; y < height; ++y) {
       for (std::int64_t x = 0; x < width; ++x) {
         if (!std::isnan((*heights)[static_cast<std::size_t>(y * width + x)])) continue;
@@ -81,6 +82,25 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     }
     levels_.push_back(std::move(coarse));
   }
+  squares_of_4_ = SquaresOf(2);
+  squares_of_8_ = SquaresOf(3);
+}
+
+SightBlock::Squares SightBlock::SquaresOf(int shift) const {
+  // A small block has no level with cells of this size: its coarsest one is one cell.
+  const Level& of = levels_[std::min(static_cast<std::size_t>(shift) - 1, levels_.size() - 1)];
+  Squares squares{shift, of.columns, {}};
+  squares.largest.reserve(of.cells.size());
+  for (std::int64_t row = 0; row < of.rows; ++row) {
+    const CellsBound* const here = &of.cells[static_cast<std::size_t>(row * of.columns)];
+    const CellsBound* const below = row + 1 < of.rows ? here + of.columns : here;
+    for (std::int64_t column = 0; column < of.columns; ++column) {
+      const std::int64_t east = std::min(column + 1, of.columns - 1);
+      squares.largest.push_back(
+          std::max(std::max(here[column].max, here[east].max), std::max(below[column].max, below[east].max)));
+    }
+  }
+  return squares;
 }
 
 CellsBound SightBlock::Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const {

@@ -31,13 +31,29 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  const std::vector<float>& owned() const { return owned_; }      // NaN: voids that are not narrow, and holes
+  // NaN: voids that are not narrow, and holes. Only voids count.
+  const std::vector<float>& owned() const { return owned_.empty() ? heights_ : owned_; }
 
   // A bound over the cells between two cells of the block, inclusive; possibly over more cells.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
   // By sample, as heights(): the largest height of the 3 x 3 samples from it to the south-east, which are the corners
   // of 2 x 2 cells; voids do not count.
   const std::vector<float>& largest() const { return largest_; }
+
+  // The largest heights of overlapping squares of cells: of 2 * side x 2 * side cells from every multiple of `side`.
+  // Every run of at most `side` cells lies in the square that its first cell is in the first quarter of.
+  struct Squares {
+    int shift = 0;  // side = 1 << shift
+    std::int64_t columns = 0;
+    std::vector<float> largest;
+
+    float At(std::int64_t column, std::int64_t row) const {
+      return largest[static_cast<std::size_t>((row >> shift) * columns + (column >> shift))];
+    }
+  };
+  // With sides of 4 and 8 cells.
+  const Squares& squares_of_4() const { return squares_of_4_; }
+  const Squares& squares_of_8() const { return squares_of_8_; }
 
  private:
   struct Level {
@@ -46,8 +62,11 @@ class SightBlock {
   };
 
   GridWindow window_;
-  std::vector<float> heights_, owned_, largest_;
-  std::vector<Level> levels_;  // cells of 2, 4, 8 .. cells a side
+  std::vector<float> heights_, owned_, largest_;  // owned_: empty if its voids are those of heights_
+  std::vector<Level> levels_;                     // cells of 2, 4, 8 .. cells a side
+  Squares squares_of_4_, squares_of_8_;
+
+  Squares SquaresOf(int shift) const;
 };
 
 // Blocks that are kept: of 1 MB each for 256 x 256 samples.

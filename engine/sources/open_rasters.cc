@@ -150,6 +150,8 @@ class Opening {
 
   // Nothing: not begun.
   std::vector<std::optional<Opened>>& opened() { return opened_; }
+  // Writes the lines that were held back.
+  void Log() { log_.Release(); }
 
  private:
   std::function<void(double)> ProgressOf(std::size_t i) {
@@ -169,7 +171,7 @@ class Opening {
   const bool only_kept_;
   const unsigned threads_;  // of each file
   const std::shared_ptr<StatisticsPages> pages_ = std::make_shared<StatisticsPages>(kKeptTables, kPagedTables);
-  SourceLog log_;
+  SourceLog log_{only_kept_};  // if statistics are missing, the files are opened again, and log then
   std::mutex mutex_;
   std::map<std::size_t, std::stop_source> running_;  // guarded by mutex_, as are these
   std::vector<double> shares_;                       // done of each file
@@ -209,7 +211,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     } else if (opening.LacksStatistics(opened)) {
       if (!lacking) lacking = opened.error();
     } else {
-      if (only_kept) others.Log();
+      if (only_kept) others.Log(), opening.Log();
       if (!options.fault || options.stop.stop_requested()) return tl::unexpected(opened.error());
       options.fault(opened.error());
       if (!fault) fault = opened.error();
@@ -217,7 +219,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     kept.push_back(std::move(files[i]));
   }
   if (lacking) return tl::unexpected(*std::move(lacking));
-  if (only_kept) others.Log();
+  if (only_kept) others.Log(), opening.Log();
   LogLeftOut(spdlog::level::warn, without_height);
   left_out = std::move(others.missed);
   left_out.insert(left_out.end(), without_height.begin(), without_height.end());

@@ -285,9 +285,8 @@ void RasterSource::LogOpened(GDALDataset& dataset, bool has_ragged_voids) const 
               "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", info_.found_voids);
   }
   if (has_ragged_voids) {
-    spdlog::warn(
-        "{}: its voids are too ragged to tell holes from collars around the data: none of them is smoothed over",
-        info_.path);
+    LogSource(SourceLog::Level::kWarn, info_.path,
+              "its voids are too ragged to tell holes from collars around the data: none of them is smoothed over");
   }
 }
 

@@ -71,6 +71,18 @@ Result<std::vector<float>> ReadNodes(const tiler::TilePipeline& pipeline, std::u
   return heights;
 }
 
+// Integers of 16 bits have no value for a void. Beside the data all of them would be 0, which looks like the sea.
+Result<void> CheckHasHeights(const GridQuery& query, const dem::OutputGrid& grid, const Steps& steps,
+                             const DatasetView& view) {
+  const bool is_16_bit = query.format == GridFormat::kR16 || query.format == GridFormat::kPng16;
+  if (!is_16_bit || query.range || steps.voids < dem::Area(grid.columns, grid.rows)) return {};
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "bbox: no node of the grid has a height, which 16-bit integers cannot say; the data is from {} to {} "
+      "E, {} to {} N: choose a bbox there, format=f32 or geotiff, where voids are NaN, or a range",
+      view.west, view.east, view.south, view.north);
+}
+
 // The Terrain-Grid header.
 std::string Describe(const dem::OutputGrid& grid, const Steps& steps) {
   return fmt::format(
@@ -133,6 +145,8 @@ asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContex
     made.reply.times.read = tiler::MicrosecondsSince(begun);
     begun = TileService::Clock::now();
     const Steps steps = Steps::Of(*heights, query->range);
+    const auto checked = CheckHasHeights(*query, *grid, steps, catalog->datasets[dataset]);
+    if (!checked) return tl::unexpected(checked.error());
     Result<std::string> bytes = Encode(*query, *grid, *heights, steps);
     if (!bytes) return tl::unexpected(std::move(bytes).error());
     made.reply.times.encode = tiler::MicrosecondsSince(begun);

@@ -197,6 +197,16 @@ class GridsAndSight(unittest.TestCase):
                 ("bbox=7,46,8,97&width=9&height=9", "latitudes")):
             self.assertIn(says, self.refused("/grid?" + query))
 
+    def test_grids_beside_the_data(self):
+        beside = "/grid?bbox=20,10,21,11&width=3&height=2"
+        self.assertTrue(all(math.isnan(height) for height in struct.unpack("<6f", self.get(beside)[0])))
+        self.assertTrue(all(math.isnan(height) for height in tiff_heights(self.get(beside + "&format=geotiff")[0])[1]))
+        self.assertEqual(json.loads(self.get(beside + "&format=json")[0])["voids"], 6)
+        for form in ("r16", "png16"):
+            self.assertIn("no node of the grid has a height", self.refused(f"{beside}&format={form}"))
+        # One of a row of landscapes with a common range may be beside the data.
+        self.assertEqual(self.get(beside + "&format=r16&range=0,512")[0], bytes(12))
+
     def test_bodies_refuse(self):
         point = struct.pack("<2d", 7.3, 46.2)
         for body, says in ((point[:-1], "no multiple of 16"), (point * 10_001, "more than 10000 points"),

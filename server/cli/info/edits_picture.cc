@@ -127,6 +127,7 @@ std::string CountEdits(const dem::DemSource& source) {
   for (const dem::EditOutline& edit : source.Edits()) ++counts[edit.op];
   std::string text;
   for (const auto& [op, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, op);
+  if (text.empty()) return "none: no feature has \"terrain\" in its properties";
   return fmt::format("{}: {}", source.info().edits, text);
 }
 

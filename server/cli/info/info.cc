@@ -233,11 +233,11 @@ int Info(const InfoArguments& arguments) {
       all.push_back(is_one ? ToJson(info) : nlohmann::json::parse(MosaicJson(name, info)));
       all.back()["left_out"] = info.left_out;
       all.back()["version"] = version;
-      if (info.edits > 0) all.back()["edits"] = info.edits;
+      if (!dataset.edits.empty()) all.back()["edits"] = info.edits;
     } else {
       is_one ? PrintText(info) : PrintMosaic(name, info);
       fmt::print("  {:<14}{}\n", "version", version);
-      if (info.edits > 0) fmt::print("  {:<14}{}\n", "edits", CountEdits(*source));
+      if (!dataset.edits.empty()) fmt::print("  {:<14}{}\n", "edits", CountEdits(*source));
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
     if (!draw.empty()) exit_code = std::max(exit_code, Draw(*source, draw));

@@ -229,13 +229,51 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
   EXPECT_EQ(message.find("feature 0 "), std::string::npos);
 }
 
+TEST_F(TerrainEdits, RefuseWhatWouldBeIgnored) {
+  const auto parts = [](const std::string& second) {
+    return R"({"type":"Feature","properties":{"terrain":{"op":"offset","metres":1}},"geometry":{"type":"MultiPolygon",)"
+           R"("coordinates":[[[[10.1,50.1],[10.2,50.1],[10.2,50.2],[10.1,50.2],[10.1,50.1]]],[)" +
+           second + "]]}}";
+  };
+  const std::string message =
+      MessageOf(parts("[[10.15,50.15],[10.25,50.15],[10.25,50.25],[10.15,50.25],[10.15,50.15]]") + "," +
+                Middle(R"({"op":"slope","heights":["100",200,300,400]})") + ",null," +
+                Middle(R"({"op":"precision","error_m":1,"min_level":3.5})") +
+                R"(,{"type":"Feature","properties":{"op":"hole"},"geometry":null})");
+  for (const char* part :
+       {"feature 0 at 50.150000, 10.150000 (lat, lon): parts of the polygon overlap", "feature 1 at",
+        "heights has \"100\"; heights are numbers", "feature 2: is no object of the type", "feature 3 at",
+        "min_level is 3.5; it must be a whole number", "feature 4: \"op\" belongs into \"terrain\""}) {
+    EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
+  }
+  // Parts that touch, or lie in a hole of another one.
+  EXPECT_NE(Open(parts("[[10.2,50.1],[10.3,50.1],[10.3,50.2],[10.2,50.2],[10.2,50.1]]")), nullptr);
+}
+
+TEST_F(TerrainEdits, HaveShortMessagesAboutLongTexts) {
+  std::string accents;
+  for (int i = 0; i < 100'000; ++i) accents += "\u00e9";
+  const std::string message = MessageOf(Middle(R"({"op":"flatten","height":1,"xx)" + accents + "\":1}"));
+  EXPECT_LT(message.size(), 1000U);
+  EXPECT_EQ(message.substr(message.size() - 6), "\u00e9 ...");  // no half of a character
+  EXPECT_LT(MessageOf(Middle(R"({"op":"flatten","height":")" + accents)).size(), 1000U);
+}
+
 TEST_F(TerrainEdits, RefuseFilesThatAreNoGeoJson) {
-  for (const char* text : {"{", "[]", R"({"type":"Feature)", R"({"type":"FeatureCollection"})", ""}) {
+  // Deep values are refused before anything walks them.
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  for (const std::string& text :
+       {std::string("{"), std::string("[]"), std::string(R"({"type":"Feature)"),
+        std::string(R"({"type":"FeatureCollection"})"), std::string(),
+        std::string(R"({"type":"FeatureCollection","features":null})"),
+        R"({"type":"FeatureCollection","features":{"a":)" + Middle(R"({"op":"hole"})") + "}}",
+        R"({"type":"FeatureCollection","features":[],"crs":)" + deep + "}",
+        R"({"type":"FeatureCollection","features":[)" + Middle(R"({"op":"flatten","height":)" + deep + "}") + "]}"}) {
     std::ofstream(dir_.File("bad.geojson")) << text;
     DemOptions options;
     options.edits = {dir_.File("bad.geojson")};
     const auto opened = DemSource::Open(slope_, options);
-    ASSERT_FALSE(opened.has_value()) << text;
+    ASSERT_FALSE(opened.has_value()) << text.substr(0, 200);
     EXPECT_NE(opened.error().message.find("bad.geojson"), std::string::npos);
   }
 }

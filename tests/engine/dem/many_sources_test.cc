@@ -408,22 +408,40 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
 
-// The log of opening the files.
-std::string LogOf(const std::vector<DemFile>& files) {
+// What is logged by a function.
+template <typename Function>
+std::string LogOf(const Function& function) {
   std::ostringstream text;
   const auto before = spdlog::default_logger();
   spdlog::set_default_logger(
       std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
-  EXPECT_TRUE(DemSource::Open(files).has_value());
+  function();
   spdlog::set_default_logger(before);
   return text.str();
 }
 
 TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   const TempDir dir;
-  const std::string log = LogOf(WriteFolder(dir, 30));
+  const auto files = WriteFolder(dir, 30);
+  const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(files).has_value()); });
   EXPECT_EQ(std::ranges::count(log, '\n'), 6) << log;
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
+}
+
+// Files without statistics are opened once more after OpenKept, and told then.
+TEST(ManySources, TheLogSaysTheSameOfAFileOnce) {
+  const TempDir dir;
+  DemOptions options;
+  options.cache = CacheIn(dir.File("cache"));
+  const auto files = WriteFolder(dir, 2);
+  EXPECT_TRUE(DemSource::Open({files.front()}, options).has_value());
+  EXPECT_EQ(LogOf([&] { EXPECT_FALSE(DemSource::OpenKept(files, options).has_value()); }), "");
+  for (const bool only_kept : {false, true}) {
+    const std::string log = LogOf([&] {
+      EXPECT_TRUE((only_kept ? DemSource::OpenKept(files, options) : DemSource::Open(files, options)).has_value());
+    });
+    EXPECT_EQ(std::ranges::count(log, '\n'), 2) << log;
+  }
 }
 
 // The grid closes on whole columns. The remainder of 360 degrees is between its last and its first column, and a bound
@@ -449,10 +467,11 @@ TEST(OneSource, WhatIsLeftOfAFullTurnCountsAsMisplacement) {
 TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
   for (const int width : {360, 361, 540}) {  // pixels, nodes at -180 and 180 degrees, one and a half turns
     const TempDir dir;
-    const std::string log = LogOf({{.path = WriteRaster(dir, {.width = width,
-                                                              .height = 180,
-                                                              .geo_transform = {-180, 1, 0, 90, 0, -1},
-                                                              .value = [](int col, int row) { return col + row; }})}});
+    const std::string path = WriteRaster(
+        dir, {.width = width, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}, .value = [](int col, int row) {
+                return col + row;
+              }});
+    const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(path).has_value()); });
     EXPECT_EQ(log.find("its last 180 columns") != std::string::npos, width == 540) << log;
     EXPECT_EQ(log.find("more than once around the Earth") != std::string::npos, width == 540) << log;
   }

@@ -1,0 +1,22 @@
+// Whether the polygons of a feature are valid.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "engine/common/dem_types.h"
+
+namespace terrace::dem {
+
+// The outer ring of a part of a polygon, and its holes: degrees, without the last position, which is the first.
+using RingsOfPart = std::vector<std::vector<GeoPosition>>;
+
+// What is wrong with a part: rings that intersect, spikes, holes outside. Empty: nothing.
+std::string FaultOf(const RingsOfPart& part);
+
+// A position of a part that overlaps another one; parts may touch. What two parts cover would count as outside.
+std::optional<GeoPosition> FirstOverlap(std::span<const RingsOfPart> parts);
+
+}  // namespace terrace::dem
