@@ -283,10 +283,12 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
   if (!worker.empty()) lock_name = bake::LockOfWorker(worker, arguments.job);
   const auto lock = bake::PlaceLock::Take(place, lock_name);
+  if (signals.signal() != 0) return StopCode(signals);  // a store that does not answer holds it up
   if (!lock) return Fail(lock.error());
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
-  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed)
-    return Fail(claimed.error());
+  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
+    return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
+  }
   if (!worker.empty() && IsFinished(place, targets)) return kExitOk;
   if (!arguments.update.empty()) {
     if (const auto read = ReadOld(arguments.update, targets); !read) return Fail(read.error());
