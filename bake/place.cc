@@ -193,9 +193,8 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
                        place, owner.pid, owner.host, other);
     }
     if (!created) {
-      return MakeError(ErrorCode::kUnavailable,
-                       "{}: cannot be written: {}; give a folder with room that can be written", file,
-                       created.error().message);
+      return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a place with room that can be written",
+                       file, created.error().message);
     }
     const std::string text = ReadText(file);
     const Owner owner = Owner::Parse(text);

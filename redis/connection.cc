@@ -2,6 +2,7 @@
 
 #include <hiredis/hiredis.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <string_view>
@@ -12,8 +13,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// hiredis allocates an array of the size that the peer claims before any element is there.
+// hiredis allocates an array of the size that the peer claims before any element is there. Arrays may be nested. All
+// elements of the replies to a call have at least kMinElementBytes, as "+\r\n" has.
 constexpr int kMaxElements = 1'000'000;
+constexpr std::size_t kMinElementBytes = 3;
 
 void* CreateBoundedArray(const redisReadTask* task, int elements);
 
@@ -35,7 +38,10 @@ struct ReplyFunctions {
 };
 
 void* CreateBoundedArray(const redisReadTask* task, int elements) {
-  return elements > kMaxElements ? nullptr : ReplyFunctions::Get().of_hiredis.createArray(task, elements);
+  auto& left = *static_cast<std::size_t*>(task->privdata);  // Connection::elements_left_
+  if (elements > kMaxElements || static_cast<std::size_t>(std::max(elements, 0)) > left) return nullptr;
+  left -= static_cast<std::size_t>(std::max(elements, 0));
+  return ReplyFunctions::Get().of_hiredis.createArray(task, elements);
 }
 
 constexpr std::string_view kTooManyClients = "ERR max number of clients";
@@ -65,7 +71,9 @@ Connection::Connection(Socket socket, const Address& address, const ConnectionOp
     : socket_(std::move(socket)),
       name_(address.Text()),
       options_(options),
-      reader_(::redisReaderCreateWithFunctions(&ReplyFunctions::Get().bounded)) {}
+      reader_(::redisReaderCreateWithFunctions(&ReplyFunctions::Get().bounded)) {
+  if (reader_) reader_->privdata = &elements_left_;
+}
 
 Connection::~Connection() = default;
 
@@ -117,6 +125,7 @@ Result<void> Connection::CallAll(std::span<const Command> commands, Deadline dea
   is_open_ = false;  // unless every reply comes
   if (auto written = socket_.Write(Encoded(commands), deadline); !written) return written;
   std::size_t bytes_left = options_.max_reply_bytes;
+  elements_left_ = bytes_left / kMinElementBytes;
   while (replies.size() < commands.size()) {
     auto reply = ReadReply(deadline, bytes_left);
     if (!reply) return tl::unexpected(reply.error());

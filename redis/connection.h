@@ -74,6 +74,7 @@ class Connection {
   const std::string name_;
   const ConnectionOptions options_;
   std::unique_ptr<redisReader, FreeReader> reader_;
+  std::size_t elements_left_ = 0;  // of arrays, in the replies to a call
   bool is_open_ = true;
 };
 

@@ -76,7 +76,7 @@ bool IsBucket(const std::string& place) {
 
 void LimitRequests() {
   constexpr std::array<std::pair<const char*, const char*>, 5> kLimits = {{{"GDAL_HTTP_CONNECTTIMEOUT", "10"},
-                                                                           {"GDAL_HTTP_LOW_SPEED_TIME", "20"},
+                                                                           {"GDAL_HTTP_LOW_SPEED_TIME", "10"},
                                                                            {"GDAL_HTTP_LOW_SPEED_LIMIT", "1"},
                                                                            {"GDAL_HTTP_MAX_RETRY", "3"},
                                                                            {"GDAL_HTTP_RETRY_DELAY", "1"}}};

@@ -14,7 +14,7 @@ namespace terrace::archive {
 bool IsBucket(const std::string& place);
 
 // For programs that write to buckets, before the first request: requests that the store refuses for want of time are
-// repeated, and those that stand still for 20 s end. GDAL waits for ever by default.
+// repeated, and those that stand still for 10 s end. GDAL waits for ever by default.
 void LimitRequests();
 
 // Writes an object that is there as a whole or not at all: one request, or an upload in parts that is completed at the

@@ -8,6 +8,7 @@
 //   terrace:{JOB}:done    stream: the last units that were done: unit, worker, seconds; for people
 //   terrace:{JOB}:errors  hash: unit -> why it failed last
 //
+// What is for people, and the errors, are read and written by pcall: they may hold something else.
 // A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node of a cluster.
 // The incarnation is a random number that is made whenever the queue is filled. A worker that took its unit from an
 // earlier filling must not acknowledge it in a later one.
@@ -27,8 +28,8 @@ local job, units, dead, taken, done, errors = KEYS[1], KEYS[2], KEYS[3], KEYS[4]
 if redis.replicate_commands then redis.replicate_commands() end
 if (redis.call('HGET', job, 'incarnation') or '') ~= ARGV[1] then return {'gone'} end
 local function remove(id, name)
-  local noted = redis.call('HGET', taken, name)
-  if noted and string.sub(noted, 1, #id + 1) == id .. ' ' then redis.call('HDEL', taken, name) end
+  local noted = redis.pcall('HGET', taken, name)
+  if type(noted) == 'string' and string.sub(noted, 1, #id + 1) == id .. ' ' then redis.call('HDEL', taken, name) end
   local acked = redis.call('XACK', units, 'bakers', id)
   redis.call('XDEL', units, id)
   return acked == 1
@@ -114,7 +115,7 @@ for _, entry in ipairs(redis.call('XRANGE', dead, '-', '+')) do
   end
 end
 if is_new then
-  redis.call('HDEL', errors, ARGV[3])
+  redis.pcall('HDEL', errors, ARGV[3])
   redis.pcall('XADD', done, 'MAXLEN', '~', 1000, '*', 'unit', ARGV[3], 'worker', ARGV[4], 'seconds', ARGV[5])
 end
 return {'ok'}
@@ -125,7 +126,7 @@ inline constexpr const char* kGiveBack = R"lua(
 local pending = redis.call('XPENDING', units, 'bakers', ARGV[2], ARGV[2], 1)[1]
 if not pending or pending[2] ~= ARGV[4] then return {'ok'} end
 if ARGV[5] ~= '' then redis.pcall('HSET', errors, ARGV[3], ARGV[5]) end
-redis.call('HDEL', taken, ARGV[3])
+redis.pcall('HDEL', taken, ARGV[3])
 redis.call('XCLAIM', units, 'bakers', '-', 0, ARGV[2], 'IDLE', ARGV[7], 'RETRYCOUNT', ARGV[6], 'JUSTID')
 return {'ok'}
 )lua";
@@ -134,12 +135,13 @@ return {'ok'}
 inline constexpr const char* kBury = R"lua(
 local why = ARGV[5]
 if why == '' then
-  why = redis.call('HGET', errors, ARGV[3]) or 'its workers ended before it was done: killed, out of memory, or cut off'
+  why = redis.pcall('HGET', errors, ARGV[3])
+  if type(why) ~= 'string' then why = 'its workers ended before it was done: killed, out of memory, or cut off' end
 end
 if remove(ARGV[2], ARGV[3]) then
   redis.call('XADD', dead, '*', 'unit', ARGV[3], 'why', why, 'deliveries', ARGV[6], 'worker', ARGV[4])
 end
-redis.call('HDEL', errors, ARGV[3])
+redis.pcall('HDEL', errors, ARGV[3])
 return {'ok'}
 )lua";
 

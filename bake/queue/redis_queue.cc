@@ -206,7 +206,9 @@ Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
   }
   if (!replies) return fail(replies.error());
   redis::Reply last = std::move(replies->back());
-  if (!last.is_error() || last.text().find("NOGROUP") != std::string_view::npos) {
+  // Somebody has removed the stream or its group, or has put something else there: TakeOnce fills the queue anew.
+  const auto says = [&](std::string_view what) { return last.text().find(what) != std::string_view::npos; };
+  if (!last.is_error() || says("NOGROUP") || says("WRONGTYPE")) {
     NoteBack();
     return last;
   }

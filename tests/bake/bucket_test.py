@@ -230,9 +230,14 @@ class Bucket(unittest.TestCase):
     def test_arguments(self):
         for arguments, place, part in ((("--form", "single"), PLACE, "--form single is written into a folder of this machine"),
                                        ((), "/vsicurl/http://127.0.0.1/x", "or into a bucket such as /vsis3/BUCKET/FOLDER"),
+                                       ((), "s3://terrain/alps", "name a bucket as /vsis3/BUCKET/FOLDER, here /vsis3/terrain/alps"),
+                                       ((), "https://example.org/alps", "URLs are not accepted"),
                                        (("--update", PLACE + "/"), PLACE, "name the same place")):
             _, errors = self.bake(*arguments, place=place, code=2)
             self.assertIn(part, errors)
+        done = subprocess.run([BINARY, "bake", "--config", self.config, "--into-cache", "/vsis3/terrain/cache"], text=True, stderr=subprocess.PIPE)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("a folder of this machine", done.stderr)
 
 
 if __name__ == "__main__":

@@ -116,6 +116,17 @@ class QueueFaults(QueueCase):
             if key == "job":
                 self.assertIn("the key belongs to something else", errors)
 
+    def test_keys_that_become_something_else(self):
+        for key in ("units", "dead", "taken", "done", "errors"):
+            place = self.place(key)
+            workers = self.joined(place, 2)
+            workers[0].stdout.readline()
+            self.redis("DEL", self.key(key))
+            self.redis("SET", self.key(key), "garbage")
+            self.end_all(workers)
+            self.expect_equal(place)
+            self.redis("FLUSHALL")
+
     def expect_refusal(self, url, part, code, timeout=None, **options):
         place = self.place(f"refused-{part[:5]}")
         begun = time.monotonic()

@@ -175,7 +175,7 @@ class Queue(QueueCase):
         first.communicate()
         (place / "units" / f"{unit}.pmtiles.0badcafe.partial").write_text("of a kill while the file was written")
         left = [name for name in files_of(place) if name.endswith((".lock", ".partial"))]
-        self.assertEqual(len(left), 2, left)
+        self.assertGreaterEqual(len(left), 2, left)  # three if it was killed while the file was written
         texts = {name: (place / name).read_bytes() for name in left}
         self.run_bake(place)
         self.expect_equal(place)

@@ -183,8 +183,9 @@ TEST(RedisConnection, PeersThatAreNoRedisAreRefused) {
 }
 
 TEST(RedisConnection, RepliesThatAreCutOrTooLongBreakIt) {
-  for (const std::string& reply : {std::string("$10\r\nabc"), std::string("*2\r\n:1\r\n"), std::string("$-"),
-                                   std::string("x"), "$200000\r\n" + std::string(200'000, 'x') + "\r\n"}) {
+  for (const std::string& reply :
+       {std::string("$10\r\nabc"), std::string("*2\r\n:1\r\n"), std::string("$-"), std::string("*30000\r\n*30000\r\n"),
+        std::string("x"), "$200000\r\n" + std::string(200'000, 'x') + "\r\n"}) {
     const FakeServer server([&](int fd) {
       Receive(fd);
       Send(fd, kGreeting);

@@ -20,6 +20,7 @@
 #include "bake/place.h"
 #include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/remote_file.h"
 #include "engine/gdal/source_policy.h"
 #include "engine/statistics/cache_folder.h"
 #include "server/cli/bake/bake_display.h"
@@ -68,11 +69,9 @@ int PlanFromCells(const BakeArguments& arguments, const bake::BakeRequest& reque
 // Whoever names a bucket in the command line allows it.
 Result<void> SetPolicy(const BakeArguments& arguments, const config::Config& config) {
   dem::SourcePolicy policy{config.data_roots, config.allowed_prefixes, config.allowed_drivers};
-  for (const std::string& place : {arguments.out, arguments.update}) {
-    if (!archive::IsBucket(place)) continue;
-    archive::LimitRequests();
-    policy.prefixes.push_back(place + "/");
-  }
+  if (archive::IsBucket(arguments.out)) policy.prefixes.push_back(arguments.out + "/");
+  if (dem::IsGdalName(arguments.update)) policy.prefixes.push_back(arguments.update + "/");
+  if (!policy.prefixes.empty()) archive::LimitRequests();
   return config.datasets.empty() && policy.prefixes.empty() ? dem::AllowVrts() : dem::SetSourcePolicy(policy);
 }
 
@@ -282,10 +281,12 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
   if (!worker.empty()) lock_name = bake::LockOfWorker(worker, arguments.job);
   const auto lock = bake::PlaceLock::Take(place, lock_name);
+  if (signals.signal() != 0) return StopCode(signals);  // a store that does not answer holds it up
   if (!lock) return Fail(lock.error());
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
-  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed)
-    return Fail(claimed.error());
+  if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
+    return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
+  }
   if (!worker.empty() && IsFinished(place, targets)) return kExitOk;
   if (!arguments.update.empty()) {
     if (const auto read = ReadOld(arguments.update, targets); !read) return Fail(read.error());
@@ -316,6 +317,18 @@ int Report(const std::vector<config::ConfigError>& errors) {
   return kExitUsage;
 }
 
+// What cannot be a place of a bake; empty: it can.
+std::string WrongPlace(const std::string& out) {
+  const std::size_t scheme_end = out.find("://");
+  const std::string scheme = out.substr(0, scheme_end);
+  if (scheme_end != std::string::npos && scheme.find('/') == std::string::npos) {
+    return fmt::format("--out {}: URLs are not accepted; name a bucket as /vsis3/BUCKET/FOLDER{}", out,
+                       scheme == "s3" ? fmt::format(", here /vsis3/{}", out.substr(scheme_end + 3)) : "");
+  }
+  if (!dem::IsGdalName(out) || archive::IsBucket(out)) return {};
+  return "--out: a bake is written into a folder, or into a bucket such as /vsis3/BUCKET/FOLDER";
+}
+
 // Combinations that make no sense; empty: none.
 std::string WrongTogether(const BakeArguments& arguments) {
   const auto given = [](const std::string& text) { return !text.empty(); };
@@ -340,13 +353,12 @@ std::string WrongTogether(const BakeArguments& arguments) {
       return "--into-cache fills a cache instead of a place: leave out --out, --form, --update, --queue, --finish and "
              "--no-gzip";
     }
+    if (dem::IsGdalName(arguments.into_cache)) return "--into-cache: a disk cache is a folder of this machine";
     return {};
   }
   if (given(arguments.codings)) return "--codings is for --into-cache";
+  if (const std::string wrong = WrongPlace(arguments.out); !wrong.empty()) return wrong;
   if (!arguments.dry_run && !given(arguments.out)) return "--out PLACE is missing: where the bake goes";
-  if (arguments.out.starts_with("/vsi") && !archive::IsBucket(arguments.out)) {
-    return "--out: a bake is written into a folder, or into a bucket such as /vsis3/BUCKET/FOLDER";
-  }
   if (archive::IsBucket(arguments.out) && arguments.form != kChunks) {
     return fmt::format(
         "--form {} is written into a folder of this machine; copy it to the bucket when it is complete, "
