@@ -1,4 +1,4 @@
-// The viewer with what nobody wishes for: odd rasters, garbage in the address, very small windows.
+// The viewer with unusual input: odd rasters, garbage in the address, very small windows.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import os from 'node:os';
