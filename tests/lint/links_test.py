@@ -69,6 +69,12 @@ class Links(unittest.TestCase):
         self.assertGreater(total, 100)
         self.assertEqual(broken, [])
 
+    def test_the_menu_of_the_site_has_each_page(self):
+        menu = (ROOT / "mkdocs.yml").read_text()
+        missing = [page.name for folder in (ROOT / "docs", ROOT / "docs/formats") for page in folder.glob("*.md")
+                   if f": {page.relative_to(ROOT / 'docs')}\n" not in menu]
+        self.assertEqual(missing, [])
+
     @unittest.skipUnless(shutil.which("mkdocs"), "mkdocs is not installed")
     def test_the_site_builds_without_a_warning(self):
         with tempfile.TemporaryDirectory() as folder:
