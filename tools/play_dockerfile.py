@@ -8,8 +8,9 @@ With --built the stage that compiles is skipped, and its installed files come fr
 
 Supports the instructions of the Dockerfile: FROM, WORKDIR, COPY, RUN, USER, ENTRYPOINT, CMD, HEALTHCHECK (ENV has no effect); others are an error. Leaves the
 last stage in FOLDER/final. Then starts ENTRYPOINT with CMD as USER on a read-only root, where only /tmp and /var/cache/terrace can be written,
-waits until HEALTHCHECK passes, fetches a tile, and sends SIGTERM, which must give exit code 0. Prints the size of the root and of its tar with gzip,
-as registries send it; fails if the latter is over 150 MB. Port 8080 must be free. Needs root, and uses the machine's network.
+waits until HEALTHCHECK passes, fetches a tile, and sends SIGTERM, which must give exit code 0. Then reads the sample in other formats, and over HTTPS with
+the image's certificates. Prints the size of the root and of its tar with gzip, as registries send it; fails if the latter is over 150 MB. Port 8080 must be
+free. Needs root, gdal-bin and openssl, and uses the machine's network.
 """
 import argparse
 import fnmatch
@@ -19,6 +20,7 @@ import pathlib
 import re
 import shutil
 import signal
+import ssl
 import subprocess
 import sys
 import tempfile
@@ -26,6 +28,9 @@ import time
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "tests/load"))
+from range_server import RangeServer  # noqa: E402
+
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 
 
@@ -131,6 +136,10 @@ def play(base, folder, built):
     return root, image
 
 
+def children_of(process):
+    return [int(pid) for pid in subprocess.run(["pgrep", "-P", str(process.pid)], stdout=subprocess.PIPE, text=True).stdout.split()]
+
+
 def smoke(root, image):
     command = json.loads(image["ENTRYPOINT"]) + json.loads(image["CMD"])
     health = json.loads(re.search(r"CMD (\[.*\])", image["HEALTHCHECK"])[1])
@@ -148,10 +157,10 @@ def smoke(root, image):
             print(f"a tile: {reply.status}, {len(reply.read())} bytes")
         with urllib.request.urlopen("http://127.0.0.1:8080/", timeout=30) as reply:
             assert b"cesium" in reply.read().lower(), "the page is not the viewer"
-        children = subprocess.run(["pgrep", "-P", str(server.pid)], stdout=subprocess.PIPE, text=True, check=True).stdout.split()
-        user = os.stat(f"/proc/{children[0]}").st_uid
+        child = children_of(server)[0]
+        user = os.stat(f"/proc/{child}").st_uid
         assert user == int(image["USER"]), f"runs as {user}"
-        os.kill(int(children[0]), signal.SIGTERM)
+        os.kill(child, signal.SIGTERM)
         code = server.wait(40)
         assert code == 0, f"ended with {code}"
         assert subprocess.run(inside(root, health, image["USER"]), stderr=subprocess.DEVNULL).returncode != 0, "HEALTHCHECK passes without a server"
@@ -159,6 +168,52 @@ def smoke(root, image):
         if server.poll() is None:
             server.kill()
     print(f"runs as {image['USER']} on a read-only root, healthy, ends with 0")
+
+
+# What GDAL needs for each is loaded with it or opened by name: drivers, the data of PROJ, certificates.
+FORMATS = {"COG": "tif", "netCDF": "nc", "JP2OpenJPEG": "jp2", "HFA": "img", "ENVI": "bil"}
+BUNDLE = "etc/ssl/certs/ca-certificates.crt"
+
+
+def read_formats(root, image):
+    """Serves the sample in several formats as the image's user, and a COG over HTTPS whose authority is among the image's certificates."""
+    folder = root / "tmp/formats"
+    folder.mkdir()
+    for driver, ending in FORMATS.items():
+        subprocess.run(["gdal_translate", "-q", "-of", driver, ROOT / "config/samples/jacksboro.tif", folder / f"dem.{ending}"],
+                       check=True)
+    for file in folder.iterdir():
+        file.chmod(0o644)
+    bundle = (root / BUNDLE).read_bytes()
+    with tempfile.TemporaryDirectory() as scratch, RangeServer(folder) as server:
+        key, certificate = f"{scratch}/key", f"{scratch}/certificate"
+        subprocess.run(["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=127.0.0.1", "-addext",
+                        "subjectAltName=IP:127.0.0.1", "-keyout", key, "-out", certificate], check=True, stderr=subprocess.DEVNULL)
+        context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        context.load_cert_chain(certificate, key)
+        server.server.socket = context.wrap_socket(server.server.socket, server_side=True)
+        remote = f"/vsicurl/{server.url.replace('http:', 'https:')}dem.tif"
+        def is_served(source):
+            command = ["terrace", "serve", "--listen", "127.0.0.1:8080", "--cache-dir", "none", "--allowed-prefixes", "/vsicurl/https://", "--", source]
+            process = subprocess.Popen(inside(root, command, image["USER"]), text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            said = process.stdout.readline()  # empty if it ends
+            for child in children_of(process):
+                os.kill(child, signal.SIGKILL)  # it would outlive `unshare`, because its user is another one
+            return said.startswith("terrace: serving"), process.communicate()[1]
+        try:
+            assert not is_served(remote)[0], "a certificate of an unknown authority was accepted"
+            with (root / BUNDLE).open("ab") as file:
+                file.write(pathlib.Path(certificate).read_bytes())
+            for source in [remote, *(f"/tmp/formats/dem.{ending}" for ending in FORMATS.values())]:
+                is_read, problem = is_served(source)
+                assert is_read, f"{source}: {problem}"
+        finally:
+            (root / BUNDLE).write_bytes(bundle)
+    shutil.rmtree(folder)
+    print(f"reads {', '.join(FORMATS)}, and a COG over HTTPS")
+
+
+def measure(root):
     def size(command):
         return int(subprocess.run(f"tar -C '{root}' --one-file-system -cf - . | {command}", shell=True, stdout=subprocess.PIPE, check=True).stdout)
     plain, packed = size("wc -c"), size("gzip -6 | wc -c")
@@ -174,7 +229,10 @@ def main():
     parser.add_argument("--built", type=pathlib.Path)
     arguments = parser.parse_args()
     built = arguments.built and arguments.built.resolve()
-    smoke(*play(arguments.base.resolve(), arguments.folder.resolve(), built))
+    root, image = play(arguments.base.resolve(), arguments.folder.resolve(), built)
+    smoke(root, image)
+    read_formats(root, image)
+    measure(root)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""Hook of mkdocs: pages link to files of the repository that the site does not contain; there they become plain text."""
+"""Hooks of mkdocs. Pages link to files of the repository that the site does not contain; there they become plain text. Debian's
+mkdocs 1.4 names its jQuery otherwise than its pages do, and lacks a script that marks tables for the style sheet: both are corrected."""
+import pathlib
 import posixpath
 import re
 
@@ -18,3 +20,27 @@ def on_page_markdown(markdown, page, config, files):
         return match.group(1)
 
     return LINK.sub(link, markdown)
+
+
+SCRIPT = re.compile(r'\s*<script[^>]*src="([^":]*/)?js/([^"/]+)"[^>]*></script>')
+
+
+def complete(html, config):
+    present = {path.name for folder in config["theme"].dirs for path in pathlib.Path(folder).glob("js/*") if path.exists()}
+    jquery = min((name for name in present if name.startswith("jquery")), default=None)
+
+    def script(match):
+        name = match.group(2)
+        if name in present:
+            return match.group(0)
+        return match.group(0).replace(name, jquery) if jquery and name.startswith("jquery") else ""
+
+    return SCRIPT.sub(script, html).replace("<table>", '<table class="docutils">')
+
+
+def on_post_page(output, page, config):
+    return complete(output, config)
+
+
+def on_post_template(output_content, template_name, config):
+    return complete(output_content, config) if template_name.endswith(".html") else output_content

@@ -21,7 +21,7 @@ export function drawLegend(figure, colouring, heights) {
 // The ends are the dataset's own; round heights between them where there is room, first of all zero.
 function ticksOfHeights(heights) {
   const text = (metres) => formatHeight(metres);
-  const room = (a, b) => (kShareOfLetter * (text(a).length + text(b).length)) / 2 + kShareOfLetter;
+  const room = (a, b) => (kShareOfLetter * (text(a).length + text(b).length + 1)) / 2;
   const ticks = [[0, heights.min]];
   const end = (metres) => kShareOfLetter * (text(metres).length / 2);  // the texts at the ends are inside
   const rounds = heightTicks(heights);

@@ -78,8 +78,11 @@ export class Panel {
   // `preparing`: datasets that are not there yet. `moreWithToken`: a token may show others. `shown`: name of the dataset
   // that is drawn.
   setDatasets(datasets, preparing, moreWithToken, shown) {
-    const pending = preparing.map(({ name }) => Object.assign(new Option(`${name} (being prepared)`, name), { disabled: true }));
-    const names = [...datasets, {}, ...preparing].map(({ name }) => name).join("\n");
+    const absent = (name, why) => Object.assign(new Option(`${name} (${why})`, name), { disabled: true });
+    const pending = preparing.map(({ name }) => absent(name, "being prepared"));
+    const isGone = shown !== undefined && ![...datasets, ...preparing].some(({ name }) => name === shown);
+    if (isGone) pending.push(absent(shown, "no longer there"));
+    const names = [...datasets, {}, ...preparing, { name: isGone }].map(({ name }) => name).join("\n");
     byId("use-token").hidden = !moreWithToken;
     if (names === this.names) return;  // an open list must not close
     this.names = names;

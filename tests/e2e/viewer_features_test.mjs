@@ -183,9 +183,12 @@ describe('features of the viewer', () => {
     process.kill(server.pid, 'SIGHUP');
     await page.getByText('hills is no longer on this server').waitFor({ timeout: 30000 });
     assert.ok(await page.evaluate(() => terrace.globe.drawn().tiles > 1), 'the picture stays');
+    const chosen = () => page.evaluate(() => [...document.querySelectorAll('#dataset option')].map(({ text, selected }) => (selected ? `[${text}]` : text)));
+    assert.deepEqual(await chosen(), ['others', '[hills (no longer there)]']);
     write(dataset);
     process.kill(server.pid, 'SIGHUP');
     await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
+    assert.deepEqual(await chosen(), ['[hills]']);
     assert.deepEqual(page.wrongs, []);
   });
 
@@ -203,6 +206,9 @@ describe('features of the viewer', () => {
     await flat.keyboard.press('Enter');
     await flat.waitForFunction(() => / m$/.test(document.getElementById('readout').textContent), undefined, kWait);
     await assertAccessible(flat, 'the flat map');
+    await flat.goto('about:blank');
+    await flat.goto(`${server.url}/#dataset=nowhere`);
+    await flat.getByText('There is no dataset nowhere on this server; this is hills.').waitFor({ timeout: 30000 });
     await plain.close();
   });
 });

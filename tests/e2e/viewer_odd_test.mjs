@@ -1,4 +1,4 @@
-// The viewer with what nobody wishes for: odd rasters, garbage in the address, very small windows.
+// The viewer with unusual input: odd rasters, garbage in the address, very small windows.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import os from 'node:os';
@@ -113,6 +113,13 @@ describe('the viewer', () => {
       await page.goto(`${server.url}/#dataset=nowhere`);
       await page.locator('#message').waitFor({ timeout: 90000 });
       if (width > 560) await apart('#message', '#panel');
+      if (height === 400) {
+        await page.waitForFunction(() => window.terrace?.state.ready, undefined, kWait);
+        await page.locator('#tool-distance').click();
+        await page.locator('#dock').waitFor();
+        await apart('#dock', '#panel');
+        await apart('#dock', '#tools');
+      }
       await apart('#tools', '#panel');
       await apart('#tools', '#message');
       const tools = await page.locator('#tools').boundingBox();

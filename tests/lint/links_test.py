@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
 """Checks the links of every Markdown file: relative ones lead to a file, `#parts` to a heading. Builds the site where mkdocs is installed."""
+import html
 import pathlib
 import re
 import shutil
 import subprocess
 import tempfile
 import unittest
+import urllib.parse
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LINK = re.compile(r"!?\[(?:[^\[\]]|\[[^\]]*\])*\]\(([^)\s]+)(?:\s+\"[^\"]*\")?\)")
@@ -33,6 +35,23 @@ def anchors(page):
     return found
 
 
+def broken_in_site(folder):
+    """References of the site's pages, scripts and style sheets included, that lead to no file or no element of it."""
+    texts = {page: page.read_text() for page in folder.rglob("*.html") if page.name != "404.html"}
+    names = {page: set(re.findall(r'\bid="([^"]+)"', text)) for page, text in texts.items()}
+    broken = []
+    for page, text in texts.items():
+        for target in re.findall(r'<(?:a|link|script|img)\b[^>]*?\b(?:href|src)="([^"]+)"', text):
+            if re.match(r"[a-z]+:|//", target):
+                continue
+            path, _, part = urllib.parse.unquote(html.unescape(target)).partition("#")
+            file = (page.parent / path.partition("?")[0]).resolve() if path else page
+            file = file / "index.html" if file.is_dir() else file
+            if not file.is_file() or (part and file.suffix == ".html" and part not in names[file]):
+                broken.append(f"{page.relative_to(folder)}: {target}")
+    return broken
+
+
 class Links(unittest.TestCase):
     def test_each_leads_somewhere(self):
         broken, total = [], 0
@@ -50,6 +69,12 @@ class Links(unittest.TestCase):
         self.assertGreater(total, 100)
         self.assertEqual(broken, [])
 
+    def test_the_menu_of_the_site_has_each_page(self):
+        menu = (ROOT / "mkdocs.yml").read_text()
+        missing = [page.name for folder in (ROOT / "docs", ROOT / "docs/formats") for page in folder.glob("*.md")
+                   if f": {page.relative_to(ROOT / 'docs')}\n" not in menu]
+        self.assertEqual(missing, [])
+
     @unittest.skipUnless(shutil.which("mkdocs"), "mkdocs is not installed")
     def test_the_site_builds_without_a_warning(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -58,6 +83,7 @@ class Links(unittest.TestCase):
             self.assertTrue((pathlib.Path(folder) / "http-api.html").is_file())
             other_hosts = re.findall(r"(?:src|href)=\"(?:https?:)?//[^\"]+\.(?:js|css|woff2?)\"", (pathlib.Path(folder) / "index.html").read_text())
             self.assertEqual(other_hosts, [])
+            self.assertEqual(broken_in_site(pathlib.Path(folder)), [])
 
 
 if __name__ == "__main__":

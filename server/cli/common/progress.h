@@ -13,8 +13,8 @@ namespace terrace::cli {
 std::string Grouped(std::uint64_t number);
 
 // Prints "terrace: reading alps.tif 42 %, 3 min left", or "terrace: reading dems 1,234 of 5,000" for many items. On a
-// terminal the line is rewritten in place; otherwise a line is printed after a second, and then every ten seconds. Prints
-// nothing if the work takes less than a second.
+// terminal the line is rewritten in place; otherwise a line is printed after a second, and then every ten seconds.
+// Prints nothing if the work takes less than a second.
 class Progress {
  public:
   explicit Progress(std::string what, std::size_t count = 1);
@@ -24,7 +24,8 @@ class Progress {
 
   void Update(double share);  // 0 .. 1
 
-  // From now on a line every ten seconds, also on a terminal and also for the first one: other lines are written meanwhile.
+  // From now on a line every ten seconds, also on a terminal and also for the first one: other lines are written
+  // meanwhile.
   void UseLines();
 
   // For APIs that take a function; must not outlive this object.
