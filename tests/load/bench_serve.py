@@ -5,9 +5,10 @@
 
 Each BINARY serves each dataset with one worker, without caches, and gets requests for the same tiles of each level, one
 after the other. Binaries take turns within each round, so that other load on the machine affects all of them. The output for each
-level is the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary,
-and the means of the last binary's stages on the clock: without HTTP, they add up to the time of a tile if nothing else runs. Before the levels it has the processor time of the first start and of a start with cached
-statistics; after them, the peak memory and the processor time of a warm tile (another error of a refinement in the cache).
+level is the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary, and
+the means of the last binary's stages on the clock; if nothing else runs, these add up to the time of a tile without HTTP. Before the
+levels it has the processor time of the first start and of a start with cached statistics; after them, the peak memory and the processor
+time of a warm tile (another error of a refinement in the cache).
 
 The dataset "cog" is a Cloud Optimized GeoTIFF with averages as overviews, read by range requests from a server on this machine; its
 request and bytes a tile are printed too.
