@@ -34,6 +34,22 @@ std::array<double, kKnots> Weights(double step, int size) {
   return weights;
 }
 
+using CellWeights = std::array<std::array<double, kKnots>, kCellNodes>;
+
+// By step, for cells of this size: each size is computed once.
+const CellWeights& WeightsOf(int size) {
+  static const auto all = [] {
+    std::array<CellWeights, 3> weights{};
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      const int cell = kMinCell << i;
+      for (int step = 0; step < cell; ++step) weights[i][static_cast<std::size_t>(step)] = Weights(step, cell);
+    }
+    return weights;
+  }();
+  static_assert(kMinCell << 2 == kCellNodes);
+  return all[size == kMinCell ? 0 : size < kCellNodes ? 1 : 2];
+}
+
 // Centres of a lattice's cells, each counted as the node at its south-western corner.
 struct CellCentres {
   explicit CellCentres(const geo::Lattice& lattice) : halves{lattice.level, 2 * lattice.cells} {}
@@ -175,8 +191,9 @@ class GridNodes {
     }
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
     // Interpolates the knots' columns at one row, then any node of that row.
+    const CellWeights& weights = WeightsOf(cell.size);
     const auto row_at = [&](std::int64_t row) {
-      const auto y = Weights(static_cast<double>(row - cell.row), cell.size);
+      const std::array<double, kKnots>& y = weights[static_cast<std::size_t>(row - cell.row)];
       std::array<Position, kKnots> sums;
       for (std::size_t i = 0; i < kKnots; ++i) {
         for (std::size_t j = 0; j < kKnots; ++j) {
@@ -195,14 +212,9 @@ class GridNodes {
       return sum;
     };
     for (std::size_t i = 0; i < kTried; ++i) {
-      const Position tried_at = at(row_at(cell.row + tried[i][1]), Weights(tried[i][0], cell.size));
+      const Position tried_at = at(row_at(cell.row + tried[i][1]), weights[static_cast<std::size_t>(tried[i][0])]);
       const Position& exact = known[kKnots * kKnots + i];
       if (!(std::abs(tried_at.x - exact.x) <= tolerance_ && std::abs(tried_at.y - exact.y) <= tolerance_)) return false;
-    }
-    std::array<std::array<double, kKnots>, kCellNodes> weights;
-    for (std::int64_t column = part.west; column < part.east; ++column) {
-      weights[static_cast<std::size_t>(column - cell.column)] =
-          Weights(static_cast<double>(column - cell.column), cell.size);
     }
     for (std::int64_t row = part.south; row < part.north; ++row) {
       const auto sums = row_at(row);

@@ -45,11 +45,15 @@ class Filler {
  private:
   // 0: no valid sample within `most` steps.
   int StepsToValid(std::int64_t column, std::int64_t row, int x, int y, int most) const {
-    for (int steps = 1; steps <= most; ++steps) {
-      column += x;
-      row += y;
-      if (column < 0 || column >= wide_.columns || row < 0 || row >= wide_.rows) return 0;
-      if (!std::isnan(At(column, row))) return steps;
+    // Up to the window's edge.
+    std::int64_t last = most;
+    if (x != 0) last = std::min(last, x > 0 ? wide_.columns - 1 - column : column);
+    if (y != 0) last = std::min(last, y > 0 ? wide_.rows - 1 - row : row);
+    const std::int64_t stride = y * wide_.columns + x;
+    const float* sample = heights_.data() + row * wide_.columns + column;
+    for (int steps = 1; steps <= last; ++steps) {
+      sample += stride;
+      if (!std::isnan(*sample)) return steps;
     }
     return 0;
   }

@@ -5,9 +5,10 @@
 
 Each BINARY serves each dataset with one worker, without caches, and gets requests for the same tiles of each level, one
 after the other. Binaries take turns within each round, so that other load on the machine affects all of them. The output for each
-level is the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary,
-and the medians of the last binary's stages. Before the levels it has the processor time of the first start and of a start with cached
-statistics; after them, the peak memory and the processor time of a warm tile (another error of a refinement in the cache).
+level is the processor time of a cold tile in the best and in the median round, the ratio of the best to that of the first binary, and
+the means of the last binary's stages on the clock; if nothing else runs, these add up to the time of a tile without HTTP. Before the
+levels it has the processor time of the first start and of a start with cached statistics; after them, the peak memory and the processor
+time of a warm tile (another error of a refinement in the cache).
 
 The dataset "cog" is a Cloud Optimized GeoTIFF with averages as overviews, read by range requests from a server on this machine; its
 request and bytes a tile are printed too.
@@ -185,9 +186,9 @@ def cold_level(servers, level, tiles, sources, arguments):
     times, stages = rounds_of(servers, lambda _: urls, arguments.rounds)
     cold = ", ".join(f"{min(t):.2f} / {statistics.median(t):.2f}" for t in times)
     ratios = ", ".join(f"{min(t) / min(times[0]):.2f}" for t in times)
-    medians = ", ".join(f"{stage} {statistics.median(stages[stage]):.2f}" for stage in STAGES if stages[stage])
+    means = ", ".join(f"{stage} {statistics.mean(stages[stage]):.2f}" for stage in STAGES if stages[stage])
     peer = f" {min(run_peer(arguments.peer, sources, level) for _ in range(arguments.rounds)):.2f} |" if arguments.peer else ""
-    print(f"  | {level} | {len(tiles)} | {cold} | {ratios} | {medians} |{peer}", flush=True)
+    print(f"  | {level} | {len(tiles)} | {cold} | {ratios} | {means} |{peer}", flush=True)
 
 
 def warm_tiles(servers, tiles, rounds):

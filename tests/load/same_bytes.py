@@ -45,7 +45,8 @@ def default_config():
 
 
 class Server:
-    def __init__(self, binary, config, cache):
+    def __init__(self, binary, config, cache, names):
+        self.names = names
         with socket.create_server(("127.0.0.1", 0)) as free:
             self.port = free.getsockname()[1]
         self.process = subprocess.Popen([binary, "serve", "--config", config, "--listen", f"127.0.0.1:{self.port}", "--worker-threads", "2",
@@ -58,7 +59,8 @@ class Server:
 
     def is_ready(self):
         try:
-            return self.get("/readyz")[0] == 200
+            # Also of datasets that are prepared after the start.
+            return self.get("/readyz")[0] == 200 and all(self.get(f"/{name}/layer.json")[0] == 200 for name in self.names)
         except OSError:
             return False
 
@@ -121,7 +123,8 @@ def main():
         path = str(arguments.config or f"{folder}/config.json")
         if not arguments.config:
             pathlib.Path(path).write_text(json.dumps(config), encoding="utf-8")
-        servers = [Server(binary, path, f"{folder}/cache") for binary in (arguments.old, arguments.new)]
+        names = [dataset["name"] for dataset in config["datasets"]]
+        servers = [Server(binary, path, f"{folder}/cache", names) for binary in (arguments.old, arguments.new)]
         try:
             chooser = random.Random(11)
             urls = [url for dataset in config["datasets"] for url in requests_of(servers[0], dataset["name"], arguments.tiles, chooser)]

@@ -3,7 +3,10 @@
 #include <ogr_spatialref.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "tests/engine/dem/dem_fixture.h"
@@ -40,6 +43,32 @@ TEST(Resampling, ReproducesAPlane) {
     }
   }
   EXPECT_GT(inside, 10000);
+}
+
+// A window with a peak is interpolated, one of equal samples is not.
+TEST(Resampling, LevelGroundDoesNotDependOnTheWindow) {
+  for (const double height : {12.3457, -3.3, 0.0, -0.0}) {
+    const TempDir dir;
+    RasterSpec spec = FlatSquare(10, 50, 200, .01, height);
+    spec.value = [height](int column, int row) { return column == 150 && row == 150 ? 80 : height; };
+    const auto source = OpenOrFail(WriteRaster(dir, spec));
+    const int level = source->max_level();
+    const double step = source->LatticeOf(level).StepDegrees();
+    const auto node = [step](double degrees) { return std::llround(degrees / step); };
+    const NodeWindow level_ground{node(190.5), node(139.5), 20, 20};
+    const int beyond = static_cast<int>(node(1.2));
+    const NodeWindow with_peak{level_ground.column, level_ground.row - beyond, beyond, beyond + 20};
+    const auto some = source->ReadNodes(level, level_ground), all = source->ReadNodes(level, with_peak);
+    ASSERT_TRUE(some && all);
+    EXPECT_GT(*std::ranges::max_element(*all), height + 1);
+    for (int j = 0; j < 20; ++j) {
+      for (int i = 0; i < 20; ++i) {
+        const float here = (*some)[static_cast<std::size_t>(j * 20 + i)];
+        const float there = (*all)[static_cast<std::size_t>((j + beyond) * beyond + i)];
+        ASSERT_EQ(std::bit_cast<std::uint32_t>(here), std::bit_cast<std::uint32_t>(there)) << height;
+      }
+    }
+  }
 }
 
 TEST(Resampling, EndsHalfAPixelBeyondTheOutermostCentres) {
