@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "archive/manifest.h"
@@ -47,32 +48,16 @@ Result<PmtilesOptions> PmtilesOptionsOf(const tiler::TileRequest& kind, const st
   return options;
 }
 
+// Archives have the first three formats.
 std::string_view FormatName(tiler::TileFormat format) {
-  switch (format) {
-    case tiler::TileFormat::kQuantizedMesh:
-      return "quantized-mesh-1.0";
-    case tiler::TileFormat::kGlb:
-      return "glb";
-    case tiler::TileFormat::kHeightPng:
-      return "png";
-    default:  // archives have no others
-      break;
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> kNames = {"quantized-mesh-1.0", "glb", "png"};
+  return kNames.at(static_cast<std::size_t>(format));
 }
 
 std::string_view MediaTypeOf(tiler::TileFormat format) {
-  switch (format) {
-    case tiler::TileFormat::kQuantizedMesh:
-      return "application/vnd.quantized-mesh";
-    case tiler::TileFormat::kGlb:
-      return "model/gltf-binary";
-    case tiler::TileFormat::kHeightPng:
-      return "image/png";
-    default:  // archives have no others
-      break;
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> kTypes = {"application/vnd.quantized-mesh", "model/gltf-binary",
+                                                      "image/png"};
+  return kTypes.at(static_cast<std::size_t>(format));
 }
 
 std::string UnitMetadata(const tiler::TileRequest& kind, std::uint64_t key) {

@@ -5,17 +5,8 @@
 namespace terrace::tiler {
 
 std::string_view NameOf(Coding coding) {
-  switch (coding) {
-    case Coding::kIdentity:
-      break;
-    case Coding::kGzip:
-      return "gzip";
-    case Coding::kBrotli:
-      return "br";
-    case Coding::kZstd:
-      return "zstd";
-  }
-  return "";
+  constexpr std::string_view kNames[] = {"", "gzip", "br", "zstd"};  // by value
+  return kNames[static_cast<std::size_t>(coding)];
 }
 
 std::string Compress(std::string bytes, Coding coding, const std::stop_token& stop) {

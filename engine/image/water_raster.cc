@@ -47,18 +47,14 @@ WaterRaster::~WaterRaster() = default;
 
 Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, const GeoBounds& around,
                                                        const FileContentOptions& content) {
-  ForgetRemote(path);
-  const auto before = StampOf(path);
-  auto dataset = OpenRaster(path);
-  if (!dataset) return tl::unexpected(dataset.error());
-  auto located = LocateRaster(**dataset, path, before);
+  auto located = OpenLocatedRaster(path);
   if (!located) return tl::unexpected(located.error());
   const Footprint footprint = Footprint::Of(located->georeference);
   if (auto touches = CheckOverlap(footprint, around, path); !touches) return tl::unexpected(touches.error());
 
   auto impl = std::make_unique<Impl>(path, std::move(located->files), std::move(located->georeference));
   impl->spacing = located->spacing;
-  impl->layout = RasterLayout::Of(**dataset, impl->georeference, "");
+  impl->layout = RasterLayout::Of(*located->dataset, impl->georeference, "");
   impl->layout.rules.is_indicator = true;
   impl->footprint = footprint.Padded();
   const auto fingerprint = impl->georeference.FingerprintWith(impl->handles.files(), content);

@@ -15,7 +15,17 @@ Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path
   if (!georeference) return tl::unexpected(georeference.error());
   const auto spacing = SourceSpacing::Of(*georeference, path);
   if (!spacing) return tl::unexpected(spacing.error());
-  return LocatedRaster{*std::move(files), *std::move(georeference), *spacing};
+  return LocatedRaster{nullptr, *std::move(files), *std::move(georeference), *spacing};
+}
+
+Result<LocatedRaster> OpenLocatedRaster(const std::string& path) {
+  ForgetRemote(path);
+  const auto before = StampOf(path);
+  auto dataset = OpenRaster(path);
+  if (!dataset) return tl::unexpected(dataset.error());
+  auto located = LocateRaster(**dataset, path, before);
+  if (located) located->dataset = *std::move(dataset);
+  return located;
 }
 
 }  // namespace terrace::dem

@@ -14,6 +14,7 @@
 namespace terrace::dem {
 
 struct LocatedRaster {
+  GDALDatasetUniquePtr dataset;  // null: it was opened by the caller
   StampedFiles files;
   Georeference georeference;
   SourceSpacing spacing;
@@ -24,5 +25,8 @@ struct LocatedRaster {
 // of Georeference::Of and SourceSpacing::Of.
 Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path,
                                    const std::optional<FileStamp>& before, int bands = 1);
+
+// Opens band 1 of the current file (OpenRaster), and locates it. Errors: those of both.
+Result<LocatedRaster> OpenLocatedRaster(const std::string& path);
 
 }  // namespace terrace::dem

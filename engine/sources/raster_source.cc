@@ -194,30 +194,27 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          std::shared_ptr<StatisticsPages> pages, unsigned threads) {
   const auto start = std::chrono::steady_clock::now();
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
-  ForgetRemote(path);
-  const auto before = StampOf(path);
-  auto dataset = OpenRaster(path);
-  if (!dataset) return tl::unexpected(dataset.error());
-  auto located = LocateRaster(**dataset, path, before);
+  auto located = OpenLocatedRaster(path);
   if (!located) return tl::unexpected(located.error());
+  GDALDataset& dataset = *located->dataset;
 
   std::unique_ptr<RasterSource> source(
       new RasterSource(path, std::move(located->files), std::move(located->georeference)));
   source->spacing_ = located->spacing;
-  if (auto found = source->FindLayout(**dataset, path, options); !found) return tl::unexpected(found.error());
+  if (auto found = source->FindLayout(dataset, path, options); !found) return tl::unexpected(found.error());
   const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
   std::string overviews_unused;
-  auto prepared = source->Prepare(**dataset, path, prepare, overviews_unused);
+  auto prepared = source->Prepare(dataset, path, prepare, overviews_unused);
   if (!prepared) return tl::unexpected(prepared.error());
   source->averages_ = prepared->averages;
   source->memory_averages_ = prepared->memory_averages;
   source->use_ = prepared->use;
   source->preparation_ = prepared->preparation;
   source->footprint_ = Footprint::Of(source->georeference_);
-  source->FillInfo(**dataset, path, *prepared);
+  source->FillInfo(dataset, path, *prepared);
   source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  source->LogOpened(**dataset, prepared->statistics.rim_voids.is_everything());
+  source->LogOpened(dataset, prepared->statistics.rim_voids.is_everything());
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
   return source;

@@ -9,37 +9,10 @@
 #include <iterator>
 #include <string>
 
+#include "server/http/status_text.h"
+
 namespace terrace::server {
 namespace {
-
-std::string_view TitleOf(int status) {
-  switch (status) {
-    case 400:
-      return "Bad request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not found";
-    case 405:
-      return "Method not allowed";
-    case 408:
-      return "Request timeout";
-    case 413:
-      return "Content too large";
-    case 414:
-      return "URI too long";
-    case 415:
-      return "Unsupported media type";
-    case 429:
-      return "Too many requests";
-    case 431:
-      return "Request header too large";
-    default:
-      return "Service unavailable";
-  }
-}
 
 std::string_view FixedDetail(ErrorCode code) {
   switch (code) {
@@ -107,7 +80,7 @@ Response ProblemResponse(int status, std::string_view detail, std::string_view r
   response.content_type = "application/problem+json";
   response.body = std::make_shared<const std::string>(
       fmt::format(R"({{"type":"about:blank","title":"{}","status":{},"detail":"{}","request_id":"{}"}})",
-                  TitleOf(status), status, EscapedForJson(detail), request_id));
+                  TextOfStatus(status).title, status, EscapedForJson(detail), request_id));
   response.cache_control = "no-store";
   return response;
 }

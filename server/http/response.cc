@@ -8,47 +8,11 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "server/http/status_text.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
 namespace {
-
-std::string_view ReasonPhrase(int status) {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 204:
-      return "No Content";
-    case 304:
-      return "Not Modified";
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 408:
-      return "Request Timeout";
-    case 413:
-      return "Content Too Large";
-    case 414:
-      return "URI Too Long";
-    case 415:
-      return "Unsupported Media Type";
-    case 429:
-      return "Too Many Requests";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 503:
-      return "Service Unavailable";
-    default:
-      return "";
-  }
-}
 
 void Put(std::string& head, std::string_view name, std::string_view value) {
   TERRACE_CHECK(std::none_of(value.begin(), value.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }));
@@ -57,7 +21,7 @@ void Put(std::string& head, std::string_view name, std::string_view value) {
 
 void PutStatus(std::string& head, unsigned version, int status) {
   head.append(version == 10 ? "HTTP/1.0 " : "HTTP/1.1 ").append(fmt::format_int(status).c_str());
-  head.append(" ").append(ReasonPhrase(status)).append("\r\n");
+  head.append(" ").append(TextOfStatus(status).phrase).append("\r\n");
 }
 
 // The current Date header. Every thread caches the line of the last second.

@@ -118,8 +118,8 @@ void AddStatus(CLI::App& bake, int& exit_code) {
   command->footer(
       "Example:\n"
       "  terrace bake status --queue redis://10.0.0.5:6379/0 --job alps --watch\n\n"
-      "Exit codes: 0 the job is baking or complete; 1 there is no such job, it ended incomplete, or Redis cannot be\n"
-      "reached; 2 wrong arguments.");
+      "Exit codes: 0 the job is baking, complete or removed; 1 there is no such job, it ended incomplete, or Redis\n"
+      "cannot be reached; 2 wrong arguments.");
   command->add_option("--queue", arguments->queue, "Redis of the job")->type_name("redis://HOST:PORT/DB")->required();
   command->add_option("--job", arguments->job, "The name of the job")->type_name("NAME")->required();
   AddQueueSecrets(*command, *arguments, "Options");

@@ -24,19 +24,8 @@ using Json = nlohmann::ordered_json;
 std::string Print(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 const char* OutcomeName(bake::UnitOutcome outcome) {
-  switch (outcome) {
-    case bake::UnitOutcome::kBaked:
-      return "baked";
-    case bake::UnitOutcome::kKept:
-      return "kept";
-    case bake::UnitOutcome::kCopied:
-      return "copied";
-    case bake::UnitOutcome::kFailed:
-      return "failed";
-    case bake::UnitOutcome::kMissing:
-      return "missing";
-  }
-  return "unknown";
+  constexpr const char* kNames[] = {"baked", "kept", "copied", "failed", "missing"};  // by value
+  return kNames[static_cast<std::size_t>(outcome)];
 }
 
 }  // namespace

@@ -251,10 +251,7 @@ int Mesh(const MeshArguments& arguments) {
         {arguments.dem, arguments.nodata, arguments.out, arguments.coordinates, goal, arguments.color, arguments.json});
   }
   Result<MeshOutput> output = MeshOutput::Open(arguments.out, {arguments.dem});
-  if (!output) {
-    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
-    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
-  }
+  if (!output) return Fail(output.error());
 
   MeshSeconds seconds;
   Clock::time_point start = Clock::now();

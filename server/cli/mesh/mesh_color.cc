@@ -148,10 +148,7 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   std::vector<std::string> inputs = {arguments.raster};
   if (!arguments.color.is_image) inputs.push_back(arguments.color.image);
   Result<MeshOutput> output = MeshOutput::Open(arguments.out, inputs);
-  if (!output) {
-    const bool is_usage = output.error().code == ErrorCode::kInvalidArgument;
-    return Fail(output.error().message, is_usage ? kExitUsage : kExitFailure);
-  }
+  if (!output) return Fail(output.error());
 
   MeshSeconds seconds;
   Clock::time_point start = Clock::now();

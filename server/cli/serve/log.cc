@@ -58,19 +58,9 @@ std::shared_ptr<spdlog::logger> MakeLogger(const std::string& name) {
 }
 
 spdlog::level::level_enum LevelOf(config::LogLevel level) {
-  switch (level) {
-    case config::LogLevel::kDebug:
-      return spdlog::level::debug;
-    case config::LogLevel::kInfo:
-      return spdlog::level::info;
-    case config::LogLevel::kWarn:
-      return spdlog::level::warn;
-    case config::LogLevel::kError:
-      return spdlog::level::err;
-    case config::LogLevel::kOff:
-      return spdlog::level::off;
-  }
-  return spdlog::level::info;
+  constexpr spdlog::level::level_enum kLevels[] = {spdlog::level::debug, spdlog::level::info, spdlog::level::warn,
+                                                   spdlog::level::err, spdlog::level::off};  // by value
+  return kLevels[static_cast<std::size_t>(level)];
 }
 
 }  // namespace
