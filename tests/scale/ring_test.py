@@ -6,12 +6,14 @@ nginx itself is reloaded they do as libcurl does. TERRACE_LONG_TESTS=1: 5,000 ti
 import asyncio
 import collections
 import contextlib
+import http.server
 import json
 import os
 import pathlib
 import shutil
 import signal
 import sys
+import threading
 import time
 import unittest
 
@@ -59,6 +61,42 @@ class Ring(unittest.TestCase):
     @staticmethod
     def builds(nodes):
         return [node.sum_of("terrace_tile_builds_total") for node in nodes]
+
+    def test_what_every_node_refuses_is_503_and_the_rest_is_answered(self):
+        class Refusing(http.server.BaseHTTPRequestHandler):
+            protocol_version, wbufsize = "HTTP/1.1", 4096
+
+            def do_GET(self):
+                self.send_response(503 if self.path.startswith("/big/") else 200)
+                self.send_header("Retry-After", "5")
+                self.send_header("Cache-Control", "no-store")
+                self.send_header("Content-Length", "2")
+                self.end_headers()
+                self.wfile.write(b"ok")
+
+            def log_message(self, *_):
+                pass
+        servers = [http.server.ThreadingHTTPServer(("127.0.0.1", 0), Refusing) for _ in range(3)]
+        for server in servers:
+            server.daemon_threads, server.port = True, server.server_address[1]
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+        replies = collections.Counter()
+
+        async def draw(nginx):
+            client = cluster.Client(nginx.port)
+            for i in range(100):
+                for dataset in ("big", "earth"):
+                    status, fields, _ = await client.get(f"/{dataset}/9/{i}/1.terrain")
+                    replies[dataset, status, fields.get("retry-after")] += 1
+            client.close()
+        asyncio.run(draw(self.ring(servers)))
+        self.assertEqual(replies, {("big", 503, "5"): 100, ("earth", 200, "5"): 100})
+        replies.clear()
+        for server in servers:
+            server.shutdown()
+            server.server_close()
+        asyncio.run(draw(self.ring(servers)))
+        self.assertEqual(replies, {("big", 503, "1"): 100, ("earth", 503, "1"): 100})
 
     def test_a_cold_storm_builds_each_tile_once(self):
         nodes = [self.node(cluster.earth()) for _ in range(3)]
