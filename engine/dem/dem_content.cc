@@ -1,6 +1,7 @@
 // The hash of all that the tiles of a subtree depend on.
 #include <algorithm>
 #include <cstdint>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -58,9 +59,23 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
       hasher.AddText({reinterpret_cast<const char*>(closed.data()), closed.size()});
     }
   }
-  for (const std::size_t edit :
-       impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top))) {
-    hasher.Add(impl_->edits->edits()[edit].hash);
+  const std::vector<std::size_t> own =
+      impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top));
+  for (const std::size_t edit : own) hasher.Add(impl_->edits->edits()[edit].hash);
+  if (impl_->edits != nullptr) {
+    // Corners on the rim have steps that also depend on edges outside.
+    std::set<std::size_t> beyond;
+    for (int level = top.level; level <= deepest; ++level) {
+      const int down = level - top.level;
+      const std::int64_t side = std::int64_t{1} << down, last = side - 1;
+      for (std::int64_t at = 0; at < side; ++at) {
+        for (const auto& [dx, dy] : {std::pair{at, std::int64_t{0}}, {at, last}, {std::int64_t{0}, at}, {last, at}}) {
+          impl_->AddPrecisionBeyondCorners({level, (top.x << down) + dx, (top.y << down) + dy}, beyond);
+        }
+      }
+    }
+    for (const std::size_t edit : own) beyond.erase(edit);
+    for (const std::size_t edit : beyond) hasher.Add(impl_->edits->edits()[edit].hash);
   }
   // The floor in the datum of a source (ReadInSourceDatum) comes from the last raster grid with a geoid.
   for (std::size_t i = impl_->grids.size(); i-- > 0 && impl_->floor_undulations != nullptr;) {

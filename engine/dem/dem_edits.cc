@@ -4,10 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 #include <utility>
 
 #include "engine/core/check.h"
 #include "engine/crs/node_positions.h"
+#include "engine/dem/corner_edges.h"
 #include "engine/dem/dem_impl.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/read_edits.h"
@@ -317,6 +319,16 @@ MeshDemands DemSource::DemandsOf(int level, const NodeWindow& window) const {
   return impl_->edits->DemandsOf(lattice, window, which);
 }
 
+std::array<std::vector<MeshDemands>, 4> DemSource::DemandsBeyondCorners(const geo::TileKey& key) const {
+  std::array<std::vector<MeshDemands>, 4> demands;
+  if (impl_->edits == nullptr) return demands;
+  const auto edges = EdgesBeyondCorners(impl_->LatticeOf(key.level), key);
+  for (std::size_t corner = 0; corner < edges.size(); ++corner) {
+    for (const NodeWindow& edge : edges[corner]) demands[corner].push_back(DemandsOf(key.level, edge));
+  }
+  return demands;
+}
+
 std::uint64_t DemSource::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
 
 std::uint64_t DemSource::EditsOf(const geo::TileKey& key) const {
@@ -350,8 +362,21 @@ void DemSource::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
   hashes.emplace(key, hash);
 }
 
-// The edits that reach the tile's samples or their halo, and the ranges of neighbours that edits have changed, on which
-// the height steps of common edges depend (proto/mesh/edge_steps.h).
+void DemSource::Impl::AddPrecisionBeyondCorners(const geo::TileKey& key, std::set<std::size_t>& found) const {
+  const geo::Lattice& lattice = LatticeOf(key.level);
+  for (const auto& edges : EdgesBeyondCorners(lattice, key)) {
+    for (const NodeWindow& edge : edges) {
+      for (const std::size_t number : EditsAt(lattice, edge)) {
+        const Edit& edit = edits->edits()[number];
+        if (edit.op == EditOp::kPrecision && key.level >= edit.min_level) found.insert(number);
+      }
+    }
+  }
+}
+
+// The edits that reach the tile's samples or their halo. The height steps of common edges and corners depend on the
+// ranges of neighbours that edits have changed, and on the precision on edges beyond the corners
+// (proto/mesh/edge_steps.h).
 std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   const bool is_polar = key.y == 0 || key.y == geo::TileRows(key.level) - 1;
@@ -370,11 +395,13 @@ std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
   const HashKey memo_key = {key.level, key.x, key.y, 0, 0};
   if (const auto known = KnownHash(memo_key)) return *known;
   ContentHasher hasher;
-  bool is_touched = false;
-  for (const std::size_t number : EditsAt(lattice, WindowOfTile(lattice, key))) {
-    hasher.Add(edits->edits()[number].hash);
-    is_touched = true;
-  }
+  const std::vector<std::size_t> own = EditsAt(lattice, WindowOfTile(lattice, key));
+  for (const std::size_t number : own) hasher.Add(edits->edits()[number].hash);
+  std::set<std::size_t> beyond;
+  AddPrecisionBeyondCorners(key, beyond);
+  for (const std::size_t number : own) beyond.erase(number);
+  for (const std::size_t number : beyond) hasher.Add(edits->edits()[number].hash);
+  bool is_touched = !own.empty() || !beyond.empty();
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
       const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);

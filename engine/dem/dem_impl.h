@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <unordered_map>
@@ -80,6 +81,8 @@ class DemSource::Impl {
   HeightRange UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const;
   HeightRange RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice, const geo::TileKey& key) const;
   std::uint64_t HashEditsOf(const geo::TileKey& key) const;
+  // The numbers of the edits that ask for precision on edges beyond a tile's corners.
+  void AddPrecisionBeyondCorners(const geo::TileKey& key, std::set<std::size_t>& found) const;
 
   std::vector<RasterGrid> grids;  // in order of precedence
   BoxIndex index;                 // of the raster grids, by degrees (IndexOf)

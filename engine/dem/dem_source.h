@@ -6,6 +6,7 @@
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -102,6 +103,8 @@ class DemSource {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
+  // The same for the edges beyond a tile's corners (corner_edges.h).
+  std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `EditsOfMercator`: for pixels
   // as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsOf(const geo::TileKey& key) const;

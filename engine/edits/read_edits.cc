@@ -127,7 +127,10 @@ void ReadEdits(const std::string& path, std::vector<Edit>& edits, std::vector<Ed
       }
     }
   } catch (const std::exception& error) {
-    faults.push_back({path, {}, {}, fmt::format("is no JSON: {}", error.what())});
+    std::string what = error.what();  // quotes the file, which may be no text
+    std::ranges::replace_if(
+        what, [](char c) { return static_cast<unsigned char>(c) >= 0x80; }, '?');
+    faults.push_back({path, {}, {}, fmt::format("is no JSON: {}", what)});
   }
 }
 

@@ -164,6 +164,8 @@ GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, doub
     corner[k] = step(errors.corner[k]);
   }
   inside = step(std::min(errors.tile, min_error_m));
+  // A corner's step may follow from an edge that is not the tile's.
+  for (std::size_t k = 0; k < 4; ++k) inside = std::min({inside, side[k], corner[k]});
 }
 
 void GridSteps::Double() {

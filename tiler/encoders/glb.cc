@@ -65,7 +65,8 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   std::vector<float> allowed = AllowedErrors(limits, replayed->error_m);
   double min_m = wanted_error_m;
   for (const float error_m : allowed) min_m = std::min(min_m, static_cast<double>(error_m));
-  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m), min_m, width);
+  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(*dataset.source, lattice.key, limits, wanted_error_m), min_m,
+                         width);
   double& step_m = steps.inside;
   const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
   proto::TileErrorMeter meter(lattice, replayed->error_m, std::move(allowed));

@@ -37,9 +37,11 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
   return allowed;
 }
 
-proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m) {
-  proto::EdgeErrors errors(error_m);
-  if (limits.weights.empty()) return errors;
+namespace {
+
+// Sets the smallest allowed errors of a tile's own samples.
+void AddOwnErrors(const tin::SampleLimits& limits, int cells, double error_m, proto::EdgeErrors& errors) {
+  if (limits.weights.empty()) return;
   const auto at = [&](int x, int y) {
     return limits.Allowed(
         static_cast<std::size_t>(y) * static_cast<std::size_t>(cells + 1) + static_cast<std::size_t>(x), error_m);
@@ -49,6 +51,25 @@ proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, doubl
     for (std::size_t side = 0; side < 4; ++side) errors.side[side] = std::min(errors.side[side], of_sides[side]);
   }
   errors.corner = {at(0, 0), at(cells, 0), at(cells, cells), at(0, cells)};
+}
+
+}  // namespace
+
+proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
+                               double error_m) {
+  proto::EdgeErrors errors(error_m);
+  if (source.EditsOf(key) == 0) return errors;
+  AddOwnErrors(limits, source.LatticeOf(key.level).cells, error_m, errors);
+  const auto beyond = source.DemandsBeyondCorners(key);
+  for (std::size_t corner = 0; corner < 4; ++corner) {
+    // Side k runs from corner k to corner k + 1.
+    double& least_m = errors.corner[corner];
+    least_m = std::min({least_m, errors.side[corner], errors.side[(corner + 3) % 4]});
+    for (const dem::MeshDemands& demands : beyond[corner]) {
+      const tin::SampleLimits of_edge = LimitsOf(demands);
+      for (std::size_t k = 0; k < of_edge.weights.size(); ++k) least_m = std::min(least_m, of_edge.Allowed(k, error_m));
+    }
+  }
   return errors;
 }
 

@@ -24,9 +24,11 @@ tin::SampleLimits LimitsOf(dem::MeshDemands demands);
 // The error that each sample may have in a tile of this error, row by row; empty: `error_m` everywhere.
 std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m);
 
-// The smallest allowed error on each side and at each corner. Neighbours have equal values for shared sides and
-// corners.
-proto::EdgeErrors EdgeErrorsOf(const tin::SampleLimits& limits, int cells, double error_m);
+// The smallest allowed error on each side of a tile of this error, and on the edges that meet at each corner: the
+// height of a corner counts for the samples on all edges that end there. Neighbours have equal values for shared sides
+// and corners. `limits`: of the tile.
+proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
+                               double error_m);
 
 // Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its samples is
 // in the hole or is a vertex of the hole's outline.

@@ -147,7 +147,7 @@ Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeVi
                             const std::stop_token& stop) {
   const tin::SampleLimits limits = LimitsOf(source, lattice.key);
   const proto::EdgeSteps steps =
-      EdgeStepsOf(source, lattice.key, EdgeErrorsOf(limits, lattice.cells(), wanted_error_m));
+      EdgeStepsOf(source, lattice.key, EdgeErrorsOf(source, lattice.key, limits, wanted_error_m));
   const Clock::time_point start = Clock::now();
   Result<ReplayedMesh> replayed = ReplayMesh(source, lattice, refinement, mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -264,7 +265,7 @@ TEST_F(TerrainEdits, RefuseFilesThatAreNoGeoJson) {
   const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
   for (const std::string& text :
        {std::string("{"), std::string("[]"), std::string(R"({"type":"Feature)"),
-        std::string(R"({"type":"FeatureCollection"})"), std::string(),
+        std::string(R"({"type":"FeatureCollection"})"), std::string(), std::string("\xff\xd8 a picture"),
         std::string(R"({"type":"FeatureCollection","features":null})"),
         R"({"type":"FeatureCollection","features":{"a":)" + Middle(R"({"op":"hole"})") + "}}",
         R"({"type":"FeatureCollection","features":[],"crs":)" + deep + "}",
@@ -275,6 +276,7 @@ TEST_F(TerrainEdits, RefuseFilesThatAreNoGeoJson) {
     const auto opened = DemSource::Open(slope_, options);
     ASSERT_FALSE(opened.has_value()) << text.substr(0, 200);
     EXPECT_NE(opened.error().message.find("bad.geojson"), std::string::npos);
+    EXPECT_TRUE(std::ranges::all_of(opened.error().message, [](char c) { return c > 0; })) << "no UTF-8";
   }
 }
 
