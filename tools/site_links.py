@@ -1,5 +1,5 @@
 """Hooks of mkdocs. Pages link to files of the repository that the site does not contain; there they become plain text. Debian's
-mkdocs 1.4 names its jQuery otherwise than its pages do, and lacks a script that marks tables for the style sheet: both are corrected."""
+mkdocs 1.4 names its jQuery otherwise than its pages do, and lacks a script that marks tables for the CSS file: both are corrected."""
 import pathlib
 import posixpath
 import re

@@ -36,7 +36,7 @@ def anchors(page):
 
 
 def broken_in_site(folder):
-    """References of the site's pages, scripts and style sheets included, that lead to no file or no element of it."""
+    """References of the site's pages, scripts and CSS files included, that lead to no file or no element of it."""
     texts = {page: page.read_text() for page in folder.rglob("*.html") if page.name != "404.html"}
     names = {page: set(re.findall(r'\bid="([^"]+)"', text)) for page, text in texts.items()}
     broken = []
