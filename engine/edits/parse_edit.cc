@@ -183,12 +183,16 @@ void Parser::AddRing(const json& points) {
                   at);
     }
     if (std::abs(at.longitude) > 180) {
-      return Fail(fmt::format("longitude {} is beyond 180: divide what crosses the antimeridian into two features",
-                              at.longitude),
-                  at);
+      return Fail(
+          fmt::format("longitude {} is beyond 180: divide what crosses the antimeridian into two parts of one feature",
+                      at.longitude),
+          at);
     }
     if (!ring.empty() && std::abs(ring.back().at.longitude - at.longitude) > 180) {
-      return Fail("crosses the antimeridian; divide it into two features (RFC 7946, section 3.1.9)", at);
+      return Fail(
+          "crosses the antimeridian; divide it into two parts of one MultiPolygon or MultiLineString (RFC 7946, "
+          "section 3.1.9)",
+          at);
     }
     std::optional<double> height;
     if (point.size() > 2 && point[2].is_number()) {

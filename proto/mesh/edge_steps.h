@@ -36,9 +36,9 @@ struct EdgeSteps {
 };
 
 // The smallest error that samples of each side, and of the four edges that meet at each corner, may have: that of the
-// tile unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared edges and corners. An edge's step
-// for its error is at least an 8192nd of the step for the tile's error, so that in the proof above S <= 8192 M, and
-// 16384 M + S < 32767 M holds.
+// tile unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared edges and
+// corners. An edge's step for its error is at least an 8192nd of the step for the tile's error, so that in the proof
+// above S <= 8192 M, and 16384 M + S < 32767 M holds.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);

@@ -216,7 +216,7 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
                            "feature 3 at",  "are the axes swapped?",
                            "feature 4 at",  "rings intersect themselves",
                            "feature 5 at",  "the ring is open",
-                           "feature 6 at",  "crosses the antimeridian",
+                           "feature 6 at",  "crosses the antimeridian; divide it into two parts of one MultiPolygon",
                            "feature 7 at",  "latitude 100.1 is beyond 90",
                            "feature 8 at",  "heights are missing",
                            "feature 9 at",  "needs its \"width_m\"",
