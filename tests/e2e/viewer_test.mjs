@@ -181,7 +181,7 @@ describe('the viewer', () => {
     await page.locator('#contours').check();
     const state = () => page.evaluate(() => {
       const place = terrace.globe.camera.slice(0, 3).map((value) => Number(value.toPrecision(5)));
-      return [terrace.state.dataset.name, terrace.state.fraction, terrace.state.contours, ...place];
+      return [terrace.state.dataset.name, Number(terrace.state.fraction.toPrecision(6)), terrace.state.contours, ...place];
     });
     const before = await state();
     await page.reload();
