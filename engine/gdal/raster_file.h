@@ -12,8 +12,8 @@
 namespace terrace::dem {
 
 // Opens `path` read-only. Errors, with the remedy: the source policy does not allow the name, the file is not a raster,
-// is remote and no GeoTIFF, has no band, has complex samples, or its sides, bands or storage blocks are absurdly large. `overview`: number of an
-// overview to open instead of the full raster; -1: the full raster.
+// is remote and not a GeoTIFF, has no band, has complex samples, or its sides, bands or storage blocks are absurdly
+// large. `overview`: number of an overview to open instead of the full raster; -1: the full raster.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
 // Clears what GDAL has cached of remote files: of the raster, or of the parts of a VRT. Call before a dataset is
