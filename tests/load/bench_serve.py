@@ -90,8 +90,8 @@ class Server:
             return False
 
     def cpu_ms(self):
-        tasks = pathlib.Path(f"/proc/{self.process.pid}/task").iterdir()
-        return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks) / 1e6
+        # The process's clock: clock_getcpuclockid(3). It has the time of threads that have ended, too.
+        return time.clock_gettime_ns(~self.process.pid << 3 | 2) / 1e6
 
     def peak_mb(self):
         return int(re.search(r"VmHWM:\s+(\d+)", pathlib.Path(f"/proc/{self.process.pid}/status").read_text())[1]) / 1024
