@@ -97,10 +97,9 @@ Result<void> MakeFolder(const std::string& place) {
   return {};
 }
 
-// Creates the lock file.
-Result<bool> CreateLock(const std::string& file) {
-  return CreateFile(
-      file, fmt::format("{} {} {} {} {}", HostName(), ::getpid(), StartOf(::getpid()), BootOf(), NumberSpace()));
+// What the lock files of this process contain.
+std::string OwnLock() {
+  return fmt::format("{} {} {} {} {}", HostName(), ::getpid(), StartOf(::getpid()), BootOf(), NumberSpace());
 }
 
 bool IsLock(const std::string& name) { return name.starts_with("bake") && name.ends_with(".lock"); }
@@ -114,17 +113,19 @@ bool IsPartial(const std::string& name) {
 
 // A lock in `place` that excludes `own`, and whose process may be running; empty: none. Locks of one division into
 // shards do not exclude one another.
-std::string OtherLock(const std::string& place, const std::string& own) {
+Result<std::string> OtherLock(const std::string& place, const std::string& own) {
   const auto division = [](const std::string& name) {
     const std::size_t of = name.rfind("-of-");
     return of == std::string::npos ? name : name.substr(of);
   };
-  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
+  const Result<std::vector<std::string>> names = NamesIn(place);
+  if (!names) return tl::unexpected(names.error());
+  for (const std::string& name : *names) {
     if (!IsLock(name) || name == own || (division(name) == division(own) && name != "bake.lock")) continue;
     const std::string file = place + "/" + name;
     if (!Owner::Parse(ReadText(file)).HasEnded()) return file;
   }
-  return {};
+  return std::string();
 }
 
 // Whether it is a file or folder of tiles.
@@ -181,16 +182,17 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
   const std::string file = fmt::format("{}/bake{}{}.lock", place, shard.empty() ? "" : "-", shard);
   constexpr int kTries = 3;
   for (int i = 0; i < kTries; ++i) {
-    const Result<bool> created = CreateLock(file);
+    const Result<bool> created = CreateFile(file, OwnLock());
     if (created && *created) {
       PlaceLock lock(file);
-      const std::string other = OtherLock(place, fs::path(file).filename().string());
-      if (other.empty()) return lock;
-      const Owner owner = Owner::Parse(ReadText(other));
+      const Result<std::string> other = OtherLock(place, fs::path(file).filename().string());
+      if (!other) return tl::unexpected(other.error());
+      if (other->empty()) return lock;
+      const Owner owner = Owner::Parse(ReadText(*other));
       return MakeError(ErrorCode::kOverloaded,
                        "{}: process {} on host {} is baking there, all of it or another division into shards; wait for "
                        "it, or remove {} if that process has ended",
-                       place, owner.pid, owner.host, other);
+                       place, owner.pid, owner.host, *other);
     }
     if (!created) {
       return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}; give a place with room that can be written",
@@ -219,7 +221,8 @@ Result<PlaceLock> PlaceLock::Take(const std::string& place, const std::string& s
 PlaceLock::PlaceLock(PlaceLock&& other) noexcept : file_(std::exchange(other.file_, {})) {}
 
 PlaceLock::~PlaceLock() {
-  if (!file_.empty()) Remove(file_);
+  // In a bucket, another process may have replaced it.
+  if (!file_.empty() && ReadText(file_) == OwnLock() + '\n') Remove(file_);
 }
 
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
@@ -311,7 +314,6 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 }
 
 Result<std::string> PlaceId(const std::string& place) {
-  if (archive::IsBucket(place)) return place;  // has the same name everywhere
   const fs::path file = fs::path(place) / kPlaceIdFile;
   std::random_device random;
   const Result<bool> created = CreateFile(file.string(), fmt::format("{:08x}{:08x}", random(), random()));
@@ -335,7 +337,9 @@ bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::
 }
 
 void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock) {
-  for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
+  const Result<std::vector<std::string>> names = NamesIn(place);
+  if (!names) return;
+  for (const std::string& name : *names) {
     if (name != kIdentityFile && name != kPlaceIdFile && name != fmt::format("bake-{}.lock", own_lock)) return;
   }
   Remove(fs::path(place) / kPlaceIdFile);

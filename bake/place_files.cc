@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cerrno>
+#include <chrono>
 #include <fstream>
 #include <sstream>
 #include <system_error>
+#include <thread>
 
 #include "archive/files/bucket.h"
 #include "archive/files/input_file.h"
@@ -47,7 +49,10 @@ Result<std::vector<std::string>> NamesIn(const fs::path& folder) {
   if (archive::IsBucket(folder.string())) return archive::NamesInBucket(folder.string());
   std::error_code error;
   std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder, error)) names.push_back(entry.path().filename().string());
+  for (auto entry = fs::directory_iterator(folder, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    names.push_back(entry->path().filename().string());
+  }
   if (error) return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}", folder.string(), error.message());
   return names;
 }
@@ -67,7 +72,9 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     if (there) return false;
     if (there.error().code != ErrorCode::kNotFound) return tl::unexpected(there.error());
     if (auto put = archive::PutText(content + '\n', file); !put) return tl::unexpected(put.error());
-    return true;
+    // Stores have no exclusive creation. Of processes that put at the same time, the last one's content stays.
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    return ReadText(file) == content + '\n';
   }
   const std::string own = OwnPartial(file);
   {

@@ -17,15 +17,15 @@ std::string OwnPartial(const std::string& file);
 bool Exists(const std::filesystem::path& file);
 // Empty: there is none.
 std::string ReadText(const std::filesystem::path& file);
-// The names directly below a folder. Errors: there is no such folder, or it cannot be read; a bucket is as an empty
-// one.
+// The names directly below a folder. Errors: there is no such folder, it cannot be read, or it is in a bucket and
+// without objects (archive::NamesInBucket).
 Result<std::vector<std::string>> NamesIn(const std::filesystem::path& folder);
 // What is not there is no error; others are ignored as well.
 void Remove(const std::filesystem::path& file);
 
-// Creates a file together with its content, so that no process reads it empty. False: there is one already. Of two
-// processes that create one object of a bucket at a time, both may get true, and the later one's content stays. Errors:
-// the message says only why.
+// Creates a file together with its content, so that no process reads it empty. False: there is one already. An
+// object of a bucket is read again a second later: false, too, if another process has replaced it with other content.
+// Errors: the message says only why.
 Result<bool> CreateFile(const std::string& file, const std::string& content);
 
 }  // namespace terrace::bake

@@ -8,16 +8,18 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
+#include "engine/core/errno_text.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/source_policy.h"
 
 namespace terrace::archive {
 namespace {
 
-constexpr std::array<std::string_view, 5> kStores = {"/vsis3/", "/vsigs/", "/vsiaz/", "/vsioss/", "/vsiswift/"};
+// GDAL writes to these by one request, or by an upload in parts that shows nothing until it is completed. To Azure and
+// Swift it appends: readers would see unfinished objects.
+constexpr std::array<std::string_view, 3> kStores = {"/vsis3/", "/vsigs/", "/vsioss/"};
 
 tl::unexpected<Error> CannotPut(const std::string& object) {
   return MakeError(ErrorCode::kUnavailable,
@@ -25,7 +27,7 @@ tl::unexpected<Error> CannotPut(const std::string& object) {
                    dem::TakeGdalError());
 }
 
-// An object that is being written. Without Close it is removed: GDAL can only close it, which may put what was written.
+// An object that is being written. A failed write ends the upload: what was there under this name stays.
 class OpenObject {
  public:
   static Result<OpenObject> Create(const std::string& object) {
@@ -44,14 +46,18 @@ class OpenObject {
       : object_(std::move(other.object_)), file_(std::exchange(other.file_, nullptr)) {}
   OpenObject& operator=(OpenObject&&) = delete;
   ~OpenObject() {
-    if (file_ == nullptr) return;
-    VSIFCloseL(file_);
-    VSIUnlink(object_.c_str());
+    if (file_ != nullptr) VSIFCloseL(file_);
   }
 
   Result<void> Write(std::string_view bytes) {
     if (bytes.empty() || VSIFWriteL(bytes.data(), 1, bytes.size(), file_) == bytes.size()) return {};
     return CannotPut(object_);
+  }
+
+  // Ends it if not all can be written: GDAL may put what it has, which is removed.
+  void Abandon() {
+    VSIFCloseL(std::exchange(file_, nullptr));
+    VSIUnlink(object_.c_str());
   }
 
   // Small objects are sent here.
@@ -92,8 +98,9 @@ Result<void> PutFile(int descriptor, const std::string& object) {
     const ssize_t read = ::pread(descriptor, piece.data(), piece.size(), at);
     if (read < 0 && errno == EINTR) continue;
     if (read < 0) {
-      return MakeError(ErrorCode::kUnavailable, "a temporary file of {} cannot be read: {}", object,
-                       std::strerror(errno));
+      const int error = errno;
+      open->Abandon();
+      return MakeError(ErrorCode::kUnavailable, "a temporary file of {} cannot be read: {}", object, ErrorText(error));
     }
     if (read == 0) return open->Close();
     if (auto written = open->Write({piece.data(), static_cast<std::size_t>(read)}); !written) return written;
@@ -108,15 +115,20 @@ Result<void> PutText(std::string_view text, const std::string& object) {
   return open->Close();
 }
 
-std::vector<std::string> NamesInBucket(const std::string& folder) {
-  if (!dem::IsRemote(folder + "/x")) return {};  // the folder itself may be the prefix
+Result<std::vector<std::string>> NamesInBucket(const std::string& folder) {
+  const auto fail = [&] {
+    return MakeError(ErrorCode::kUnavailable, "{}: no object is listed; check the right to list the bucket", folder);
+  };
+  if (!dem::IsRemote(folder + "/x")) return fail();  // the folder itself may be the prefix
   dem::InitGdal();
   VSICurlPartialClearCache(folder.c_str());
   const CPLStringList names(VSIReadDir(folder.c_str()));
+  VSICurlPartialClearCache(folder.c_str());  // else GDAL would take objects that are put later for absent
   std::vector<std::string> all;
   for (int i = 0; i < names.size(); ++i) {
     if (const std::string name = names[i]; name != "." && name != "..") all.push_back(name);
   }
+  if (all.empty()) return fail();
   return all;
 }
 

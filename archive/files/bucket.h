@@ -1,5 +1,5 @@
-// Objects of a bucket, written, listed and removed through GDAL's file systems (/vsis3/, /vsigs/ ...). Read them with
-// InputFile. The source policy decides which names are allowed.
+// Objects of a bucket, written, listed and removed through GDAL's file systems (/vsis3/, /vsigs/, /vsioss/). Read them
+// with InputFile. The source policy decides which names are allowed.
 #pragma once
 
 #include <string>
@@ -23,8 +23,9 @@ void LimitRequests();
 Result<void> PutFile(int descriptor, const std::string& object);
 Result<void> PutText(std::string_view text, const std::string& object);
 
-// The names directly below a folder. A folder that cannot be listed is as one without names.
-std::vector<std::string> NamesInBucket(const std::string& folder);
+// The names directly below a folder. kUnavailable: there are none, or the folder cannot be listed; GDAL does not tell
+// the two apart.
+Result<std::vector<std::string>> NamesInBucket(const std::string& folder);
 
 // An object that is not there is no error; others are ignored as well.
 void RemoveObject(const std::string& object);

@@ -59,8 +59,9 @@ bool RedisQueue::Leave() {
     finish_.reset();
   }
   const std::lock_guard calls(calls_);
-  const bool is_given_back = Flush().has_value();
+  const bool is_sent = Flush().has_value();
   const std::lock_guard lock(mutex_);
+  const bool is_given_back = is_sent && outbox_.empty();  // what Redis refuses stays in it
   outbox_.clear();
   return is_given_back;
 }

@@ -1,5 +1,6 @@
 #include "engine/gdal/remote_file.h"
 
+#include <cpl_conv.h>
 #include <cpl_vsi.h>
 #include <cpl_vsi_error.h>
 
@@ -45,6 +46,8 @@ Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
   }
   InitGdal();
   ForgetGdalError();
+  // Else GDAL lists the folder, and takes what is put there later for absent.
+  const CPLConfigOptionSetter no_list("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
   VSICurlPartialClearCache(path.c_str());
   VSIStatBufL status{};
   if (VSIStatL(path.c_str(), &status) != 0) {

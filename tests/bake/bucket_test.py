@@ -103,6 +103,34 @@ class Bucket(unittest.TestCase):
             with urllib.request.urlopen(f"http://127.0.0.1:{port}/cells/{key}.terrain") as reply:
                 self.assertGreater(len(reply.read()), 88)
 
+    def test_a_place_that_cannot_be_listed_is_refused_and_keeps_what_it_holds(self):
+        self.store.objects[f"{BELOW}/planet.pmtiles"] = b"of somebody else"
+        for status in (403, 500):
+            self.store.refuse = lambda method, key, query, status=status: status if method == "GET" and key.strip("/") == "terrain" else None
+            _, errors = self.bake(code=1)
+            self.assertIn("check the right to list the bucket", errors)
+        self.store.refuse = lambda method, key, query: None
+        _, errors = self.bake(code=2)
+        self.assertIn("holds something that is no bake (planet.pmtiles)", errors)
+        self.assertEqual(self.files(), {"planet.pmtiles": b"of somebody else"})
+
+    def test_a_failed_upload_leaves_the_object_that_was_there(self):
+        of_another = self.reference[UNIT]
+
+        def refuse(method, key, query):  # another worker's unit appears while this one's is being put
+            if query.get("partNumber") != "2" or not key.endswith(UNIT):
+                return None
+            self.store.objects[f"{BELOW}/{UNIT}"] = of_another
+            return 403
+        self.store.refuse = refuse
+        self.bake(environment={"VSIS3_CHUNK_SIZE_BYTES": "50000"})  # tried again, it is found
+        self.assertEqual(self.files().get(UNIT), of_another)
+
+    def test_of_two_other_bakes_that_begin_together_one_is_refused(self):
+        processes = [self.start(), self.start("--error", "60")]
+        ends = [(process.communicate(timeout=150)[1], process.returncode) for process in processes]
+        self.assertEqual(sorted(code == 0 for _, code in ends), [False, True], ends)
+
     def test_killed_at_any_moment_it_goes_on_to_the_same_objects(self):
         for after in (1, 2, 3, 3, 3):  # writes: the lock, the identity, the units
             writes = sum(method == "PUT" for method, _, _ in self.store.requests) + after
