@@ -245,7 +245,7 @@ export async function startFlatMap() {
   const fail = (error) => Object.assign(byId("message"), { textContent: error.message ?? String(error), hidden: false });
   say("This browser has no WebGL 2, which the globe needs. This is a flat map of the same heights.");
   try {
-    const { datasets } = await listWhenThere(fail);
+    const { datasets, preparing, moreWithToken } = await listWhenThere(fail);
     if (datasets.length === 0) throw new Error("There is no dataset that this page may show.");
     byId("dataset").replaceChildren(...datasets.map(({ name }) => new Option(name, name)));
     const show = async (name) => {
@@ -270,7 +270,11 @@ export async function startFlatMap() {
     };
     const wanted = new URLSearchParams(location.hash.slice(1)).get("dataset");
     await show(wanted);
-    if (wanted && wanted !== map.dataset.name) fail(new Error(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`));
+    if (!wanted || wanted === map.dataset.name || !byId("message").hidden) return;
+    const pending = preparing.find(({ name }) => name === wanted);
+    if (pending) fail(pendingText(pending));
+    else if (moreWithToken) fail(`${wanted} needs a token, or is not on this server; this is ${map.dataset.name}.`);
+    else fail(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`);
   } catch (error) {
     fail(error);
   }
