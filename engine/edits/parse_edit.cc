@@ -42,6 +42,17 @@ std::optional<GeoPosition> FirstPosition(const json& feature) {
   return GeoPosition{(*at)[0], (*at)[1]};
 }
 
+// Of `terrain`.
+constexpr std::array<std::string_view, 11> kKeys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
+                                                    "width_m", "error_m", "factor", "min_level", "vertical"};
+
+// Whether these properties of a feature without `terrain` are its members. Other files have an "op" of their own.
+bool LooksLikeEdit(const json& properties) {
+  const auto op = properties.find("op");
+  if (op == properties.end() || std::ranges::find(kEditOpNames, *op) == kEditOpNames.end()) return false;
+  return std::ranges::any_of(kKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
+}
+
 class Parser {
  public:
   Parser(const std::string& file, std::size_t feature, std::vector<EditFault>& faults)
@@ -80,11 +91,10 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   const json& properties = feature["properties"];
   const auto terrain = properties.find("terrain");
   if (terrain == properties.end()) {
-    const auto op = properties.find("op");
-    if (op != properties.end() && std::ranges::find(kEditOpNames, *op) != kEditOpNames.end()) {
+    if (LooksLikeEdit(properties)) {
       first_ = FirstPosition(feature);
       Fail(fmt::format("\"op\" belongs into \"terrain\": \"properties\": {{\"terrain\": {{\"op\": {}, ...}}}}",
-                       op->dump()));
+                       properties["op"].dump()));
     }
     return std::nullopt;
   }
@@ -121,11 +131,9 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 }
 
 void Parser::CheckKeys(const json& terrain) {
-  static const std::vector<std::string_view> keys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
-                                                     "width_m", "error_m", "factor", "min_level", "vertical"};
   for (const auto& [key, value] : terrain.items()) {
-    if (std::ranges::find(keys, key) == keys.end()) {
-      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, keys)));
+    if (std::ranges::find(kKeys, key) == kKeys.end()) {
+      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, kKeys)));
     }
   }
 }

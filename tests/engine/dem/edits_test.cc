@@ -240,13 +240,17 @@ TEST_F(TerrainEdits, RefuseWhatWouldBeIgnored) {
       MessageOf(parts("[[10.15,50.15],[10.25,50.15],[10.25,50.25],[10.15,50.25],[10.15,50.15]]") + "," +
                 Middle(R"({"op":"slope","heights":["100",200,300,400]})") + ",null," +
                 Middle(R"({"op":"precision","error_m":1,"min_level":3.5})") +
-                R"(,{"type":"Feature","properties":{"op":"hole"},"geometry":null})");
+                R"(,{"type":"Feature","properties":{"op":"offset","metres":1},"geometry":null})");
   for (const char* part :
        {"feature 0 at 50.150000, 10.150000 (lat, lon): parts of the polygon overlap", "feature 1 at",
         "heights has \"100\"; heights are numbers", "feature 2: is no object of the type", "feature 3 at",
         "min_level is 3.5; it must be a whole number", "feature 4: \"op\" belongs into \"terrain\""}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
   }
+  // Properties of somebody else.
+  EXPECT_NE(Open(Middle(R"({"op":"hole"})") + R"(,{"type":"Feature","properties":{"op":"replace","asset":7},)"
+                                              R"("geometry":{"type":"Point","coordinates":[10,50]}})"),
+            nullptr);
   // Parts that touch, or lie in a hole of another one.
   EXPECT_NE(Open(parts("[[10.2,50.1],[10.3,50.1],[10.3,50.2],[10.2,50.2],[10.2,50.1]]")), nullptr);
 }
