@@ -260,6 +260,7 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
   const std::string slope = WriteSlope(dir_, 179.8, "antimeridian.tif");
   const auto open = [&](const std::string& terrain, const std::string& geometry) {
     DemOptions options;
+    options.source.vertical = "ellipsoid";
     options.edits = {WriteEdits(
         dir_, fmt::format(R"({{"type":"Feature","properties":{{"terrain":{}}},"geometry":{}}})", terrain, geometry))};
     return OpenOrFail(slope, options);
@@ -283,6 +284,17 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
   EXPECT_NE(carved->EditsOf(key(179.99)), 0u);
   EXPECT_NE(carved->EditsOf(key(-179.99)), 0u);
   for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(carved->EditsOf(key(far)), 0u) << far;
+  const int finest = carved->finest_level();
+  const auto row = static_cast<std::int64_t>((50.2 + 90) * std::ldexp(1, finest) / 180);
+  const auto east = carved->Read({finest, 0, row}), west = carved->Read({finest, geo::TileColumns(finest) - 1, row});
+  ASSERT_TRUE(east && west);
+  const int cells = east->lattice.cells;
+  int low = 0;
+  for (int y = 0; y <= cells; ++y) {
+    EXPECT_EQ(east->At(0, y), west->At(cells, y));
+    low += east->At(0, y) == 50 ? 1 : 0;
+  }
+  EXPECT_GT(low, 1);
   for (const EditOutline& outline : carved->Edits()) {
     ASSERT_EQ(outline.lines.size(), 2u);
     EXPECT_NEAR(outline.lines[0].front().longitude, 179.9, 1e-9);
@@ -291,13 +303,16 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
     EXPECT_NEAR(outline.lines[1].back().longitude, -179.9, 1e-9);
   }
 
-  const auto flat = open(
-      R"({"op":"flatten","height":"mean"})",
+  const std::string parts =
       R"({"type":"MultiPolygon","coordinates":[[[[179.95,50.1],[180,50.1],[180,50.3],[179.95,50.3],[179.95,50.1]]],)"
-      R"([[[-180,50.1],[-179.95,50.1],[-179.95,50.3],[-180,50.3],[-180,50.1]]]]})");
-  ASSERT_NE(flat, nullptr);
+      R"([[[-180,50.1],[-179.95,50.1],[-179.95,50.3],[-180,50.3],[-180,50.1]]]]})";
+  const auto flat = open(R"({"op":"flatten","height":"mean"})", parts);
+  const auto lake = open(R"({"op":"flatten","height":20,"vertical":"orthometric"})", parts);
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
+  ASSERT_TRUE(flat && lake && geoid);
   for (const double longitude : {179.951, 179.99999, 180.0, -180.0, -179.99999, -179.951}) {
     EXPECT_NEAR(At(*flat, longitude, 50.2123), 299.5, 0.01) << longitude;
+    EXPECT_NEAR(At(*lake, longitude, 50.2123), 20 + (*geoid)->Undulation({longitude, 50.2123}), 0.01) << longitude;
   }
 }
 
