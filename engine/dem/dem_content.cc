@@ -1,5 +1,6 @@
 // The hash of all that the tiles of a subtree depend on.
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <set>
 #include <utility>
@@ -37,6 +38,15 @@ std::vector<std::pair<std::int64_t, std::int64_t>> RimOf(const std::vector<geo::
   return rim;
 }
 
+// Whether an edit may ask for precision in the tile or within its width around it.
+bool HasPrecisionAround(const EditSet& edits, const geo::Lattice& lattice, const geo::TileKey& tile) {
+  Box box = BoxOf(lattice, WindowOfTile(lattice, tile));
+  const double width = (lattice.cells + 1) * lattice.StepDegrees();
+  box.Grow(width, width);
+  return std::ranges::any_of(edits.Find(box),
+                             [&](std::size_t number) { return edits.edits()[number].op == EditOp::kPrecision; });
+}
+
 }  // namespace
 
 ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const {
@@ -62,7 +72,7 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
   const std::vector<std::size_t> own =
       impl_->EditsAt(impl_->LatticeOf(top.level), WindowOfTile(impl_->LatticeOf(top.level), top));
   for (const std::size_t edit : own) hasher.Add(impl_->edits->edits()[edit].hash);
-  if (impl_->edits != nullptr) {
+  if (impl_->edits != nullptr && HasPrecisionAround(*impl_->edits, impl_->LatticeOf(top.level), top)) {
     // Corners on the rim have steps that also depend on edges outside.
     std::set<std::size_t> beyond;
     for (int level = top.level; level <= deepest; ++level) {

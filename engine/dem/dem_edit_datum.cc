@@ -48,7 +48,7 @@ Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
     const double latitude = reach.south + static_cast<double>(j) * patch->step_y / plane.north_m;
     for (std::size_t i = 0; i < patch->columns; ++i) {
       const double longitude = reach.west + static_cast<double>(i) * patch->step_x / plane.east_m;
-      const double metres = reader.At({longitude, latitude});
+      const double metres = reader.At({std::remainder(longitude, 360), latitude});
       if (!std::isfinite(metres))
         return fmt::format("its heights are orthometric, and {} has none there", (*geoid)->name());
       patch->values.push_back(std::round(metres * 4096) / 4096);  // equal on all processors

@@ -48,7 +48,7 @@ std::vector<GeoPosition> PositionsInside(const Edit& edit) {
     const EditRow row(edit, edit.plane.Y(latitude));
     for (int i = 0; i < kAcross; ++i) {
       const double longitude = west + (east - west) * (i + 0.5) / kAcross;
-      if (row.At(edit.plane.X(longitude)).is_inside) inside.push_back({longitude, latitude});
+      if (row.At(edit.plane.X(longitude)).is_inside) inside.push_back({std::remainder(longitude, 360), latitude});
     }
   }
   return inside;
@@ -437,9 +437,13 @@ std::vector<EditOutline> DemSource::Edits() const {
     outline.feature = edit.feature;
     for (const auto& ring : edit.rings) {
       auto& line = outline.lines.emplace_back();
+      // One part of a feature may be across the antimeridian from the plane's origin.
+      const auto [west, east] = std::ranges::minmax(ring, {}, &PlanPoint::x);
+      const double middle = edit.plane.longitude + (west.x + east.x) / 2 / edit.plane.east_m;
+      const double turn = std::remainder(middle, 360) - middle;
       for (const PlanPoint point : ring) {
-        line.push_back(
-            {edit.plane.longitude + point.x / edit.plane.east_m, edit.plane.latitude + point.y / edit.plane.north_m});
+        const double longitude = edit.plane.longitude + point.x / edit.plane.east_m + turn;
+        line.push_back({std::clamp(longitude, -180.0, 180.0), edit.plane.latitude + point.y / edit.plane.north_m});
       }
       if (edit.is_area) line.push_back(line.front());
     }

@@ -47,7 +47,7 @@ struct PlanPoint {
 // A plane that touches the Earth at an edit: longitudes and latitudes are scaled by constants, so that lines that are
 // straight in degrees are straight in it.
 struct EditPlane {
-  double longitude = 0, latitude = 0;  // of the origin, degrees
+  double longitude = 0, latitude = 0;  // of the origin, degrees; longitude in -180 .. 180
   double east_m = 1, north_m = 1;      // per degree
 
   double X(double lon) const;  // the shorter way around the Earth
@@ -94,7 +94,7 @@ struct Edit {
   std::size_t replacement = 0;                               // of replace: index of the opened source, set by DemSource
 
   // Derived by Complete.
-  Box reach;                     // degrees, with the blend; west in -180 .. 180
+  Box reach;                     // degrees, with the blend; around plane.longitude, so that its ends may be beyond 180
   double low_m = 0, high_m = 0;  // of the target heights
   double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;

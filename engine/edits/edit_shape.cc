@@ -278,7 +278,7 @@ void HashContent(Edit& edit) {
   ContentHasher hasher;
   hasher.Add(static_cast<std::uint8_t>(edit.op));
   if (edit.op == EditOp::kPrecision)
-    hasher.Add(std::uint8_t{3});  // of the rules of borders and corners (tin::BorderOptions, proto::EdgeErrors)
+    hasher.Add(std::uint8_t{4});  // of the rules of borders and corners (tin::BorderOptions, proto::EdgeErrors)
   hasher.Add(edit.is_area);
   for (const double value : {edit.plane.longitude, edit.plane.latitude, edit.blend_m, edit.half_width_m, edit.height_m,
                              edit.offset_m, edit.error_m, edit.factor}) {

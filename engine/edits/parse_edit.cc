@@ -6,12 +6,11 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <limits>
-#include <numeric>
 #include <span>
 #include <string_view>
 #include <utility>
 
+#include "engine/edits/did_you_mean.h"
 #include "engine/edits/edit_polygon.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/ellipsoid.h"
@@ -31,21 +30,6 @@ struct Vertex {
 };
 using Ring = std::vector<Vertex>;
 
-// Letters to insert, remove or replace.
-std::size_t LettersApart(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t above = row[j];
-      row[j] = std::min({above + 1, row[j - 1] + 1, diagonal + (a[i - 1] == b[j - 1] ? 0 : 1)});
-      diagonal = above;
-    }
-  }
-  return row.back();
-}
-
 // For messages about features whose geometry is not read.
 std::optional<GeoPosition> FirstPosition(const json& feature) {
   if (!feature.contains("geometry") || !feature["geometry"].is_object()) return std::nullopt;
@@ -58,15 +42,15 @@ std::optional<GeoPosition> FirstPosition(const json& feature) {
   return GeoPosition{(*at)[0], (*at)[1]};
 }
 
-template <typename Names>
-std::string DidYouMean(std::string_view word, const Names& names) {
-  std::string_view best;
-  std::size_t fewest = std::numeric_limits<std::size_t>::max();
-  for (const std::string_view name : names) {
-    const std::size_t apart = LettersApart(word, name);
-    if (apart < fewest) fewest = apart, best = name;
-  }
-  return 3 * fewest <= std::max(word.size(), best.size()) + 1 ? fmt::format("; did you mean \"{}\"?", best) : "";
+// Of `terrain`.
+constexpr std::array<std::string_view, 11> kKeys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
+                                                    "width_m", "error_m", "factor", "min_level", "vertical"};
+
+// Whether these properties of a feature without `terrain` are its members. Other files have an "op" of their own.
+bool LooksLikeEdit(const json& properties) {
+  const auto op = properties.find("op");
+  if (op == properties.end() || std::ranges::find(kEditOpNames, *op) == kEditOpNames.end()) return false;
+  return std::ranges::any_of(kKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
 }
 
 class Parser {
@@ -107,11 +91,10 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   const json& properties = feature["properties"];
   const auto terrain = properties.find("terrain");
   if (terrain == properties.end()) {
-    const auto op = properties.find("op");
-    if (op != properties.end() && std::ranges::find(kEditOpNames, *op) != kEditOpNames.end()) {
+    if (LooksLikeEdit(properties)) {
       first_ = FirstPosition(feature);
       Fail(fmt::format("\"op\" belongs into \"terrain\": \"properties\": {{\"terrain\": {{\"op\": {}, ...}}}}",
-                       op->dump()));
+                       properties["op"].dump()));
     }
     return std::nullopt;
   }
@@ -148,11 +131,9 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 }
 
 void Parser::CheckKeys(const json& terrain) {
-  static const std::vector<std::string_view> keys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
-                                                     "width_m", "error_m", "factor", "min_level", "vertical"};
   for (const auto& [key, value] : terrain.items()) {
-    if (std::ranges::find(keys, key) == keys.end()) {
-      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, keys)));
+    if (std::ranges::find(kKeys, key) == kKeys.end()) {
+      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, kKeys)));
     }
   }
 }
@@ -314,18 +295,37 @@ void Parser::ReadDatum(const json& terrain) {
   edit_.datum = *datum;
 }
 
+// From the westernmost to the easternmost position. Parts whose middle is west of Greenwich are one turn further east
+// if that is the shorter way around: those of a feature on both sides of the antimeridian. Parts stay whole.
+std::pair<double, double> LongitudesOf(const std::vector<Ring>& rings) {
+  double west = 180, east = -180, west_across = 540, east_across = -180;
+  for (const Ring& ring : rings) {
+    double first = 180, last = -180;
+    for (const Vertex& vertex : ring) {
+      first = std::min(first, vertex.at.longitude);
+      last = std::max(last, vertex.at.longitude);
+    }
+    const double turn = first + last < 0 ? 360 : 0;
+    west = std::min(west, first), east = std::max(east, last);
+    west_across = std::min(west_across, first + turn), east_across = std::max(east_across, last + turn);
+  }
+  return east - west > 180 && east_across - west_across < east - west ? std::pair(west_across, east_across)
+                                                                      : std::pair(west, east);
+}
+
 void Parser::PlaceOnPlane() {
-  double west = 180, east = -180, south = 90, north = -90;
+  double south = 90, north = -90;
   for (const Ring& ring : rings_) {
     for (const Vertex& vertex : ring) {
-      west = std::min(west, vertex.at.longitude);
-      east = std::max(east, vertex.at.longitude);
       south = std::min(south, vertex.at.latitude);
       north = std::max(north, vertex.at.latitude);
     }
   }
+  const auto [west, east] = LongitudesOf(rings_);
   EditPlane& plane = edit_.plane;
   plane.longitude = (west + east) / 2;
+  // Of few bits, so that 180 and -180 degrees are exactly one place.
+  if (east > 180) plane.longitude = std::remainder(std::round(plane.longitude * 0x1p24) / 0x1p24, 360.0);
   plane.latitude = (south + north) / 2;
   plane.east_m = std::max(geo::MetresPerDegreeEast(plane.latitude), 1.0);
   plane.north_m = geo::MetresPerDegreeNorth(plane.latitude);

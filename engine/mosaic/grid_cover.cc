@@ -67,10 +67,11 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
       columns[c] = x >= box.west && x <= box.east ? 1 : 0;
       if (columns[c] != 0) first = std::min(first, c), end = c + 1;
     }
+    if (first >= end) continue;  // between two columns
     const bool is_one_run = std::find(columns.begin() + static_cast<std::ptrdiff_t>(first),
                                       columns.begin() + static_cast<std::ptrdiff_t>(end),
                                       0) == columns.begin() + static_cast<std::ptrdiff_t>(end);
-    for (std::size_t j = 0; j < positions.rows() && first < end; ++j) {
+    for (std::size_t j = 0; j < positions.rows(); ++j) {
       if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
       std::uint8_t* const row = inside.data() + j * columns.size();
       if (is_one_run) {

@@ -170,7 +170,8 @@ GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, doub
 
 void GridSteps::Double() {
   inside *= 2;
-  for (std::size_t k = 0; k < 4; ++k) side[k] *= 2, corner[k] *= 2;
+  // Coarser steps stay: they are those of the neighbours.
+  for (std::size_t k = 0; k < 4; ++k) side[k] = std::max(side[k], inside), corner[k] = std::max(corner[k], inside);
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, const GridSteps& steps) {

@@ -48,6 +48,7 @@ struct GridSteps {
   std::array<double, 4> side{}, corner{};
 
   GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double min_error_m, PositionWidth width);
+  // For tiles that do not fit (FitsFloats). Steps of sides and corners stay unless they are finer than `inside`.
   void Double();
 };
 

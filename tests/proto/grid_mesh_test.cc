@@ -47,6 +47,34 @@ TEST(GridStep, KeepsFloatsWithinACentimetreOfTheBorder) {
   EXPECT_EQ(GridStep({2, 256}, geo::LadderError(2, 0), PositionWidth::kFloat), 1);
 }
 
+// Neighbours have the same edges unless these have to become coarser than they are.
+TEST(GridSteps, DoubleEdgesOnlyWithTheInside) {
+  const geo::Lattice lattice{14, 64};
+  EdgeErrors errors(2);
+  errors.side[1] = errors.corner[1] = errors.corner[2] = 0.1;
+  for (const PositionWidth width : {PositionWidth::k16Bits, PositionWidth::kFloat}) {
+    const GridSteps before(lattice, errors, 0.01, width);
+    GridSteps steps = before;
+    ASSERT_LT(steps.inside, before.side[0] / 2);
+    for (double inside = 2 * before.inside; inside <= 4 * before.side[0]; inside *= 2) {
+      steps.Double();
+      EXPECT_EQ(steps.inside, inside);
+      for (std::size_t k = 0; k < 4; ++k) {
+        EXPECT_EQ(steps.side[k], std::max(before.side[k], inside));
+        EXPECT_EQ(steps.corner[k], std::max(before.corner[k], inside));
+      }
+    }
+    // Without limits all steps are one.
+    GridSteps plain(lattice, EdgeErrors(2), 2, width);
+    plain.Double();
+    for (std::size_t k = 0; k < 4; ++k) {
+      EXPECT_EQ(plain.inside, 2 * GridStep(lattice, 2, width));
+      EXPECT_EQ(plain.side[k], plain.inside);
+      EXPECT_EQ(plain.corner[k], plain.inside);
+    }
+  }
+}
+
 // Pairs of neighbours: inside a root, across both roots, across the antimeridian, beside the poles.
 struct Meeting {
   geo::TileKey a, b;

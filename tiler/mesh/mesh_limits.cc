@@ -70,6 +70,9 @@ proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey&
       for (std::size_t k = 0; k < of_edge.weights.size(); ++k) least_m = std::min(least_m, of_edge.Allowed(k, error_m));
     }
   }
+  // A pole is one point with one step in all tiles around it.
+  if (key.y == 0) errors.side[0] = errors.corner[0] = errors.corner[1] = errors.tile;
+  if (key.y + 1 == geo::TileRows(key.level)) errors.side[2] = errors.corner[2] = errors.corner[3] = errors.tile;
   return errors;
 }
 

@@ -26,7 +26,7 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 
 // The smallest allowed error on each side of a tile of this error, and on the edges that meet at each corner: the
 // height of a corner counts for the samples on all edges that end there. Neighbours have equal values for shared sides
-// and corners. `limits`: of the tile.
+// and corners. On a pole they are `error_m`. `limits`: of the tile.
 proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
                                double error_m);
 

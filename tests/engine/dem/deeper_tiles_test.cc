@@ -191,6 +191,30 @@ TEST_F(TerrainEdits, AreInTheContentOfTheDeeperTilesThatTheyTouch) {
   EXPECT_NE(hash(at_rim, false), hash(at_rim + "," + beside, true));
 }
 
+// Tiles around the parts alone, not around the Earth.
+TEST_F(TerrainEdits, GoDeeperOnBothSidesOfTheAntimeridian) {
+  const std::string slope = WriteSlope(dir_, 179.8, "antimeridian.tif");
+  const std::string west = "[[[179.99,50.2],[180,50.2],[180,50.202],[179.99,50.202],[179.99,50.2]]]";
+  const std::string east = "[[[-180,50.2],[-179.99,50.2],[-179.99,50.202],[-180,50.202],[-180,50.2]]]";
+  const auto deeper = [&](const std::string& parts) {
+    DemOptions options;
+    options.edits = {WriteEdits(
+        dir_, fmt::format(R"({{"type":"Feature","properties":{{"terrain":{{"op":"precision","error_m":0.5}}}},)"
+                          R"("geometry":{{"type":"MultiPolygon","coordinates":[{}]}}}})",
+                          parts))};
+    const auto source = OpenOrFail(slope, options);
+    std::int64_t tiles = 0;
+    for (int level = source->finest_level() + 1; level <= source->max_level(); ++level) {
+      for (const geo::TileRange& range : source->Available(level)) tiles += geo::Cells(range);
+    }
+    return tiles;
+  };
+  const std::int64_t one = deeper(west), two = deeper(west + "," + east);
+  EXPECT_GT(one, 50);
+  EXPECT_GT(two, one * 5 / 4);
+  EXPECT_LT(two, one * 9 / 4);
+}
+
 TEST_F(TerrainEdits, GoNoDeeperThanSixLevels) {
   const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.001})", 10.35, 50.35, 10.3502, 50.3502));
   ASSERT_NE(edited, nullptr);

@@ -240,15 +240,95 @@ TEST_F(TerrainEdits, RefuseWhatWouldBeIgnored) {
       MessageOf(parts("[[10.15,50.15],[10.25,50.15],[10.25,50.25],[10.15,50.25],[10.15,50.15]]") + "," +
                 Middle(R"({"op":"slope","heights":["100",200,300,400]})") + ",null," +
                 Middle(R"({"op":"precision","error_m":1,"min_level":3.5})") +
-                R"(,{"type":"Feature","properties":{"op":"hole"},"geometry":null})");
+                R"(,{"type":"Feature","properties":{"op":"offset","metres":1},"geometry":null})");
   for (const char* part :
        {"feature 0 at 50.150000, 10.150000 (lat, lon): parts of the polygon overlap", "feature 1 at",
         "heights has \"100\"; heights are numbers", "feature 2: is no object of the type", "feature 3 at",
         "min_level is 3.5; it must be a whole number", "feature 4: \"op\" belongs into \"terrain\""}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
   }
+  // Properties of somebody else.
+  EXPECT_NE(Open(Middle(R"({"op":"hole"})") + R"(,{"type":"Feature","properties":{"op":"replace","asset":7},)"
+                                              R"("geometry":{"type":"Point","coordinates":[10,50]}})"),
+            nullptr);
   // Parts that touch, or lie in a hole of another one.
   EXPECT_NE(Open(parts("[[10.2,50.1],[10.3,50.1],[10.3,50.2],[10.2,50.2],[10.2,50.1]]")), nullptr);
+}
+
+// Two parts that meet at 180 degrees are one shape there.
+TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
+  const std::string slope = WriteSlope(dir_, 179.8, "antimeridian.tif");
+  const auto open = [&](const std::string& terrain, const std::string& geometry) {
+    DemOptions options;
+    options.source.vertical = "ellipsoid";
+    options.edits = {WriteEdits(
+        dir_, fmt::format(R"({{"type":"Feature","properties":{{"terrain":{}}},"geometry":{}}})", terrain, geometry))};
+    return OpenOrFail(slope, options);
+  };
+  const auto carved =
+      open(R"({"op":"carve","width_m":400,"height":50})",
+           R"({"type":"MultiLineString","coordinates":[[[179.9,50.1],[180,50.2]],[[-180,50.2],[-179.9,50.3]]]})");
+  ASSERT_NE(carved, nullptr);
+  EXPECT_EQ(At(*carved, 179.999, 50.2), 50);
+  EXPECT_EQ(At(*carved, -179.999, 50.2), 50);
+  // Nearest to the part on the other side, whose width reaches across.
+  EXPECT_EQ(At(*carved, -179.9995, 50.198), 50);
+  EXPECT_EQ(At(*carved, 179.9995, 50.202), 50);
+  EXPECT_GT(At(*carved, -179.99, 50.19), 300);
+  constexpr int kLevel = 8;
+  const auto key = [](double longitude) {
+    const double tiles = std::ldexp(1, kLevel) / 180;
+    return geo::TileKey{kLevel, static_cast<std::int64_t>((longitude + 180) * tiles),
+                        static_cast<std::int64_t>((50.2 + 90) * tiles)};
+  };
+  EXPECT_NE(carved->EditsOf(key(179.99)), 0u);
+  EXPECT_NE(carved->EditsOf(key(-179.99)), 0u);
+  for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(carved->EditsOf(key(far)), 0u) << far;
+  const int finest = carved->finest_level();
+  const auto row = static_cast<std::int64_t>((50.2 + 90) * std::ldexp(1, finest) / 180);
+  const auto east = carved->Read({finest, 0, row}), west = carved->Read({finest, geo::TileColumns(finest) - 1, row});
+  ASSERT_TRUE(east && west);
+  const int cells = east->lattice.cells;
+  int low = 0;
+  for (int y = 0; y <= cells; ++y) {
+    EXPECT_EQ(east->At(0, y), west->At(cells, y));
+    low += east->At(0, y) == 50 ? 1 : 0;
+  }
+  EXPECT_GT(low, 1);
+  for (const EditOutline& outline : carved->Edits()) {
+    ASSERT_EQ(outline.lines.size(), 2u);
+    EXPECT_NEAR(outline.lines[0].front().longitude, 179.9, 1e-9);
+    EXPECT_NEAR(outline.lines[0].back().longitude, 180, 1e-9);
+    EXPECT_NEAR(outline.lines[1].front().longitude, -180, 1e-9);
+    EXPECT_NEAR(outline.lines[1].back().longitude, -179.9, 1e-9);
+  }
+
+  const std::string parts =
+      R"({"type":"MultiPolygon","coordinates":[[[[179.95,50.1],[180,50.1],[180,50.3],[179.95,50.3],[179.95,50.1]]],)"
+      R"([[[-180,50.1],[-179.95,50.1],[-179.95,50.3],[-180,50.3],[-180,50.1]]]]})";
+  const auto flat = open(R"({"op":"flatten","height":"mean"})", parts);
+  const auto lake = open(R"({"op":"flatten","height":20,"vertical":"orthometric"})", parts);
+  const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
+  ASSERT_TRUE(flat && lake && geoid);
+  for (const double longitude : {179.951, 179.99999, 180.0, -180.0, -179.99999, -179.951}) {
+    EXPECT_NEAR(At(*flat, longitude, 50.2123), 299.5, 0.01) << longitude;
+    EXPECT_NEAR(At(*lake, longitude, 50.2123), 20 + (*geoid)->Undulation({longitude, 50.2123}), 0.01) << longitude;
+  }
+}
+
+// The shorter way around is that of whole parts: a part on both sides of the Greenwich meridian stays in one piece.
+TEST_F(TerrainEdits, KeepPartsWhole) {
+  const std::string slope = WriteSlope(dir_, -0.2, "greenwich.tif");
+  DemOptions options;
+  options.edits = {WriteEdits(dir_,
+                              R"({"type":"Feature","properties":{"terrain":{"op":"carve","width_m":200,"height":50}},)"
+                              R"("geometry":{"type":"MultiLineString","coordinates":[[[-90,50.2],[60,50.2]],)"
+                              R"([[170,50.2],[180,50.2]]]}})")};
+  const auto source = OpenOrFail(slope, options);
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(At(*source, -0.05, 50.2), 50);
+  EXPECT_EQ(At(*source, 0.05, 50.2), 50);
+  EXPECT_GT(At(*source, 0.15, 50.21), 400);
 }
 
 TEST_F(TerrainEdits, HaveShortMessagesAboutLongTexts) {
