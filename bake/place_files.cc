@@ -13,6 +13,7 @@
 
 #include "archive/files/bucket.h"
 #include "archive/files/input_file.h"
+#include "engine/core/errno_text.h"
 
 namespace terrace::bake {
 
@@ -64,9 +65,7 @@ void Remove(const fs::path& file) {
 }
 
 Result<bool> CreateFile(const std::string& file, const std::string& content) {
-  const auto why = [](int error) {
-    return MakeError(ErrorCode::kUnavailable, "{}", std::generic_category().message(error));
-  };
+  const auto why = [](int error) { return MakeError(ErrorCode::kUnavailable, "{}", ErrorText(error)); };
   if (archive::IsBucket(file)) {
     const auto there = archive::InputFile::Open(file);
     if (there) return false;

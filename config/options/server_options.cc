@@ -392,8 +392,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .details =
            "Another example is `/vsicurl/https://example.org/dems/`. By default GDAL cannot reach the network. Remote "
            "rasters must be GeoTIFFs, because GDAL does not report failed reads of some other formats. Remote files "
-           "are "
-           "not watched: the server sees a changed file at the next start. Give a changed file another name",
+           "are not watched: the server sees a changed file at the next start. Give a changed file another name",
        .codec = TextList(&Config::allowed_prefixes, "a list of prefixes such as [\"/vsis3/bucket/\"]", false)},
       {.key = "allowed_drivers",
        .value = "NAME[,NAME]",

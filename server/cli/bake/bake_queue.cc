@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +14,7 @@
 
 #include "archive/files/input_file.h"
 #include "bake/find_missing.h"
+#include "bake/place_files.h"
 #include "bake/queue/redis_queue.h"
 #include "engine/gdal/source_policy.h"
 #include "server/cli/bake/bake_display.h"
@@ -145,9 +145,7 @@ std::string Shown(const std::string& text) {
 }
 
 std::string WorkerName() {
-  std::array<char, 256> host{};
-  if (::gethostname(host.data(), host.size() - 1) != 0) host = {'h', 'o', 's', 't'};
-  std::string name = host.data();
+  std::string name = bake::HostName();
   std::ranges::replace_if(
       name, [](char c) { return c == '/' || c == ' '; }, '_');
   return fmt::format("{}-{}-{:04x}", name, ::getpid(), std::random_device()() & 0xffffU);

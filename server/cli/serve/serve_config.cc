@@ -67,8 +67,7 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
   if (written.starts_with("/vsi") && !place.has_extension()) {
     return fmt::format(
         "{} has no extension, so it is no raster; name an archive in a bucket in a configuration: \"baked\": \"{}\", "
-        "and "
-        "its bucket in allowed_prefixes",
+        "and its bucket in allowed_prefixes",
         written, written);
   }
   if (written.ends_with(".json")) {
