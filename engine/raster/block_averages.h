@@ -2,32 +2,16 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/gdal/sample_rules.h"
+#include "engine/raster/block_sums.h"
 #include "engine/raster/sample_grid.h"
 
 namespace terrace::dem {
-
-struct BlockSum {
-  double sum = 0, weight = 0;  // of valid samples
-
-  void Add(float sample, double times = 1) {
-    if (std::isnan(sample)) return;
-    sum += times * sample;
-    weight += times;
-  }
-  void Add(const BlockSum& other) {
-    sum += other.sum;
-    weight += other.weight;
-  }
-  float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
-};
 
 // Returns the fraction of a block of `step` samples that lies on an axis of `size` samples; below 1 for a partial last
 // block.
@@ -60,7 +44,7 @@ class BlockAverages {
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
     // All but the block of the last sample.
     const std::int64_t whole = (count - 1) / plain_;
-    AddWhole(samples, whole, weight);
+    AddRowOfBlocks(samples, plain_, weight, std::span(inner_).first(static_cast<std::size_t>(whole)));
     BlockSum& end = inner_[static_cast<std::size_t>(whole)];
     for (std::int64_t i = whole * plain_; i < count; ++i) end.Add(samples[i], i + 1 == count ? weight * last : weight);
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
@@ -69,40 +53,10 @@ class BlockAverages {
   // Writes one average per block, NaN for a block without a valid sample, and starts the next row of blocks.
   void Take(float* out) {
     if (parts_ > 1 && rows_ > 0) Gather();
-    for (BlockSum& sum : parts_ > 1 ? outer_ : inner_) {
-      *out++ = sum.Mean();
-      sum = {};
-    }
+    TakeMeans(parts_ > 1 ? outer_ : inner_, out);
   }
 
  private:
-  void AddWhole(const float* samples, std::int64_t blocks, double weight) {
-    if (plain_ == 2) return AddBlocks<2>(samples, blocks, weight);
-    if (plain_ == 4) return AddBlocks<4>(samples, blocks, weight);
-    if (plain_ == 8) return AddBlocks<8>(samples, blocks, weight);
-    for (std::int64_t i = 0; i < blocks; ++i, samples += plain_) {
-      BlockSum sum = inner_[static_cast<std::size_t>(i)];
-      for (int k = 0; k < plain_; ++k) sum.Add(samples[k], weight);
-      inner_[static_cast<std::size_t>(i)] = sum;
-    }
-  }
-
-  // The same without a branch: a void adds 0, which changes no bit of a sum.
-  template <int kBlock>
-  void AddBlocks(const float* samples, std::int64_t blocks, double weight) {
-    BlockSum* const sums = inner_.data();
-    for (std::int64_t i = 0; i < blocks; ++i) {
-      double sum = sums[i].sum, weights = sums[i].weight;
-      for (int k = 0; k < kBlock; ++k) {
-        const double sample = samples[i * kBlock + k];
-        const bool is_void = sample != sample;
-        sum += is_void ? 0.0 : weight * sample;
-        weights += is_void ? 0.0 : weight;
-      }
-      sums[i] = {sum, weights};
-    }
-  }
-
   void Gather() {
     for (std::size_t i = 0; i < inner_.size(); ++i) {
       outer_[i / static_cast<std::size_t>(parts_)].Add(inner_[i]);
