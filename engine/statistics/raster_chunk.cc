@@ -9,6 +9,7 @@
 #include "engine/raster/grid_cells.h"
 #include "engine/statistics/averaging_errors.h"
 #include "engine/statistics/kept_factors.h"
+#include "engine/statistics/sample_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -66,9 +67,9 @@ void CountSamples(const Samples& samples, const Chunk& chunk, const RasterLayout
     const float* row = samples.Row(chunk.row + r) + (chunk.col - samples.box.col);
     BlockRange* ranges = statistics.ranges.data() + std::ptrdiff_t{r / RangeTable::kBlock} * columns;
     const std::int64_t before = statistics.valid;
-    for (int c = 0; c < chunk.cols; ++c) {
-      ranges[c / RangeTable::kBlock].Add(row[c]);
-      statistics.valid += std::isnan(row[c]) ? 0 : 1;
+    for (int c = 0; c < chunk.cols; c += RangeTable::kBlock, ++ranges) {
+      const int count = std::min(RangeTable::kBlock, chunk.cols - c);
+      statistics.valid += AddToRange({row + c, static_cast<std::size_t>(count)}, *ranges);
     }
     const int used = std::clamp(layout.columns - chunk.col, 0, chunk.cols);
     if (statistics.valid - before < chunk.cols) AddVoidRuns(row, r, used, statistics.voids);
@@ -96,12 +97,9 @@ std::vector<BlockSum> SumsOf(const Samples& samples, const Chunk& box, int facto
   for (int r = 0; r < box.rows; ++r) {
     const float* row = samples.Row(box.row + r) + (box.col - samples.box.col);
     BlockSum* to = sums.data() + std::ptrdiff_t{r / factor} * columns;
-    for (int first = 0; first < box.cols; first += factor, ++to) {
-      BlockSum sum = *to;
-      const int end = std::min(first + factor, box.cols);
-      for (int c = first; c < end; ++c) sum.Add(row[c]);
-      *to = sum;
-    }
+    const int whole = box.cols / factor;
+    AddRowOfBlocks(row, factor, 1, {to, static_cast<std::size_t>(whole)});
+    for (int c = whole * factor; c < box.cols; ++c) to[whole].Add(row[c]);
   }
   return sums;
 }
@@ -162,10 +160,11 @@ Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout,
 // Adds the differences between one row of samples and the surface between averages to its blocks.
 class RowErrors {
  public:
-  RowErrors(const Averages& averages, const Chunk& chunk, const RasterLayout& layout, int factor)
+  // `block`: samples along a side of the blocks; a multiple of the factor.
+  RowErrors(const Averages& averages, const Chunk& chunk, const RasterLayout& layout, int factor, int block)
       : averages_(averages),
         rows_(layout.height, factor, false),
-        line_(static_cast<std::size_t>(averages.window.columns)) {
+        line_(static_cast<std::size_t>(averages.window.columns) + 1) {
     const GridAxis columns(layout.columns, factor, layout.wraps);
     const int used = std::min(chunk.cols, layout.columns - chunk.col);
     for (int c = 0; c < used; ++c) {
@@ -176,36 +175,67 @@ class RowErrors {
       if (averages.window.columns == 1) place = {0, 0};
       places_.push_back(place);
     }
+    for (int k = 0; k < factor; ++k) weights_.push_back((k + 0.5) / factor);
+    for (int first = 0; first < used; first += block) parts_.push_back(PartOf(first, std::min(first + block, used)));
   }
 
-  void Add(const float* samples, int row, int block, float* errors) {
+  void Add(const float* samples, int row, float* errors) {
     const GridAxis::Location place = rows_.Locate(row + 0.5);
     const float* upper = averages_.Row(place.index);
     const float* lower = place.weight > 0 ? averages_.Row(place.index + 1) : upper;
     bool has_voids = false;
-    for (std::size_t i = 0; i < line_.size(); ++i) {
+    for (std::size_t i = 0; i + 1 < line_.size(); ++i) {
       line_[i] = upper[i] * (1 - place.weight) + lower[i] * place.weight;
       has_voids |= std::isnan(line_[i]);
     }
-    const auto count = static_cast<int>(places_.size());
-    for (int first = 0; first < count; first += block, ++errors) {
-      const int end = std::min(first + block, count);
-      *errors = std::max(
-          *errors, has_voids ? WithVoids(samples, upper, lower, place.weight, first, end) : Plain(samples, first, end));
+    line_.back() = line_[line_.size() - 2];  // has no weight
+    for (const Part& part : parts_) {
+      *errors = std::max(*errors, has_voids ? WithVoids(samples, upper, lower, place.weight, part.first, part.end)
+                                            : Plain(samples, part));
+      ++errors;
     }
   }
 
  private:
-  float Plain(const float* samples, int first, int end) const {
+  // Columns first .. end - 1, a block. In the middle are whole runs of samples between two averages.
+  struct Part {
+    int first, middle, middle_end, end;
+  };
+
+  // The averages at the ends of an axis have no others beyond them; samples there do not lie in whole runs.
+  Part PartOf(int first, int end) const {
+    const auto length = static_cast<int>(weights_.size());
+    const auto is_whole = [&](int begin) {
+      for (int k = 0; k < length; ++k) {
+        const GridAxis::Location& place = places_[static_cast<std::size_t>(begin + k)];
+        if (place.index != places_[static_cast<std::size_t>(begin)].index) return false;
+        if (place.weight != weights_[static_cast<std::size_t>(k)]) return false;
+      }
+      return true;
+    };
+    int middle = std::min(first + length / 2, end), middle_end = middle;
+    if (middle + length <= end && !is_whole(middle)) middle_end = middle = std::min(middle + length, end);
+    while (middle_end + length <= end && is_whole(middle_end)) middle_end += length;
+    return {first, middle, middle_end, end};
+  }
+
+  float Plain(const float* samples, const Part& part) const {
     double worst = 0;
-    const bool single = line_.size() == 1;
-    for (int c = first; c < end; ++c) {
-      const auto& [index, weight] = places_[static_cast<std::size_t>(c)];
-      const double* at = line_.data() + index;
-      const double height = single ? at[0] : at[0] + weight * (at[1] - at[0]);
-      const double error = std::abs(height - double{samples[c]});
-      if (error > worst) worst = error;  // never for a void
+    const auto add = [&](int first, int end) {
+      for (int c = first; c < end; ++c) {
+        const auto& [index, weight] = places_[static_cast<std::size_t>(c)];
+        const double* at = line_.data() + index;
+        const double error = std::abs(at[0] + weight * (at[1] - at[0]) - double{samples[c]});
+        if (error > worst) worst = error;  // never for a void
+      }
+    };
+    add(part.first, part.middle);
+    if (part.middle_end > part.middle) {
+      const double* const averages = line_.data() + places_[static_cast<std::size_t>(part.middle)].index;
+      const std::size_t runs = static_cast<std::size_t>(part.middle_end - part.middle) / weights_.size();
+      worst = std::max(worst, LargestDistance({samples + part.middle, averages, runs, weights_}));
     }
+    add(part.middle_end, part.end);
     return Up(worst);
   }
 
@@ -240,6 +270,8 @@ class RowErrors {
   const Averages& averages_;
   const GridAxis rows_;
   std::vector<GridAxis::Location> places_;  // by column of the chunk, within the window
+  std::vector<double> weights_;             // of a whole run
+  std::vector<Part> parts_;
   std::vector<double> line_;
 };
 
@@ -258,9 +290,9 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
     }
     const int pixels = AveragingErrors::BlockPixels(factor), columns = DivideUp(chunk.cols, pixels);
     std::vector<float>& errors = statistics.errors[statistics.averages.size()];
-    RowErrors rows(*averages, chunk, layout, factor);
+    RowErrors rows(*averages, chunk, layout, factor, pixels);
     for (int r = 0; r < chunk.rows; ++r) {
-      rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r, pixels,
+      rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r,
                errors.data() + std::ptrdiff_t{r / pixels} * columns);
     }
     statistics.averages.emplace_back();

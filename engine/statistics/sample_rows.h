@@ -1,0 +1,26 @@
+// Statistics of rows of samples, in vectors. Results have the same bits on every set of instructions.
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "engine/common/range_table.h"
+
+namespace terrace::dem {
+
+// Adds samples to a range. Returns the number of those that are not void.
+std::int64_t AddToRange(std::span<const float> samples, BlockRange& range);
+
+// Samples of a row between averages of `weights.size()` samples each. Run i is as many samples between averages i and
+// i + 1; `weights` are their distances from average i, in averages.
+struct SampleRuns {
+  const float* samples = nullptr;
+  const double* averages = nullptr;  // runs + 1
+  std::size_t runs = 0;
+  std::span<const double> weights;  // 2 or a multiple of 4
+};
+
+// The largest distance of a sample from the line between its averages. Voids do not count. No average is void.
+double LargestDistance(const SampleRuns& runs);
+
+}  // namespace terrace::dem
