@@ -15,6 +15,7 @@
 #include "engine/gdal/sample_rules.h"
 #include "engine/raster/block_averages.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {
 namespace {
@@ -122,6 +123,51 @@ TEST(BlockAverages, AreSumsOfTheSamplesOfABlockInTheirOrder) {
         }
       }
     }
+  }
+}
+
+// Heights of very different sizes: the sum of a block depends on the order of its samples.
+TEST(BlockSums, AreInTheOrderOfTheSamples) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> height(-400, 8800);
+  for (const int block : {1, 2, 3, 4, 8, 12, 64}) {
+    for (const std::size_t blocks : {0UL, 1UL, 4UL, 7UL, 19UL}) {
+      std::vector<float> samples(blocks * static_cast<std::size_t>(block));
+      for (float& sample : samples) {
+        sample = random() % 3 == 0 ? SampleRules::kVoid : std::ldexp(height(random), -static_cast<int>(random() % 50));
+      }
+      std::vector<BlockSum> expected(blocks, BlockSum{0.1, 2});
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        expected[i / static_cast<std::size_t>(block)].Add(samples[i], 0.75);
+      }
+      tin::ForEachInstructionSet([&] {
+        std::vector<BlockSum> sums(blocks, BlockSum{0.1, 2});
+        AddRowOfBlocks(samples.data(), block, 0.75, sums);
+        for (std::size_t i = 0; i < blocks; ++i) {
+          EXPECT_EQ(sums[i].sum, expected[i].sum) << block << ' ' << blocks << ' ' << i;
+          EXPECT_EQ(sums[i].weight, expected[i].weight) << block << ' ' << blocks << ' ' << i;
+        }
+      });
+    }
+  }
+}
+
+TEST(BlockSums, MeansAreThoseOfTheSingleBlocks) {
+  for (std::size_t blocks = 0; blocks <= 20; ++blocks) {
+    std::vector<BlockSum> sums(blocks);
+    for (std::size_t i = 0; i < blocks; ++i) {
+      if (i % 3 != 0) sums[i] = {0.1 * static_cast<double>(i), static_cast<double>(i % 7 + 1) / 3};
+    }
+    tin::ForEachInstructionSet([&] {
+      std::vector<BlockSum> taken = sums;
+      std::vector<float> means(blocks);
+      TakeMeans(taken, means.data());
+      for (std::size_t i = 0; i < blocks; ++i) {
+        EXPECT_TRUE(IsSameHeight(means[i], sums[i].Mean())) << blocks << ' ' << i;
+        EXPECT_EQ(taken[i].weight, 0);
+        EXPECT_EQ(taken[i].sum, 0);
+      }
+    });
   }
 }
 
