@@ -93,7 +93,10 @@ class Run {
         unit = UnitToHelp();
       }
       if (!unit) {
-        if (taken.state == UnitQueue::Taken::State::kOver && open_.empty()) return;
+        if (taken.state == UnitQueue::Taken::State::kOver && open_.empty()) {
+          changed_.notify_all();  // the others need not wait
+          return;
+        }
         // A shared queue may hand out units again that other processes gave back; nothing notifies this one.
         constexpr std::chrono::milliseconds kPause{200};
         changed_.wait_for(lock, kPause);

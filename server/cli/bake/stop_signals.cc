@@ -3,7 +3,6 @@
 #include <signal.h>
 
 #include <cstdlib>
-#include <ctime>
 
 namespace terrace::cli {
 
@@ -14,15 +13,19 @@ StopSignals::StopSignals() {
   ::sigaddset(&set, SIGTERM);
   ::pthread_sigmask(SIG_BLOCK, &set, nullptr);
   thread_ = std::jthread([this, set](const std::stop_token& ended) {
-    constexpr timespec kPause{0, 100'000'000};
     while (!ended.stop_requested()) {
-      const int came = ::sigtimedwait(&set, nullptr, &kPause);
-      if (came <= 0) continue;
+      const int came = ::sigwaitinfo(&set, nullptr);
+      if (came <= 0 || ended.stop_requested()) continue;
       if (signal_ != 0) std::_Exit(128 + came);
       signal_ = came;
       source_.request_stop();
     }
   });
+}
+
+StopSignals::~StopSignals() {
+  thread_.request_stop();
+  ::pthread_kill(thread_.native_handle(), SIGTERM);  // wakes the thread
 }
 
 }  // namespace terrace::cli

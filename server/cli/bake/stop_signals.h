@@ -12,7 +12,7 @@ namespace terrace::cli {
 class StopSignals {
  public:
   StopSignals();
-  ~StopSignals() = default;
+  ~StopSignals();
   StopSignals(const StopSignals&) = delete;
   StopSignals& operator=(const StopSignals&) = delete;
 
