@@ -159,16 +159,24 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& ch
       ++low;
     }
   };
+  const auto zeros_in = [&](int row) {
+    return row < rows ? std::count(heights + row * stride, heights + row * stride + cols, 0.0f) : 0;
+  };
+  std::ptrdiff_t zeros_below = zeros_in(0);
   for (int r = 0; r < rows; ++r) {
     const float* const row = heights + r * stride;
-    for (int c = 0; c < cols; ++c) {
-      if (c + 1 < cols) pair(row[c], row[c + 1]);
-      if (r + 1 < rows) pair(row[c], row[c + stride]);
+    const std::ptrdiff_t zeros_here = zeros_below;
+    zeros_below = zeros_in(r + 1);
+    if (zeros_here > 0 || zeros_below > 0) {  // else there is no pair
+      for (int c = 0; c < cols; ++c) {
+        if (c + 1 < cols) pair(row[c], row[c + 1]);
+        if (r + 1 < rows) pair(row[c], row[c + stride]);
+      }
     }
-    zeros += std::count(row, row + cols, 0.0f);
+    zeros += zeros_here;
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
     const int raster_row = chunk.row + r;
-    if (raster_row == 0 || raster_row + 1 == raster_height) at_border += std::count(row, row + cols, 0.0f);
+    if (raster_row == 0 || raster_row + 1 == raster_height) at_border += zeros_here;
     AddGround(row, cols, chunk.col, raster_row);
   }
 }
