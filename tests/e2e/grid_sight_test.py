@@ -201,9 +201,16 @@ class GridsAndSight(unittest.TestCase):
         beside = "/grid?bbox=20,10,21,11&width=3&height=2"
         self.assertTrue(all(math.isnan(height) for height in struct.unpack("<6f", self.get(beside)[0])))
         self.assertTrue(all(math.isnan(height) for height in tiff_heights(self.get(beside + "&format=geotiff")[0])[1]))
-        self.assertEqual(json.loads(self.get(beside + "&format=json")[0])["voids"], 6)
-        for form in ("r16", "png16"):
-            self.assertIn("no node of the grid has a height", self.refused(f"{beside}&format={form}"))
+        for form in ("r16", "png16", "json"):
+            refused = self.refused(f"{beside}&format={form}")
+            self.assertIn("no node of the grid has a height", refused)
+            self.assertRegex(refused, r"in units of the crs, EPSG:4326: degree; the data is in 6\.999\d*,45\.999\d*,8\.000\d*,47\.000\d*: ")
+        self.assertEqual(json.loads(self.get(beside + "&format=json&range=0,512")[0])["voids"], 6)
+        # Degrees in a reference system of metres: the box of the message is one that can be asked for.
+        degrees = "/grid?crs=EPSG:32632&width=3&height=3&format=r16&bbox="
+        refused = self.refused(degrees + "7.2,46.2,7.4,46.3")
+        box = re.search(r"in units of the crs, EPSG:32632: metre; the data is in ([-0-9.,]+): ", refused)[1]
+        self.assertEqual(len(self.get(degrees + box)[0]), 18)
         # One of a row of landscapes with a common range may be beside the data.
         self.assertEqual(self.get(beside + "&format=r16&range=0,512")[0], bytes(12))
 

@@ -136,7 +136,8 @@ TEST(GridQuery, SaysWhatIsWrong) {
       {"bbox=0,0,1,1&spacing=1&range=-1.7e308,1.7e308&format=r16", "from -1000000 to 1000000"},
       {"bbox=0,0,1,1&spacing=1&range=-1000001,0&format=r16", "from -1000000 to 1000000"},
       {"bbox=0,0,1,1&spacing=1&range=0,1000001&format=json", "from -1000000 to 1000000"},
-      {"bbox=0,0,1,1&spacing=1&range=0,5", "range needs format"},
+      {"bbox=0,0,1,1&spacing=1&range=0,5", "range needs format=r16, png16 or json"},
+      {"bbox=0,0,1,1&spacing=1&format=json&fraction=0.5", "fraction needs surface=served"},
       {"bbox=0,0,1,1&spacing=1&datum=mean", "datum must be"},
       {"bbox=0,0,1,1&spacing=1&size=3", "unknown parameter"},
       {"bbox=0,0,1,1&spacing=1&spacing=1", "more than once"},
@@ -195,6 +196,24 @@ TEST(SightQuery, ReadsOneRayAndMany) {
   EXPECT_EQ(many->rays[1].to.height_m, 4);
   const std::string body = BytesOf({7, 46, 10, 7.5, 46.5, 20});
   const auto binary = ParseSight({"surface=served", kBinary, body}, 9);
+TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
+  const auto plan = dem::PlanOutputGrid({32632, 8.03, 46.45, 8.16, 46.55, 5, 5, {}}, 100);
+  ASSERT_TRUE(plan) << plan.error().message;
+  EXPECT_EQ(plan->unit, "metre");
+  const auto box = dem::BoundsInCrs(*plan, {8, 46, 10, 47});
+  ASSERT_TRUE(box);
+  // By `gdaltransform -s_srs EPSG:4326 -t_srs EPSG:32632`. The southern edge is farthest south at 9 degrees.
+  EXPECT_NEAR(box->west, 422567.8174, 1e-3);
+  EXPECT_NEAR(box->east, 577432.1826, 1e-3);
+  EXPECT_NEAR(box->south, 5094047.4921, 1e-3);
+  EXPECT_NEAR(box->north, 5205649.3477, 1e-3);
+  EXPECT_FALSE(dem::BoundsInCrs(*plan, {-180, -90, 180, 90})) << "zone 32 is no map of the world";
+  const auto degrees = dem::PlanOutputGrid({4326, 1, 2, 3, 4, 5, 5, {}}, 100);
+  ASSERT_TRUE(degrees);
+  EXPECT_EQ(degrees->unit, "degree");
+  EXPECT_EQ(dem::BoundsInCrs(*degrees, {8, 46, 10, 47})->east, 10);
+}
+
   ASSERT_TRUE(binary) << binary.error().message;
   EXPECT_TRUE(binary->is_binary);
   EXPECT_TRUE(binary->drawn);
