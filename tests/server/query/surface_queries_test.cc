@@ -61,6 +61,19 @@ TEST(BinaryHeights, SaysWhatIsWrong) {
   ExpectSays(parse(point, "normals=yes"), "normals must be 0 or 1");
 }
 
+// curl and urllib send this type unless told otherwise.
+TEST(BinaryHeights, AreNamedIfTheyAreSentAsAForm) {
+  constexpr const char* kForm = "application/x-www-form-urlencoded";
+  constexpr const char* kRemedy = "send numbers with Content-Type: application/octet-stream";
+  ExpectSays(ParseHeights({{}, kForm, BytesOf({8.25, 46.5})}, 9), kRemedy);
+  ExpectSays(ParseSight({{}, kForm, BytesOf({8.25, 46.5, 900, 8.5, 46.5, 900})}, 9), kRemedy);
+  for (const char* text : {"location=46.5,8.25", "locations=46.5;8.25\r\n"}) {
+    const auto refused = ParseHeights({{}, kForm, text}, 9);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().message.find("octet-stream"), std::string::npos) << refused.error().message;
+  }
+}
+
 TEST(DrawnSurface, ReadsTheParametersOfTiles) {
   const auto query = ParseHeights(
       {"locations=1,2&surface=served&level=12&error=5&atleast=1&format=glb&compression=meshopt", {}, {}}, 9);
