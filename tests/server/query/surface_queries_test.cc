@@ -93,9 +93,10 @@ TEST(DrawnSurface, SaysWhatIsWrong) {
     const char* says;
   } cases[] = {
       {"surface=mesh", "surface must be source or served"},
-      {"level=3", "need surface=served"},
-      {"error=3", "need surface=served"},
-      {"surface=source&format=glb", "need surface=served"},
+      {"level=3", "level needs surface=served"},
+      {"error=3", "error needs surface=served"},
+      {"surface=source&format=glb", "format needs surface=served"},
+      {"compression=none", "compression needs surface=served"},
       {"surface=served&level=25", "level must be"},
       {"surface=served&level=-1", "level must be"},
       {"surface=served&level=", "level must be"},
@@ -195,20 +196,6 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   ExpectSays(dem::PositionsOf(*far, 0, 10, {}), "EPSG:32611 has no place on Earth for column 0, row 0");
 }
 
-TEST(SightQuery, ReadsOneRayAndMany) {
-  const auto one = ParseSight({"from=46,7,1000&to=46.1,7.1,1200.5&refraction=0.13&heights=ground", {}, {}}, 9);
-  ASSERT_TRUE(one) << one.error().message;
-  ASSERT_EQ(one->rays.size(), 1u);
-  EXPECT_EQ(one->rays[0].from.latitude, 46);
-  EXPECT_EQ(one->rays[0].to.height_m, 1200.5);
-  EXPECT_EQ(one->options.refraction, 0.13);
-  EXPECT_TRUE(one->from_ground);
-  const auto many = ParseSight({{}, "application/json", R"({"rays": "46,7,10,46.1,7,20|1,2,3,1,2,4"})"}, 9);
-  ASSERT_TRUE(many) << many.error().message;
-  ASSERT_EQ(many->rays.size(), 2u);
-  EXPECT_EQ(many->rays[1].to.height_m, 4);
-  const std::string body = BytesOf({7, 46, 10, 7.5, 46.5, 20});
-  const auto binary = ParseSight({"surface=served", kBinary, body}, 9);
 TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
   const auto plan = dem::PlanOutputGrid({32632, 8.03, 46.45, 8.16, 46.55, 5, 5, {}}, 100);
   ASSERT_TRUE(plan) << plan.error().message;
@@ -227,6 +214,20 @@ TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
   EXPECT_EQ(dem::BoundsInCrs(*degrees, {8, 46, 10, 47})->east, 10);
 }
 
+TEST(SightQuery, ReadsOneRayAndMany) {
+  const auto one = ParseSight({"from=46,7,1000&to=46.1,7.1,1200.5&refraction=0.13&heights=ground", {}, {}}, 9);
+  ASSERT_TRUE(one) << one.error().message;
+  ASSERT_EQ(one->rays.size(), 1u);
+  EXPECT_EQ(one->rays[0].from.latitude, 46);
+  EXPECT_EQ(one->rays[0].to.height_m, 1200.5);
+  EXPECT_EQ(one->options.refraction, 0.13);
+  EXPECT_TRUE(one->from_ground);
+  const auto many = ParseSight({{}, "application/json", R"({"rays": "46,7,10,46.1,7,20|1,2,3,1,2,4"})"}, 9);
+  ASSERT_TRUE(many) << many.error().message;
+  ASSERT_EQ(many->rays.size(), 2u);
+  EXPECT_EQ(many->rays[1].to.height_m, 4);
+  const std::string body = BytesOf({7, 46, 10, 7.5, 46.5, 20});
+  const auto binary = ParseSight({"surface=served", kBinary, body}, 9);
   ASSERT_TRUE(binary) << binary.error().message;
   EXPECT_TRUE(binary->is_binary);
   EXPECT_TRUE(binary->drawn);
@@ -254,7 +255,7 @@ TEST(SightQuery, SaysWhatIsWrong) {
       {"from=1,2,3&to=1,2,4&refraction=x", "refraction must be"},
       {"from=1,2,3&to=1,2,4&heights=sea", "heights must be"},
       {"from=1,2,3&to=1,2,4&from=1,2,3", "from is given more than once"},
-      {"from=1,2,3&to=1,2,4&level=3", "need surface=served"},
+      {"from=1,2,3&to=1,2,4&level=3", "level needs surface=served"},
       {"frm=1,2,3", "unknown parameter"},
   };
   for (const auto& [query, says] : cases) ExpectSays(ParseSight({query, {}, {}}, 2), says);
