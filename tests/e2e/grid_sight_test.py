@@ -197,6 +197,12 @@ class GridsAndSight(unittest.TestCase):
                 ("bbox=7,46,8,97&width=9&height=9", "latitudes")):
             self.assertIn(says, self.refused("/grid?" + query))
 
+    def test_the_default_admits_the_sizes_of_game_engines(self):
+        for side in (1009, 1025):  # Unreal's and Unity's
+            self.assertEqual(len(self.get(f"/grid?bbox=7.2,46.2,7.4,46.35&width={side}&height={side}&format=r16")[0]), 2 * side * side)
+        self.assertIn("1025 x 1026 nodes, more than max_mesh_samples of this server (1050625)",
+                      self.refused("/grid?bbox=7.2,46.2,7.4,46.35&width=1025&height=1026"))
+
     def test_grids_beside_the_data(self):
         beside = "/grid?bbox=20,10,21,11&width=3&height=2"
         self.assertTrue(all(math.isnan(height) for height in struct.unpack("<6f", self.get(beside)[0])))
