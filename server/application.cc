@@ -59,7 +59,10 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     if (admission.refusal) return admission;
     const RouteRow& row = *context_.route.row;
     admission.depends_on_token = admission_control.DependsOnToken(context_);
-    if (row.takes_post()) admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
+    if (row.takes_post()) {
+      admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
+      admission.body_remedy = "the limit follows from max_locations of this server: send fewer points at once";
+    }
     return admission;
   }
 

@@ -90,7 +90,9 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .value = "METRES",
        .help =
            "Height outside the sources and in voids that are not filled; by default the lowest height of the sources",
-       .details = "Above the WGS 84 ellipsoid",
+       .details =
+           "Above the WGS 84 ellipsoid. Where heights are converted from a geoid, the default may be some metres "
+           "below the lowest height; `terrace info` prints it",
        .codec = Number(&DatasetConfig::floor, -kMaxHeight, kMaxHeight)},
       {.key = "max_void_gap",
        .value = "SAMPLES",

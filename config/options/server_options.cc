@@ -329,7 +329,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "load",
        .help = "Largest number of height samples of one mesh of an area, and of nodes of one grid",
        .details =
-           "Larger ones get 400. Meshing takes up to 300 bytes of memory a sample. A grid of 1009 x 1009 needs 1018081",
+           "Larger ones get 400. Meshing takes up to 300 bytes of memory a sample. The default admits 1025 x 1025",
        .codec = Integer(&Config::max_mesh_samples, 4, 100'000'000),
        .is_live = true},
       {.key = "request_deadline_s",

@@ -33,6 +33,13 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
     return Invalid(fmt::format("crs: EPSG:{} has no easting and northing, nor longitude and latitude", epsg));
   }
   grid.is_geographic = srs.IsGeographic() != 0;
+  const char* unit = nullptr;
+  if (grid.is_geographic) {
+    srs.GetAngularUnits(&unit);
+  } else {
+    srs.GetLinearUnits(&unit);
+  }
+  grid.unit = unit != nullptr ? unit : "unknown unit";
   return {};
 }
 
@@ -129,6 +136,34 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
   positions.reserve(nodes.size());
   for (const Position& node : nodes) positions.push_back({std::remainder(node.x, 360), node.y});
   return positions;
+}
+
+std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area) {
+  if (grid.epsg == kWgs84) return area;
+  const double east = area.east < area.west ? area.east + 360 : area.east;
+  std::vector<Position> edge;
+  constexpr int kSteps = 32;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double along = static_cast<double>(i) / kSteps;
+    const double x = std::lerp(area.west, east, along), y = std::lerp(area.south, area.north, along);
+    for (const Position& on_edge : {Position{x, area.south}, {x, area.north}, {area.west, y}, {east, y}}) {
+      edge.push_back(on_edge);
+    }
+  }
+  const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
+  if (!projector) return std::nullopt;
+  std::vector<Position> placed = edge;
+  (*projector)->Forward(placed);
+  std::vector<Position> back = placed;
+  (*projector)->Inverse(back);
+  GeoBounds box{placed[0].x, placed[0].y, placed[0].x, placed[0].y};
+  for (std::size_t i = 0; i < edge.size(); ++i) {
+    const double off = std::hypot(std::remainder(back[i].x - edge[i].x, 360), back[i].y - edge[i].y);
+    if (!(off <= kReturn * 1e-5)) return std::nullopt;  // also NaN
+    box.west = std::min(box.west, placed[i].x), box.east = std::max(box.east, placed[i].x);
+    box.south = std::min(box.south, placed[i].y), box.north = std::max(box.north, placed[i].y);
+  }
+  return box;
 }
 
 }  // namespace terrace::dem

@@ -18,6 +18,7 @@ namespace terrace::dem {
 struct OutputGrid {
   int epsg = 4326;
   std::string wkt;                                  // of the CRS
+  std::string unit;                                 // of its axes: "metre", "degree"
   bool is_geographic = true;                        // x and y are degrees of longitude and latitude
   double west = 0, south = 0, east = 0, north = 0;  // units of the CRS
   std::int64_t columns = 0, rows = 0;
@@ -43,6 +44,9 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
 // has no position on Earth at a node. kCancelled: stopped.
 Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
                                              const std::stop_token& stop);
+
+// The smallest box around `area` in the CRS of the grid, for messages; nothing: a part of the area has no place there.
+std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
 // A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL
 // cannot write it.

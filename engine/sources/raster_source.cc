@@ -162,8 +162,9 @@ void LogVertical(const std::string& path, const VerticalDatum& vertical, const s
         "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
         "sea level, set `vertical`, as in --vertical egm96");
   } else if (vertical.geoid) {
-    LogSource(SourceLog::Level::kInfo, path, "heights count from {}, made ellipsoidal by PROJ operation \"{}\"",
-              vertical.name, vertical.geoid->description());
+    LogSource(SourceLog::Level::kInfo, path,
+              "heights are above {}, converted to the ellipsoid by PROJ operation \"{}\"", vertical.name,
+              vertical.geoid->description());
     LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
     // Some programs write feet in places that GDAL does not read.
     const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());

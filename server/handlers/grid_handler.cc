@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
@@ -22,6 +23,7 @@ namespace {
 // Nodes that are read at once.
 constexpr std::int64_t kBatch = 65536;
 constexpr int kLargest = 65535;  // of 16 bits
+constexpr int kBoxDigits = 9;    // in messages: centimetres, or 10^-6 degrees
 
 struct MadeGrid {
   MadeReply reply;
@@ -71,16 +73,25 @@ Result<std::vector<float>> ReadNodes(const tiler::TilePipeline& pipeline, std::u
   return heights;
 }
 
-// Integers of 16 bits have no value for a void. Beside the data all of them would be 0, which looks like the sea.
+// Where the data is, in words for `bbox`.
+std::string DataBox(const dem::OutputGrid& grid, const DatasetView& view) {
+  const dem::GeoBounds degrees{view.west, view.south, view.east, view.north};
+  const std::optional<dem::GeoBounds> there = dem::BoundsInCrs(grid, degrees);
+  const dem::GeoBounds& box = there ? *there : degrees;
+  return fmt::format("{},{},{},{}{}", PlainNumber(box.west, kBoxDigits), PlainNumber(box.south, kBoxDigits),
+                     PlainNumber(box.east, kBoxDigits), PlainNumber(box.north, kBoxDigits),
+                     there ? "" : " in degrees of EPSG:4326");
+}
+
+// Integers have no value for a void. Beside the data all of them would be 0, which looks like the sea.
 Result<void> CheckHasHeights(const GridQuery& query, const dem::OutputGrid& grid, const Steps& steps,
                              const DatasetView& view) {
-  const bool is_16_bit = query.format == GridFormat::kR16 || query.format == GridFormat::kPng16;
-  if (!is_16_bit || query.range || steps.voids < dem::Area(grid.columns, grid.rows)) return {};
-  return MakeError(
-      ErrorCode::kInvalidArgument,
-      "bbox: no node of the grid has a height, which 16-bit integers cannot say; the data is from {} to {} "
-      "E, {} to {} N: choose a bbox there, format=f32 or geotiff, where voids are NaN, or a range",
-      view.west, view.east, view.south, view.north);
+  if (!HasIntegers(query.format) || query.range || steps.voids < dem::Area(grid.columns, grid.rows)) return {};
+  return MakeError(ErrorCode::kInvalidArgument,
+                   "bbox: no node of the grid has a height, which 16-bit integers cannot say; bbox is "
+                   "west,south,east,north in units of the crs, EPSG:{}: {}; the data is in {}: choose a bbox there, "
+                   "format=f32 or geotiff, where voids are NaN, or a range",
+                   grid.epsg, grid.unit, DataBox(grid, view));
 }
 
 // The Terrain-Grid header.

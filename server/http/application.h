@@ -23,6 +23,7 @@ struct Admission {
   std::optional<Response> refusal = {};  // sent instead of an answer; the request's body is not read
   bool delays_refusal = false;           // the client exceeds its rate; an immediate refusal would be retried at once
   std::size_t max_body_bytes = 0;        // limit of a POST's body
+  std::string_view body_remedy = {};     // for larger bodies, as the end of a message
   bool depends_on_token = false;         // the reply depends on the request's token
 };
 

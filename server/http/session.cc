@@ -43,9 +43,13 @@ Response Overloaded(std::string_view detail, std::string_view request_id) {
 }
 
 // Checked before a body is read: nothing if it may be sent.
-std::optional<Response> WhyNoBody(const Request& request, std::size_t max_body_bytes) {
-  if (request.content_length > max_body_bytes) {
-    return ProblemResponse(413, "the request body is too large", request.id);
+std::optional<Response> WhyNoBody(const Request& request, const Admission& admission) {
+  if (request.content_length > admission.max_body_bytes) {
+    return ProblemResponse(
+        413,
+        fmt::format("the body has {} bytes, more than the {} that this URL takes{}{}", request.content_length,
+                    admission.max_body_bytes, admission.body_remedy.empty() ? "" : "; ", admission.body_remedy),
+        request.id);
   }
   if (!request.fields->content_encoding.empty() && !EqualsIgnoringCase(request.fields->content_encoding, "identity")) {
     Response response = ProblemResponse(415, "bodies with a Content-Encoding are not read", request.id);
@@ -204,7 +208,7 @@ asio::awaitable<bool> Session::ServeOne() {
   Admission& admission = exchange_.admission;
   admission = handler_->Admit(request, context_->deadline->load(std::memory_order_relaxed));
   exchange_.is_admitted = true;
-  if (!admission.refusal) admission.refusal = WhyNoBody(request, admission.max_body_bytes);
+  if (!admission.refusal) admission.refusal = WhyNoBody(request, admission);
   if (admission.delays_refusal) {
     co_await DelayRefusal();
   } else if (admission.wait.count() > 0 && !co_await WhileConnected(Sleep(admission.wait))) {

@@ -11,8 +11,9 @@ constexpr ParameterNote kIgnoredExtensionsNote{
     "extensions", "Accepted and ignored: clients append it. May be repeated.", R"({"type":"string"})"};
 constexpr ParameterNote kLayerParameters[] = {kErrorNote, kFractionNote, kIgnoredExtensionsNote};
 constexpr MediaNote kLayerReplies[] = {{"application/json", "Layer"}};
-constexpr ExampleRequest kLayerExamples[] = {
-    {"/jacksboro/layer.json"}, {"/jacksboro/layer.json?error=5"}, {"/jacksboro/layer.json?fraction=0.25&extensions=a"}};
+constexpr ExampleRequest kLayerExamples[] = {{"/jacksboro/layer.json"},
+                                             {"/jacksboro/layer.json?error=5"},
+                                             {"/jacksboro/layer.json?fraction=0.25&extensions=octvertexnormals"}};
 
 constexpr ParameterNote kTilesetParameters[] = {kErrorNote, kFractionNote, kCompressionNote, kTextureNote,
                                                 kIgnoredExtensionsNote};
@@ -20,7 +21,7 @@ constexpr MediaNote kTilesetReplies[] = {{"application/json", "Tileset"}};
 constexpr ExampleRequest kTilesetExamples[] = {
     {"/jacksboro/tileset.json"},
     {"/jacksboro/tileset.json?error=50&compression=meshopt&texture=none"},
-    {"/jacksboro/tileset.json?fraction=0.25&extensions=a"},
+    {"/jacksboro/tileset.json?fraction=0.25&extensions=octvertexnormals"},
     {"/earth/tileset.json"},
 };
 

@@ -164,8 +164,8 @@ const Operation kSightOperation{
     .summary = "Whether straight lines between points are free of ground",
     .description =
         "A body of numbers has longitude, latitude and height of both ends of each ray as little-endian "
-        "64-bit floats; the reply then has two 32-bit floats for each ray: the clearance, and the distance "
-        "of the first place below the surface, NaN if the ray is free.",
+        "64-bit floats; the reply then has two 32-bit floats for each ray: the clearance, NaN without a height "
+        "below the ray, and the distance of the first place below the surface, NaN if none is.",
     .parameters = kSightParameters,
     .replies = kSightReplies,
     .headers = kReplyHeaders,

@@ -62,11 +62,13 @@ Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts) {
     return MakeError(ErrorCode::kInvalidArgument, "surface must be source or served");
   }
   if (surface == "source") {
-    const bool is_plain =
-        !texts.level && !texts.error && !texts.fraction && !texts.at_least && !texts.format && !texts.compression;
-    if (is_plain) return std::optional<tiler::DrawnSurface>();
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "level, error, fraction, atleast, format and compression need surface=served");
+    for (const auto& [name, text] :
+         {std::pair("level", &texts.level), std::pair("error", &texts.error), std::pair("fraction", &texts.fraction),
+          std::pair("atleast", &texts.at_least), std::pair("format", &texts.format),
+          std::pair("compression", &texts.compression)}) {
+      if (*text) return MakeError(ErrorCode::kInvalidArgument, "{} needs surface=served", name);
+    }
+    return std::optional<tiler::DrawnSurface>();
   }
   tiler::DrawnSurface drawn;
   for (const Result<void>& set :

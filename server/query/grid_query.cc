@@ -116,9 +116,7 @@ Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) 
   if (!numbers || (*numbers)[0] >= (*numbers)[1] || (*numbers)[0] < -kMaxScale || (*numbers)[1] > kMaxScale) {
     return InvalidGrid("range must be two numbers of metres from -1000000 to 1000000, the lower first");
   }
-  if (query.format == GridFormat::kF32 || query.format == GridFormat::kGeoTiff) {
-    return InvalidGrid("range needs format=r16 or png16");
-  }
+  if (!HasIntegers(query.format)) return InvalidGrid("range needs format=r16, png16 or json");
   query.range = dem::HeightRange{(*numbers)[0], (*numbers)[1]};
   return {};
 }

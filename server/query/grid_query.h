@@ -14,11 +14,14 @@ namespace terrace::server {
 
 enum class GridFormat : std::uint8_t { kF32, kR16, kGeoTiff, kPng16, kJson };
 
+// Integers of 16 bits, or the description of them: offset and scale. They have no value for a void.
+constexpr bool HasIntegers(GridFormat format) { return format != GridFormat::kF32 && format != GridFormat::kGeoTiff; }
+
 struct GridQuery {
   dem::GridRequest grid;
   GridFormat format = GridFormat::kF32;
   dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
-  std::optional<dem::HeightRange> range;     // of the integers of kR16 and kPng16; nothing: that of the heights
+  std::optional<dem::HeightRange> range;     // of the integers; nothing: that of the heights
   std::optional<tiler::DrawnSurface> drawn;  // nothing: the surface of the sources
 };
 

@@ -1,5 +1,6 @@
 #include "server/query/heights_query.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -23,6 +24,12 @@ bool HasMediaType(std::string_view content_type, std::string_view type) {
 
 bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
 bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
+
+// Printable ASCII, tabs and ends of lines, which is all that forms have.
+bool IsText(std::string_view body) {
+  return std::all_of(body.begin(), body.end(),
+                     [](char c) { return (c >= ' ' && c <= '~') || c == '\t' || c == '\r' || c == '\n'; });
+}
 
 // Longitude and latitude of each point as 64-bit floats.
 Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::string_view body, std::size_t max_locations,
@@ -148,7 +155,11 @@ Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, P
   read = IsForm(input.content_type) ? ReadForm(parts, PlusSign::kIsBlank, parameters, at)
                                     : ReadJsonObject(parts, parameters, at);
   if (!read && read.error().code == ErrorCode::kInvalidArgument) {
-    return MakeError(ErrorCode::kInvalidArgument, "the body, byte {}: {}", at, read.error().message);
+    const bool is_of_numbers = IsForm(input.content_type) && !IsText(input.body);
+    return MakeError(ErrorCode::kInvalidArgument, "the body, byte {}: {}{}", at, read.error().message,
+                     is_of_numbers ? "; the body was read as a form, as its Content-Type says, and is no text: send "
+                                     "numbers with Content-Type: application/octet-stream"
+                                   : "");
   }
   return read;
 }

@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::string_view kLeftOut = "...";
 constexpr std::string_view kVersion = "v";    // has any value
+constexpr std::string_view kCrs = "crs";      // the code of an authority
 constexpr std::string_view kToken = "token";  // omitted and not counted: admission removes it from requests
 
 // The parameters of all URLs; a test compares them with the manual.
@@ -71,6 +72,8 @@ constexpr Characters Among(std::string_view characters) {
 constexpr Characters kOfPath = Among("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-._~/");
 constexpr Characters kOfHost = Among("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-.:[]");
 constexpr Characters kOfNumbers = Among("0123456789.,|eE+-");
+constexpr Characters kDigits = Among("0123456789");
+constexpr std::size_t kMaxCrsDigits = 6;
 
 std::size_t PlainPrefix(std::string_view text, const Characters& plain) {
   std::size_t size = 0;
@@ -82,15 +85,25 @@ bool IsAmong(std::string_view text, const auto& texts) {
   return std::find(std::begin(texts), std::end(texts), text) != std::end(texts);
 }
 
-// The commas and bars between them may be encoded.
+// The commas, bars and blanks between them may be encoded.
 bool AreNumbers(std::string_view text) {
   for (;;) {
     text.remove_prefix(PlainPrefix(text, kOfNumbers));
     if (text.empty()) return true;
     const std::string_view encoded = text.substr(0, 3);
-    if (!EqualsIgnoringCase(encoded, "%2c") && !EqualsIgnoringCase(encoded, "%7c")) return false;
+    if (!EqualsIgnoringCase(encoded, "%2c") && !EqualsIgnoringCase(encoded, "%7c") && encoded != "%20") return false;
     text.remove_prefix(encoded.size());
   }
+}
+
+// "EPSG:" and digits; the colon may be encoded.
+bool IsCrs(std::string_view text) {
+  for (const std::string_view authority : {"epsg:", "epsg%3a"}) {
+    if (!EqualsIgnoringCase(text.substr(0, authority.size()), authority)) continue;
+    text.remove_prefix(authority.size());
+    return text.size() <= kMaxCrsDigits && PlainPrefix(text, kDigits) == text.size();
+  }
+  return false;
 }
 
 bool AreWords(std::string_view text) {
@@ -107,6 +120,7 @@ struct Parameter {
 
   bool is_plain() const {
     if (name == kVersion) return PlainPrefix(value, kOfPath) == value.size();
+    if (name == kCrs && IsCrs(value)) return true;
     return IsAmong(name, kParameters) && (AreNumbers(value) || AreWords(value));
   }
 

@@ -197,13 +197,26 @@ class GridsAndSight(unittest.TestCase):
                 ("bbox=7,46,8,97&width=9&height=9", "latitudes")):
             self.assertIn(says, self.refused("/grid?" + query))
 
+    def test_the_default_admits_the_sizes_of_game_engines(self):
+        for side in (1009, 1025):  # Unreal's and Unity's
+            self.assertEqual(len(self.get(f"/grid?bbox=7.2,46.2,7.4,46.35&width={side}&height={side}&format=r16")[0]), 2 * side * side)
+        self.assertIn("1025 x 1026 nodes, more than max_mesh_samples of this server (1050625)",
+                      self.refused("/grid?bbox=7.2,46.2,7.4,46.35&width=1025&height=1026"))
+
     def test_grids_beside_the_data(self):
         beside = "/grid?bbox=20,10,21,11&width=3&height=2"
         self.assertTrue(all(math.isnan(height) for height in struct.unpack("<6f", self.get(beside)[0])))
         self.assertTrue(all(math.isnan(height) for height in tiff_heights(self.get(beside + "&format=geotiff")[0])[1]))
-        self.assertEqual(json.loads(self.get(beside + "&format=json")[0])["voids"], 6)
-        for form in ("r16", "png16"):
-            self.assertIn("no node of the grid has a height", self.refused(f"{beside}&format={form}"))
+        for form in ("r16", "png16", "json"):
+            refused = self.refused(f"{beside}&format={form}")
+            self.assertIn("no node of the grid has a height", refused)
+            self.assertRegex(refused, r"in units of the crs, EPSG:4326: degree; the data is in 6\.999\d*,45\.999\d*,8\.000\d*,47\.000\d*: ")
+        self.assertEqual(json.loads(self.get(beside + "&format=json&range=0,512")[0])["voids"], 6)
+        # Degrees in a reference system of metres: the box of the message is one that can be asked for.
+        degrees = "/grid?crs=EPSG:32632&width=3&height=3&format=r16&bbox="
+        refused = self.refused(degrees + "7.2,46.2,7.4,46.3")
+        box = re.search(r"in units of the crs, EPSG:32632: metre; the data is in ([-0-9.,]+): ", refused)[1]
+        self.assertEqual(len(self.get(degrees + box)[0]), 18)
         # One of a row of landscapes with a common range may be beside the data.
         self.assertEqual(self.get(beside + "&format=r16&range=0,512")[0], bytes(12))
 

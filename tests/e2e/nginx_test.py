@@ -149,7 +149,9 @@ class Proxied(unittest.TestCase):
     def test_requests_with_known_parameters_are_cached(self):
         version = self.version()
         for target in (f"/earth/4/8/11.terrain?v={version}&error=50&atleast=1", "/earth/3/4/5.terrain?extensions=octvertexnormals-watermask",
-                       "/earth/heights?locations=1,2%7C3%2C4", f"/earth/3dtiles/0-0-0/0/0/0.6.subtree?v={version}&error=50&atleast=1",
+                       "/earth/heights?locations=1,2%7C3%2C4", "/earth/heights?locations=1,%203",
+                       f"/earth/grid?crs=EPSG:32632&bbox=400000,5000000,500000,5100000&width=2&height=2&v={version}",
+                       f"/earth/3dtiles/0-0-0/0/0/0.6.subtree?v={version}&error=50&atleast=1",
                        f"/earth/3/2/3.glb?compression=meshopt&v={version}", "/earth/3/2/3.png?encoding=terrarium&size=512"):
             self.assertEqual([self.get(target).fields["x-cache"] for _ in range(2)], ["MISS", "HIT"], target)
 

@@ -34,6 +34,10 @@ try:
                 run(sys.executable, source / "examples" / script, dataset, picture, *arguments)
                 assert picture.read_bytes().startswith(b"\x89PNG"), script
                 picture.unlink()
+            said = run(sys.executable, source / "examples/view_map.py", dataset, picture, "36.44,-84.4", "10", "0.05", "41")
+            seen, hidden, unknown = map(int, re.findall(r"\d+", said))
+            # 61 % of the columns and 56 % of the rows of the map are on the data: the rest is unknown, not seen.
+            assert seen + hidden + unknown == 41 * 41 and seen > 0 and unknown > 41 * 41 / 2, said
     else:
         print("SKIPPED in part: drive.py and view_map.py need matplotlib")
 finally:

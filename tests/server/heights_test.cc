@@ -153,6 +153,11 @@ TEST_F(HeightsTest, RefusesBodiesThatAreTooLarge) {
     const auto reply = client.Read();
     ASSERT_TRUE(reply) << length;
     EXPECT_EQ(reply->status, 413) << length;
+    EXPECT_NE(
+        reply->body.find(std::string(length) + " bytes, more than the 4736 that this URL takes; the limit follows "
+                                               "from max_locations of this server: send fewer points at once"),
+        std::string::npos)
+        << reply->body;
     EXPECT_EQ(reply->Field("connection"), "close");
     EXPECT_TRUE(client.Ended());
   }

@@ -86,8 +86,8 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   }
   if (info.void_samples > 0) {
     advice.push_back(
-        fmt::format("voids: those with data all around them are filled from their edges, those that touch the rim of "
-                    "the raster show the floor of {} m",
+        fmt::format("voids: small ones are filled from their edges, larger ones with data all around them with a "
+                    "smooth surface; those that touch the rim of the raster show the floor of {} m",
                     PlainNumber(floor)));
   }
   return advice;

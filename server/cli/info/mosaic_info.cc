@@ -114,7 +114,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   if (voids > 0) {
     advice.push_back(fmt::format(
         "with voids: {}; small ones are filled from their edges, larger ones show the next source; then those with "
-        "data all around them are filled from their edges, and those that touch the rim show the floor of {} m",
+        "data all around them are filled with a smooth surface, and those that touch the rim show the floor of {} m",
         Sources(voids), PlainNumber(info.floor)));
   }
   return advice;

@@ -1,12 +1,19 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <string>
 #include <string_view>
 
 #include "server/api/tile_formats.h"
+#include "server/http/text.h"
 #include "server/routes.h"
 #include "server/telemetry/redact.h"
+#include "tests/support/source_dir.h"
 
 namespace terrace::server {
 namespace {
@@ -219,6 +226,57 @@ TEST(Router, DescribesEachUrl) {
     }
   }
   EXPECT_GE(ids.size(), 20U);
+}
+
+// The regular expression of docker/nginx.conf.template for requests that are cached.
+std::regex PlainInNginx() {
+  std::ifstream file(test_support::SourceDir() / "docker/nginx.conf.template");
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  std::smatch found;
+  EXPECT_TRUE(std::regex_search(text, found, std::regex("map \\$request_uri[^~]*\"~(.*)\" \\$request_uri;")));
+  return std::regex(found[1].str());
+}
+
+// As URLSearchParams of browsers and urlencode of Python write it.
+std::string Encoded(std::string_view target) {
+  std::string encoded;
+  for (const char c : target) {
+    if (c == ',' || c == '|' || c == ':') {
+      encoded += PercentEncode({&c, 1});
+    } else {
+      encoded += c;
+    }
+  }
+  return encoded;
+}
+
+// Otherwise its reply is private even with a version, and the log leaves a part of it out.
+TEST(Router, KnowsThatNoValidRequestIsASecret) {
+  const std::regex of_nginx = PlainInNginx();
+  int count = 0;
+  const auto expect_plain = [&](const std::string& target) {
+    ++count;
+    for (const std::string& sent : {target, Encoded(target)}) {
+      EXPECT_TRUE(IsPlainTarget(sent)) << sent;
+      EXPECT_EQ(RedactTarget(sent, true), sent);
+      EXPECT_TRUE(std::regex_search(sent, of_nginx)) << sent << " in docker/nginx.conf.template";
+    }
+  };
+  for (const DocumentedUrl& url : DocumentedUrls()) {
+    for (const ExampleRequest& example : url.operation->examples) {
+      if (Routes().Match(example.target)->row->label != "viewer") expect_plain(std::string(example.target));
+    }
+    for (const ParameterNote& note : url.operation->parameters) {
+      const auto schema = nlohmann::json::parse(note.schema);
+      for (const nlohmann::json& value : schema.value("enum", nlohmann::json::array())) {
+        expect_plain(
+            fmt::format("/maui/x?{}={}", note.name, value.is_string() ? value.get<std::string>() : value.dump()));
+      }
+    }
+  }
+  EXPECT_GE(count, 100);
+  EXPECT_FALSE(std::regex_search("/maui/grid?crs=EPSG:1s", of_nginx));
+  EXPECT_FALSE(std::regex_search("/maui/grid?width=a:1", of_nginx));
 }
 
 TEST(Router, TellsWhichUrlsTakeABodyAndHowLarge) {

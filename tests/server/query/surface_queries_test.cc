@@ -61,6 +61,19 @@ TEST(BinaryHeights, SaysWhatIsWrong) {
   ExpectSays(parse(point, "normals=yes"), "normals must be 0 or 1");
 }
 
+// curl and urllib send this type unless told otherwise.
+TEST(BinaryHeights, AreNamedIfTheyAreSentAsAForm) {
+  constexpr const char* kForm = "application/x-www-form-urlencoded";
+  constexpr const char* kRemedy = "send numbers with Content-Type: application/octet-stream";
+  ExpectSays(ParseHeights({{}, kForm, BytesOf({8.25, 46.5})}, 9), kRemedy);
+  ExpectSays(ParseSight({{}, kForm, BytesOf({8.25, 46.5, 900, 8.5, 46.5, 900})}, 9), kRemedy);
+  for (const char* text : {"location=46.5,8.25", "locations=46.5;8.25\r\n"}) {
+    const auto refused = ParseHeights({{}, kForm, text}, 9);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().message.find("octet-stream"), std::string::npos) << refused.error().message;
+  }
+}
+
 TEST(DrawnSurface, ReadsTheParametersOfTiles) {
   const auto query = ParseHeights(
       {"locations=1,2&surface=served&level=12&error=5&atleast=1&format=glb&compression=meshopt", {}, {}}, 9);
@@ -80,9 +93,10 @@ TEST(DrawnSurface, SaysWhatIsWrong) {
     const char* says;
   } cases[] = {
       {"surface=mesh", "surface must be source or served"},
-      {"level=3", "need surface=served"},
-      {"error=3", "need surface=served"},
-      {"surface=source&format=glb", "need surface=served"},
+      {"level=3", "level needs surface=served"},
+      {"error=3", "error needs surface=served"},
+      {"surface=source&format=glb", "format needs surface=served"},
+      {"compression=none", "compression needs surface=served"},
       {"surface=served&level=25", "level must be"},
       {"surface=served&level=-1", "level must be"},
       {"surface=served&level=", "level must be"},
@@ -136,7 +150,8 @@ TEST(GridQuery, SaysWhatIsWrong) {
       {"bbox=0,0,1,1&spacing=1&range=-1.7e308,1.7e308&format=r16", "from -1000000 to 1000000"},
       {"bbox=0,0,1,1&spacing=1&range=-1000001,0&format=r16", "from -1000000 to 1000000"},
       {"bbox=0,0,1,1&spacing=1&range=0,1000001&format=json", "from -1000000 to 1000000"},
-      {"bbox=0,0,1,1&spacing=1&range=0,5", "range needs format"},
+      {"bbox=0,0,1,1&spacing=1&range=0,5", "range needs format=r16, png16 or json"},
+      {"bbox=0,0,1,1&spacing=1&format=json&fraction=0.5", "fraction needs surface=served"},
       {"bbox=0,0,1,1&spacing=1&datum=mean", "datum must be"},
       {"bbox=0,0,1,1&spacing=1&size=3", "unknown parameter"},
       {"bbox=0,0,1,1&spacing=1&spacing=1", "more than once"},
@@ -181,6 +196,24 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   ExpectSays(dem::PositionsOf(*far, 0, 10, {}), "EPSG:32611 has no place on Earth for column 0, row 0");
 }
 
+TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
+  const auto plan = dem::PlanOutputGrid({32632, 8.03, 46.45, 8.16, 46.55, 5, 5, {}}, 100);
+  ASSERT_TRUE(plan) << plan.error().message;
+  EXPECT_EQ(plan->unit, "metre");
+  const auto box = dem::BoundsInCrs(*plan, {8, 46, 10, 47});
+  ASSERT_TRUE(box);
+  // By `gdaltransform -s_srs EPSG:4326 -t_srs EPSG:32632`. The southern edge is farthest south at 9 degrees.
+  EXPECT_NEAR(box->west, 422567.8174, 1e-3);
+  EXPECT_NEAR(box->east, 577432.1826, 1e-3);
+  EXPECT_NEAR(box->south, 5094047.4921, 1e-3);
+  EXPECT_NEAR(box->north, 5205649.3477, 1e-3);
+  EXPECT_FALSE(dem::BoundsInCrs(*plan, {-180, -90, 180, 90})) << "zone 32 is no map of the world";
+  const auto degrees = dem::PlanOutputGrid({4326, 1, 2, 3, 4, 5, 5, {}}, 100);
+  ASSERT_TRUE(degrees);
+  EXPECT_EQ(degrees->unit, "degree");
+  EXPECT_EQ(dem::BoundsInCrs(*degrees, {8, 46, 10, 47})->east, 10);
+}
+
 TEST(SightQuery, ReadsOneRayAndMany) {
   const auto one = ParseSight({"from=46,7,1000&to=46.1,7.1,1200.5&refraction=0.13&heights=ground", {}, {}}, 9);
   ASSERT_TRUE(one) << one.error().message;
@@ -222,7 +255,7 @@ TEST(SightQuery, SaysWhatIsWrong) {
       {"from=1,2,3&to=1,2,4&refraction=x", "refraction must be"},
       {"from=1,2,3&to=1,2,4&heights=sea", "heights must be"},
       {"from=1,2,3&to=1,2,4&from=1,2,3", "from is given more than once"},
-      {"from=1,2,3&to=1,2,4&level=3", "need surface=served"},
+      {"from=1,2,3&to=1,2,4&level=3", "level needs surface=served"},
       {"frm=1,2,3", "unknown parameter"},
   };
   for (const auto& [query, says] : cases) ExpectSays(ParseSight({query, {}, {}}, 2), says);

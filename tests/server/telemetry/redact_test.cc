@@ -18,7 +18,8 @@ TEST(RedactTarget, ShowsPlainTargetsWhole) {
         "/maui/heights?locations=36.3,-84.2|1e1,2", "/maui/heights?locations=36.3%2C-84.2%7C1,2&datum=orthometric",
         "/maui/0/0/0.terrain?extensions=octvertexnormals-watermask", "/maui/mesh?bbox=-1,2,+3,4.5&error=1&format=obj",
         "/maui/tileset.json?compression=meshopt&texture=webp", "/viewer/Workers/createTaskProcessorWorker.js",
-        "/maui/layer.json?error=&fraction"}) {
+        "/maui/layer.json?error=&fraction", "/maui/grid?crs=EPSG:32632&spacing=10",
+        "/maui/grid?crs=epsg%3A4326&width=2", "/maui/heights?locations=36.3,%20-84.2%7C1,%202"}) {
     EXPECT_TRUE(IsPlainTarget(target)) << target;
     EXPECT_EQ(RedactTarget(target, true), target);
   }
@@ -37,6 +38,7 @@ TEST(RedactTarget, LeavesOutWhatMayBeASecret) {
       {"/maui/layer.json?v=1;token=s", "/maui/layer.json?+1"},
       {"/maui/layer.json?extensions=metadata-s", "/maui/layer.json?+1"},
       {"/maui/layer.json?error=s&&error=%35", "/maui/layer.json?+2"},
+      {"/maui/grid?crs=EPSG:s&crs=EPSG:0123456&crs=s:1&spacing=EPSG:1", "/maui/grid?+4"},
       {"/maui/layer.json;token=s?error=5", "/maui/layer.json...?error=5"},
       {"/maui/layer.json%3Ftoken=s", "/maui/layer.json..."},
       {"/maui/layer.json#token=s", "/maui/layer.json..."},
