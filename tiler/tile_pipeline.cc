@@ -161,7 +161,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.source->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);
@@ -210,7 +210,8 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
     drawn_->Insert(cache_key, mesh);
     return std::shared_ptr<const DrawnMesh>(std::move(mesh));
   }
-  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  const double error_m =
+      NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
