@@ -37,7 +37,7 @@ PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
                               "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
                               "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sight/sight_ray.h",
                               "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h")),
-    ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/nearest_name.h", "common/token_hash.h",
+    ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/token_hash.h",
                           "common/working_directory.h", "options/options.h")),
 ) for name in names}
 # Plain values in the configuration's structs: config may include nothing else of these modules.
