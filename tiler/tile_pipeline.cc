@@ -1,12 +1,12 @@
 #include "tiler/tile_pipeline.h"
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <utility>
 
 #include "engine/common/content_hash.h"
 #include "engine/core/check.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"

@@ -129,7 +129,7 @@ LIBRARIES = [
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
     # Libraries that a module promises not to use: threads and clocks, files, sockets.
     Library("threads", r"(thread|mutex|shared_mutex|condition_variable|semaphore|future)", rf"({DEM_FILES}|tiler/store|archive|bake|fly/(flight|http)|server)/|redis/resolver\.cc"),
-    Library("clocks", r"(chrono|ctime)", rf"(config|bake|fly/(flight|http)|tiler|redis|server|{DEM_FILES})/"),
+    Library("clocks", r"(chrono|ctime)", rf"(config|bake|fly/(flight|http)|tiler|redis|server|{DEM_FILES})/|engine/core/elapsed_time\.h"),
     Library("files", r"(filesystem|fstream)", rf"(config/|{DEM_FILES}/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
     Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",
@@ -204,7 +204,7 @@ class Tree:
             other = PUBLIC_HEADERS[quoted]
         if other not in MODULES[room] and not (room in CONFIG and quoted in VALUES):
             return f'{room} may not know {other} ("{quoted}")'
-        public = PUBLIC | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
+        public = PUBLIC - ({"clocks"} if room in GEOMETRY + PROTO else set()) | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
         public |= {"GDAL", "Boost.Geometry"} if other in DEM and room in [*DEM, "engine/dem"] else set()
         public |= {"nlohmann_json"} if room in CONFIG and other in CONFIG else set()
         hidden = self.libraries_behind(quoted) - public

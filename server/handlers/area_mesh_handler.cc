@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/error_text.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
@@ -82,7 +83,7 @@ asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestConte
   Work<tiler::EncodedTile> work = [catalog = handlers.catalog, dataset, area, plan, coding,
                                    requested_at =
                                        TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
-    const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
+    const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
     Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
     if (!mesh) return mesh;
     mesh->times.queue = queued;

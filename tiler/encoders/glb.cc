@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/gltf/glb_tile.h"

@@ -1,8 +1,8 @@
 #include "proto/mesh/quantized_mesh.h"
 
-#include <chrono>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/tile_metadata.h"
 #include "proto/mesh/tile_normals.h"
