@@ -15,10 +15,10 @@
 #include "tiler/map/map_heights.h"
 #include "tiler/map/relief.h"
 #include "tiler/mesh/mesh_limits.h"
-#include "tiler/strong_etag.h"
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/drawn_triangles.h"
 #include "tiler/surface/source_normals.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
 namespace {

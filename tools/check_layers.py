@@ -26,7 +26,8 @@ TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended"
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config", "config/input", "config/options", "config/file"]
-ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config", "tiler", "archive", "server/asio"]
+TILER = ["tiler/map", "tiler/mesh", "tiler/tile", "tiler/area", "tiler/store", "tiler/surface", "tiler"]
+ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config"] + TILER + ["archive", "server/asio"]
 ARCHIVE = ["archive/files", "archive/pmtiles", "archive"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/statistics", "engine/sources", "engine/mosaic", "engine/sight",
@@ -61,12 +62,12 @@ MODULES = {
     "proto": GEOMETRY,
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
-    "tiler": GEOMETRY + ["engine/dem"] + PROTO,
+    **{room: GEOMETRY + ["engine/dem"] + PROTO + TILER[:i] for i, room in enumerate(TILER)},
     "archive/files": ["engine/core", "engine/dem"] + PROTO,
-    "archive/pmtiles": ["engine/core", "engine/dem"] + PROTO + ["tiler", "archive/files"],
-    "archive": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"] + ARCHIVE[:2],
+    "archive/pmtiles": ["engine/core", "engine/dem"] + PROTO + TILER + ["archive/files"],
+    "archive": GEOMETRY + ["engine/dem"] + PROTO + TILER + ARCHIVE[:2],
     "bake/queue": ["engine/core", "redis"],
-    "bake": GEOMETRY + ["engine/dem"] + PROTO + ["tiler"] + ARCHIVE + ["bake/queue"],
+    "bake": GEOMETRY + ["engine/dem"] + PROTO + TILER + ARCHIVE + ["bake/queue"],
     "redis": ["engine/core"],
     "fly/scene": ["engine/core", "engine/geo"],
     "fly/select": ["engine/core", "engine/geo", "fly/scene"],
@@ -80,7 +81,7 @@ MODULES = {
     "server/jobs": ["engine/core", "server/asio"],
     "server/net": ["engine/core", "server/asio"],
     "server/http": ["engine/core", "server/asio", "server/net"],
-    "server/store": ["engine/core", "engine/geo", "config", "tiler", "archive", "redis"],
+    "server/store": ["engine/core", "engine/geo", "config", *TILER, "archive", "redis"],
     "server/tiles": ENGINE + ["server/jobs"],
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
@@ -254,7 +255,7 @@ class SelfTest(unittest.TestCase):
                            ("config", "engine/geo"), ("engine/tin", "server/tiles"),
                            ("server/tiles", "server/http"), ("server/http", "server/tiles"), ("server/http", "tiler"), ("server/http", "server/api"),
                            ("server/jobs", "server/tiles"), ("server/jobs", "tiler"), ("server/net", "server/http"), ("server/api", "server/handlers"),
-                           ("server/handlers", "server/cli"),
+                           ("server/handlers", "server/cli"), ("tiler/tile", "tiler/store"), ("tiler/surface", "tiler"),
                            ("server/tiles", "server")):
             with self.subTest(user=user, used=used):
                 self.assert_refused({f"{used}/b.h": "", f"{user}/a.cc": f'#include "{used}/b.h"\n'}, f"{user} may not know {used}")

@@ -14,7 +14,7 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {

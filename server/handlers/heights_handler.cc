@@ -21,7 +21,7 @@
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {

@@ -15,7 +15,7 @@
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/sight_query.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
 namespace {

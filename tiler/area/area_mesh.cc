@@ -19,7 +19,7 @@
 #include "tiler/area/area_surface.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
 namespace {

@@ -17,7 +17,6 @@
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
-#include "tiler/surface/drawn_triangles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {

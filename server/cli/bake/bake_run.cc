@@ -33,8 +33,8 @@
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
-#include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::cli {
 namespace {
