@@ -8,6 +8,7 @@ import { assertAccessible } from './axe.mjs';
 import { end, openBrowser } from './browser.mjs';
 import { json, request, run, samples, serve } from './harness.mjs';
 import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
+import { formatVolume } from '../../server/viewer/numbers.js';
 
 const kWait = { timeout: 120000, polling: 200 };
 const hills = path.join(samples, 'jacksboro.tif');
@@ -36,6 +37,10 @@ describe('shapes of edits', () => {
 
   it('move ground', () => {
     assert.deepEqual(earthwork([10, 20, undefined, 30, 40], 25, 400), { samples: 4, raised: 15, lowered: 15, fill: 2000, cut: 2000 });
+  });
+
+  it('have volumes in one unit', () => {
+    assert.deepEqual([2000, 571.2e6, 4.981e9].map(formatVolume), ['2,000 m³', '571.2 million m³', '4,981 million m³']);
   });
 
   it('are closed and counterclockwise in the file', () => {
