@@ -12,7 +12,7 @@
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
 #include "engine/gdal/remote_file.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {

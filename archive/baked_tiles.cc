@@ -10,7 +10,7 @@
 #include "proto/compress.h"
 #include "proto/mesh/quantized_mesh.h"
 #include "proto/mesh/tile_metadata.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::archive {
 namespace {

@@ -16,7 +16,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::archive {
 

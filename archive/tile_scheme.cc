@@ -8,7 +8,7 @@
 #include "archive/manifest.h"
 #include "archive/manifest_json.h"
 #include "proto/documents/tile_json.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {

@@ -10,7 +10,7 @@
 #include "archive/pmtiles/tile_id.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::archive {
 

@@ -10,8 +10,8 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::archive {
 

@@ -13,7 +13,7 @@
 #include "archive/tile_scheme.h"
 #include "archive/tile_writer.h"
 #include "engine/common/content_hash.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {

@@ -139,7 +139,7 @@ std::vector<Ranges> TilesWithin(const std::vector<Ranges>& available, const dem:
     Ranges tiles;
     for (const geo::TileRange& range : available[level]) {
       for (const geo::TileRange& part : wanted) {
-        const geo::TileRange common = geo::Common(range, part);
+        const geo::TileRange common = geo::Intersection(range, part);
         if (!geo::IsEmpty(common)) tiles.push_back(common);
       }
     }

@@ -10,9 +10,9 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "proto/media_type.h"
-#include "tiler/requested_error.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
 #include "tiler/tile_pipeline.h"
-#include "tiler/tile_request.h"
 
 namespace terrace::bake {
 

@@ -3,7 +3,6 @@
 #include <xxhash.h>
 
 #include <algorithm>
-#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <list>
@@ -15,7 +14,7 @@
 #include "bake/copy_unit.h"
 #include "bake/queue/local_queue.h"
 #include "bake/unit_key.h"
-#include "tiler/encoded_tile.h"
+#include "engine/core/elapsed_time.h"
 
 namespace terrace::bake {
 namespace {
@@ -201,11 +200,9 @@ class Run {
     }
     if (!unit_file) return false;
     counters_.passed += unit_file->tiles;
-    Report(index, {target,
-                   {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3},
-                   outcome,
-                   tiler::SecondsSince(start),
-                   {}});
+    Report(
+        index,
+        {target, {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3}, outcome, SecondsSince(start), {}});
     return true;
   }
 
@@ -263,7 +260,7 @@ class Run {
       Report(unit.index, {output.target,
                           {name, output.key, unit_file->tiles, unit_file->bytes, unit_file->xxh3},
                           UnitOutcome::kBaked,
-                          tiler::SecondsSince(unit.start),
+                          SecondsSince(unit.start),
                           {}});
     }
     if (options_.stop.stop_requested()) return queue_.Return(unit.index);
@@ -275,7 +272,7 @@ class Run {
       ReportLocked(unit.index, {output.target,
                                 {name, output.key, 0, 0, {}},
                                 UnitOutcome::kFailed,
-                                tiler::SecondsSince(unit.start),
+                                SecondsSince(unit.start),
                                 unit.error->message});
     }
   }

@@ -80,7 +80,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;
         for (const geo::TileRange& range : source.Available(level)) {
-          if (const auto common = geo::Common(range, below); !geo::IsEmpty(common)) parts.push_back(common);
+          if (const auto common = geo::Intersection(range, below); !geo::IsEmpty(common)) parts.push_back(common);
         }
         AddRanges(hasher, parts);
       }

@@ -18,7 +18,7 @@ std::uint64_t ZOrder(const geo::TileKey& key) {
 
 bool HasTileIn(const std::vector<geo::TileRange>& ranges, const geo::TileRange& box) {
   return std::ranges::any_of(ranges,
-                             [&](const geo::TileRange& range) { return !geo::IsEmpty(geo::Common(range, box)); });
+                             [&](const geo::TileRange& range) { return !geo::IsEmpty(geo::Intersection(range, box)); });
 }
 
 // Whether there are tiles below `key`. Ancestors of tiles exist, except on the first levels of a pyramid, which may be
@@ -62,7 +62,7 @@ std::vector<Unit> UnitsOf(const Pyramid& pyramid) {
           const geo::TileKey root{archive::kTopLevels, x, y};
           Unit& unit = subtrees[ZOrder(root)];
           if (!unit.root) unit = {archive::UnitNameOf(root), root, Pyramid(pyramid.size())};
-          unit.tiles[static_cast<std::size_t>(level)].push_back(geo::Common(range, geo::TilesBelow(root, level)));
+          unit.tiles[static_cast<std::size_t>(level)].push_back(geo::Intersection(range, geo::TilesBelow(root, level)));
         }
       }
     }

@@ -13,7 +13,7 @@
 #include "server/http/text.h"
 #include "server/openapi/openapi_document.h"
 #include "server/openapi/operations.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
 namespace {

@@ -1,35 +1,17 @@
-// The tile formats and the encoder of each, one row each; server/api/tile_formats.cc has one row for the requests of
-// each format.
+// The encoder of each tile format, one row each; server/api/tile_formats.cc has one row for the requests of each
+// format.
 #pragma once
 
-#include <cstdint>
 #include <stop_token>
 
 #include "engine/core/result.h"
+#include "tiler/surface/drawn_mesh.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 
-struct EncodedTile;   // encoded_tile.h
+struct EncodedTile;   // tile/encoded_tile.h
 struct EncoderInput;  // tile_pipeline.h
-
-enum class TileFormat : std::uint8_t {
-  kQuantizedMesh,
-  kGlb,
-  kHeightPng,
-  // Tiles for maps, which archives do not have.
-  kHillshade,
-  kSlope,
-  kContours,
-  kImagery,
-  kGeodeticImagery
-};
-
-// Whether keys are in Web Mercator's XYZ scheme, y from the NORTH; else in TMS geodetic.
-constexpr bool IsMercator(TileFormat format) {
-  return format == TileFormat::kHeightPng || format == TileFormat::kHillshade || format == TileFormat::kSlope ||
-         format == TileFormat::kContours || format == TileFormat::kImagery;
-}
-constexpr bool IsForMaps(TileFormat format) { return format > TileFormat::kHeightPng; }
 
 struct Encoder {
   TileFormat format;
@@ -60,5 +42,9 @@ inline constexpr Encoder kEncoders[] = {
     {TileFormat::kImagery, /*needs_refinement=*/false, EncodeImagery},
     {TileFormat::kGeodeticImagery, /*needs_refinement=*/false, EncodeGeodeticImagery},
 };
+
+// The triangles in the bytes that EncodeQuantizedMesh and EncodeGlb make of the same input. Same errors.
+Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
+Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -1,12 +1,12 @@
 #include "tiler/tile_pipeline.h"
 
 #include <algorithm>
-#include <chrono>
 #include <iterator>
 #include <utility>
 
 #include "engine/common/content_hash.h"
 #include "engine/core/check.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
@@ -15,10 +15,10 @@
 #include "tiler/map/map_heights.h"
 #include "tiler/map/relief.h"
 #include "tiler/mesh/mesh_limits.h"
-#include "tiler/strong_etag.h"
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/drawn_triangles.h"
 #include "tiler/surface/source_normals.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
 namespace {
@@ -161,7 +161,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.source->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);
@@ -210,7 +210,8 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
     drawn_->Insert(cache_key, mesh);
     return std::shared_ptr<const DrawnMesh>(std::move(mesh));
   }
-  const double error_m = MeshError(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  const double error_m =
+      NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());

@@ -18,14 +18,14 @@
 #include "proto/gltf/texture.h"
 #include "proto/lattice_view.h"
 #include "tiler/area/area_mesh.h"
-#include "tiler/encoded_tile.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/baked_tiles.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/surface/drawn_mesh_cache.h"
 #include "tiler/surface/drawn_points.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 
@@ -79,16 +79,6 @@ struct EncoderInput {
   const TileRequest& request;
   const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
   double error_m = 0;                    // the bound that the mesh keeps
-};
-
-// Heights of a dataset at points, NaN where it has none.
-struct PointHeights {
-  std::vector<float> heights;
-  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled in; empty: none was
-  std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
-  // Of drawn surfaces: the tiles that were read, and the index of each point's tile. Empty: heights of the sources.
-  std::vector<geo::TileKey> tiles = {};
-  std::vector<std::uint32_t> tile_of_point = {};
 };
 
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions

@@ -46,7 +46,7 @@ std::vector<geo::TileRange> TilesWithin(const TileTree& tree, int level, double 
   box.end_y = std::max(box.start_y, box.end_y);
   std::vector<geo::TileRange> tiles;
   for (const geo::TileRange& range : tree.available[static_cast<std::size_t>(level)]) {
-    if (const geo::TileRange common = geo::Common(range, box); !geo::IsEmpty(common)) tiles.push_back(common);
+    if (const geo::TileRange common = geo::Intersection(range, box); !geo::IsEmpty(common)) tiles.push_back(common);
   }
   return tiles;
 }

@@ -46,42 +46,49 @@ std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
   }
 }
 
-std::string ParentOf(const std::string& path) {
-  if (IsBucket(path)) {
-    std::error_code error;
-    const std::string folder = std::filesystem::temp_directory_path(error).string();
-    return error ? "/tmp" : folder;
+// Where the bytes of a file wait until it is complete.
+struct WaitingPlace {
+  bool is_object;      // an object of a bucket: in the folder of temporary files
+  std::string folder;  // else that of the file
+  std::string name;    // of a file in the folder
+};
+
+WaitingPlace WaitingPlaceOf(const std::string& path) {
+  if (!IsBucket(path)) {
+    const std::string folder = std::filesystem::path(path).parent_path().string();
+    return {false, folder.empty() ? "." : folder, path};
   }
-  const std::string folder = std::filesystem::path(path).parent_path().string();
-  return folder.empty() ? "." : folder;
+  std::error_code error;
+  std::string folder = std::filesystem::temp_directory_path(error).string();
+  if (error) folder = "/tmp";
+  return {true, folder, folder + "/terrace"};
 }
 
-// A nameless file in a folder. `name`: one that it may have for a moment on file systems without nameless files. Below
-// 0: errno says why.
-int CreateNameless(const std::string& folder, const std::string& name) {
-  int descriptor = ::open(folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
+// A nameless file. On file systems without nameless files it has a name for a moment. Below 0: errno says why.
+int CreateNameless(const WaitingPlace& place) {
+  int descriptor = ::open(place.folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
   if (descriptor >= 0) return descriptor;
   std::string partial;
-  std::tie(descriptor, partial) = CreatePartial(name, O_RDWR);
+  std::tie(descriptor, partial) = CreatePartial(place.name, O_RDWR);
   if (descriptor >= 0) ::unlink(partial.c_str());
   return descriptor;
 }
 
-Result<void> MakeFolder(const std::string& path) {
+Result<void> MakeFolder(const WaitingPlace& place) {
   std::error_code error;
-  std::filesystem::create_directories(ParentOf(path), error);
-  if (error) return CannotWrite(ParentOf(path), error.value());
+  std::filesystem::create_directories(place.folder, error);
+  if (error) return CannotWrite(place.folder, error.value());
   return {};
 }
 
 }  // namespace
 
 struct OutputFile::Impl {
-  explicit Impl(std::string p) : path(std::move(p)) {}
+  explicit Impl(const std::string& p) : path(p), place(WaitingPlaceOf(p)) {}
   ~Impl() {
     if (descriptor < 0) return;
     ::close(descriptor);
-    if (!is_object) ::unlink(partial.c_str());
+    if (!place.is_object) ::unlink(partial.c_str());
   }
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
@@ -93,8 +100,8 @@ struct OutputFile::Impl {
   }
 
   const std::string path;
+  const WaitingPlace place;
   std::string partial;  // of objects: the folder of the nameless file
-  bool is_object = false;
   dem::ContentHasher hasher;
   int descriptor = -1;
   std::uint64_t size = 0;
@@ -106,16 +113,11 @@ OutputFile::OutputFile(OutputFile&&) noexcept = default;
 OutputFile::~OutputFile() = default;
 
 Result<OutputFile> OutputFile::Create(const std::string& path) {
-  if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
   auto impl = std::make_unique<Impl>(path);
-  if (IsBucket(path)) {
-    impl->is_object = true;
-    impl->partial = ParentOf(path);
-    impl->descriptor = CreateNameless(impl->partial, impl->partial + "/terrace");
-    if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
-    return OutputFile(std::move(impl));
-  }
-  std::tie(impl->descriptor, impl->partial) = CreatePartial(path, O_WRONLY);
+  if (Result<void> made = MakeFolder(impl->place); !made) return tl::unexpected(std::move(made.error()));
+  std::tie(impl->descriptor, impl->partial) = impl->place.is_object
+                                                  ? std::pair(CreateNameless(impl->place), impl->place.folder)
+                                                  : CreatePartial(path, O_WRONLY);
   if (impl->descriptor < 0) return CannotWrite(impl->partial, errno);
   return OutputFile(std::move(impl));
 }
@@ -137,12 +139,12 @@ Result<void> OutputFile::Skip(std::uint64_t bytes) {
 
 Result<void> OutputFile::Finish() {
   if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
-  if (impl_->is_object) return PutFile(impl_->descriptor, impl_->path);
+  if (impl_->place.is_object) return PutFile(impl_->descriptor, impl_->path);
   if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);
   if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
   ::close(std::exchange(impl_->descriptor, -1));
   // The new name must be on the disk as well. Some file systems do not allow fsync of folders, and do not need it.
-  const int folder = ::open(ParentOf(impl_->path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int folder = ::open(impl_->place.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (folder < 0) return {};
   ::fsync(folder);
   ::close(folder);
@@ -160,7 +162,7 @@ Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {
   const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode); };
   int descriptor = open();
   if (descriptor < 0 && errno == ENOENT) {
-    if (Result<void> made = MakeFolder(path); !made) return made;
+    if (Result<void> made = MakeFolder(WaitingPlaceOf(path)); !made) return made;
     descriptor = open();
   }
   if (descriptor < 0) return CannotWrite(path, errno);
@@ -180,11 +182,11 @@ SpoolFile::~SpoolFile() {
 }
 
 Result<SpoolFile> SpoolFile::Create(const std::string& path) {
-  if (Result<void> made = MakeFolder(path); !made) return tl::unexpected(std::move(made.error()));
-  const std::string folder = ParentOf(path);
-  const int descriptor = CreateNameless(folder, IsBucket(path) ? folder + "/terrace" : path);
+  const WaitingPlace place = WaitingPlaceOf(path);
+  if (Result<void> made = MakeFolder(place); !made) return tl::unexpected(std::move(made.error()));
+  const int descriptor = CreateNameless(place);
   if (descriptor < 0) return CannotWrite(path, errno);
-  return SpoolFile(descriptor, folder);
+  return SpoolFile(descriptor, place.folder);
 }
 
 Result<void> SpoolFile::Flush() {

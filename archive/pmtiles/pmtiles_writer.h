@@ -11,7 +11,7 @@
 #include "archive/pmtiles/unit_file.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "tiler/encoded_tile.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::archive {
 

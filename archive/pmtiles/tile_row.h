@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "engine/common/dem_types.h"
-#include "tiler/encoded_tile.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::archive {
 

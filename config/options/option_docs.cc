@@ -7,9 +7,9 @@
 #include <map>
 #include <vector>
 
-#include "config/common/nearest_name.h"
 #include "config/options/option_table.h"
 #include "config/options/options.h"
+#include "engine/core/nearest_name.h"
 
 namespace terrace::config {
 namespace {

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <vector>
 
-#include "config/common/nearest_name.h"
 #include "config/config.h"
 #include "config/options/option_codec.h"
+#include "engine/core/nearest_name.h"
 
 namespace terrace::config {
 

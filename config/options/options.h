@@ -19,7 +19,7 @@ struct OptionInfo {
   std::string_view help;   // one line
   bool has_flag = false;
   std::string default_value;          // as JSON; empty: none
-  std::string_view other_words = {};  // names that other programs use (config/common/nearest_name.h)
+  std::string_view other_words = {};  // names that other programs use (engine/core/nearest_name.h)
 
   // "--cache-bytes"
   std::string Flag() const;

@@ -29,12 +29,6 @@ const std::array<Kind, 9>& Kinds() {
   return kinds;
 }
 
-std::vector<std::string> Quoted(const std::vector<std::string_view>& names) {
-  std::vector<std::string> quoted;
-  for (const std::string_view name : names) quoted.push_back(fmt::format("\"{}\"", name));
-  return quoted;
-}
-
 }  // namespace
 
 // The order: kinds that have the key itself, then similar keys of this object, then similar keys of the other kinds.
@@ -53,13 +47,13 @@ std::string ExplainKey(std::string_view key, std::span<const KnownName> known) {
   if (!places.empty() && !is_here) {
     return fmt::format("is no key of this object; \"{}\" belongs {}", name, Alternatives(places));
   }
-  if (!here.empty()) return fmt::format("unknown key; did you mean {}?", Alternatives(Quoted(here)));
+  if (!here.empty()) return "unknown key" + DidYouMean(Quoted(here));
   std::vector<std::string> elsewhere;
   for (const Kind& kind : Kinds()) {
     const std::vector<std::string> names = Quoted(NearestNames(key, kind.keys));
     if (!names.empty()) elsewhere.push_back(fmt::format("{} {}", Alternatives(names), kind.place));
   }
-  return elsewhere.empty() ? "" : fmt::format("is no key of this object; did you mean {}?", Alternatives(elsewhere));
+  return elsewhere.empty() ? "" : "is no key of this object" + DidYouMean(elsewhere);
 }
 
 }  // namespace terrace::config

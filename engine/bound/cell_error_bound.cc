@@ -263,7 +263,7 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
 }
 
 double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
-                                           std::optional<CellSamples>& place) const {
+                                           std::optional<CellSamples>& cell_samples) const {
   const HeightRange& all = grid_.heights();
   const auto corners = CornersOf(cell);
   if (!corners) return DistanceBound(cell, all.min, all.max);
@@ -294,19 +294,19 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   double error = DistanceBound(cell, range.min, range.max);
   if (fills) return error;
   error = std::min(error, BoundByAveragesNear(cell, box));
-  place = CellSamples{*corners, Clipped(CentresIn(box, 0)), may_blend};
+  cell_samples = CellSamples{*corners, Clipped(CentresIn(box, 0)), may_blend};
   if (trace_.factor > 1) return error;
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;
-    error = std::min(error, BoundBySamples(cell, *place, trace_.window, trace_.samples,
+    error = std::min(error, BoundBySamples(cell, *cell_samples, trace_.window, trace_.samples,
                                            turn * static_cast<std::int64_t>(grid_.columns())));
   }
   return error;
 }
 
-double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
                                       const std::vector<float>& samples, std::int64_t turn) const {
-  const SampleBox& in = place.samples;
+  const SampleBox& in = cell_samples.samples;
   if (in.empty()) return 0;
   if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
       in.south >= window.row + window.rows) {
@@ -317,7 +317,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& p
   const Position& off = statistics_.misplacement();
   const double slack = kPosition * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
-  CellSurface surface(place.corners, is_separable, {off.x + slack, off.y + slack});
+  CellSurface surface(cell_samples.corners, is_separable, {off.x + slack, off.y + slack});
   const double geoid_error = geoid_.BoundOver(cell.box());
   const bool is_known = std::isfinite(geoid_error);
   const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
@@ -334,12 +334,12 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& p
       const double sample = line[column];
       if (std::isnan(sample)) continue;
       lowest = std::min(lowest, sample), highest = std::max(highest, sample);
-      if (place.between) continue;
+      if (cell_samples.between) continue;
       error = std::max(
           error, surface.DistanceBound({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
     }
   }
-  if (place.between && lowest <= highest) error = DistanceBound(cell, lowest, highest);
+  if (cell_samples.between && lowest <= highest) error = DistanceBound(cell, lowest, highest);
   return error;
 }
 

@@ -60,8 +60,9 @@ class CellErrorBound {
 
   // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
   // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
-  // `place` if BoundBySamples can give a tighter bound from samples that have not been read.
-  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, std::optional<CellSamples>& place) const;
+  // `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
+  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
+                             std::optional<CellSamples>& cell_samples) const;
 
   // Whether BoundBySurroundings returns 0 for every cell of a box, because all samples around them are voids, as on the
   // sea. Precondition: nothing is blended. False does not mean the contrary.
@@ -69,7 +70,7 @@ class CellErrorBound {
 
   // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of
   // the window's columns against the cell's, in columns.
-  double BoundBySamples(const TileCell& cell, const CellSamples& place, const GridWindow& window,
+  double BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
                         const std::vector<float>& samples, std::int64_t turn) const;
 
  private:

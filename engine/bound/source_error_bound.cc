@@ -30,8 +30,8 @@ class LooseCells {
   void BeginGroup() { groups_.emplace_back(); }
 
   // `error`: the known bound of the cell. Precondition: a group has begun.
-  void Add(const TileCell& cell, const CellErrorBound::CellSamples& place, double error) {
-    groups_.back().cells.push_back({cell, place, error});
+  void Add(const TileCell& cell, const CellErrorBound::CellSamples& cell_samples, double error) {
+    groups_.back().cells.push_back({cell, cell_samples, error});
     groups_.back().error = std::max(groups_.back().error, error);
   }
 
@@ -47,7 +47,7 @@ class LooseCells {
       if (group.error <= bound) return {};
       SampleBox all;
       for (const Cell& loose : group.cells) {
-        if (loose.error > bound && !loose.place.samples.empty()) all = all.Around(loose.place.samples);
+        if (loose.error > bound && !loose.cell_samples.samples.empty()) all = all.Around(loose.cell_samples.samples);
       }
       if (all.empty()) continue;
       if (all.columns() > left || all.rows() > left || all.columns() * all.rows() > left) {
@@ -60,8 +60,8 @@ class LooseCells {
       if (!samples) return tl::unexpected(samples.error());
       for (const Cell& loose : group.cells) {
         if (loose.error <= bound) continue;
-        bound = std::max(bound,
-                         std::min(loose.error, single_.BoundBySamples(loose.cell, loose.place, window, *samples, 0)));
+        bound = std::max(
+            bound, std::min(loose.error, single_.BoundBySamples(loose.cell, loose.cell_samples, window, *samples, 0)));
       }
     }
     return {};
@@ -70,7 +70,7 @@ class LooseCells {
  private:
   struct Cell {
     TileCell cell;
-    CellErrorBound::CellSamples place;
+    CellErrorBound::CellSamples cell_samples;
     double error;
   };
   struct Group {
@@ -280,13 +280,13 @@ class GridErrorBound {
   // `known`: a bound known so far.
   void AddUneven(const TileCell& cell, bool may_blend, bool fills, double known) {
     if (known <= tile_.bound_) return;
-    std::optional<CellErrorBound::CellSamples> place;
-    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, place));
+    std::optional<CellErrorBound::CellSamples> cell_samples;
+    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, cell_samples));
     if (error <= tile_.bound_) return;
-    if (!place || !LooseCells::MayRead(trace_.factor)) return Raise(error);
+    if (!cell_samples || !LooseCells::MayRead(trace_.factor)) return Raise(error);
     if (!has_loose_group_) loose_.BeginGroup();
     has_loose_group_ = true;
-    loose_.Add(cell, *place, error);
+    loose_.Add(cell, *cell_samples, error);
   }
 
   SourceErrorBound& tile_;

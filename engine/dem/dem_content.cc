@@ -20,7 +20,7 @@ std::vector<std::pair<std::int64_t, std::int64_t>> RimOf(const std::vector<geo::
                                                          const geo::TileKey& first, std::int64_t side) {
   std::vector<std::pair<std::int64_t, std::int64_t>> rim;
   for (const geo::TileRange& range : available) {
-    const geo::TileRange inside = geo::Common(range, {first.x, first.y, first.x + side - 1, first.y + side - 1});
+    const geo::TileRange inside = geo::Intersection(range, {first.x, first.y, first.x + side - 1, first.y + side - 1});
     if (geo::IsEmpty(inside)) continue;
     const std::int64_t west = inside.start_x - first.x - 1, east = inside.end_x - first.x + 1;
     const std::int64_t south = inside.start_y - first.y - 1, north = inside.end_y - first.y + 1;
@@ -65,8 +65,8 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
       hasher.Add(grid.members()[member].column);
       hasher.Add(grid.members()[member].row);
       // A void may be a hole because of rasters far away.
-      const auto closed = grid.ClosedVoids(member);
-      hasher.AddText({reinterpret_cast<const char*>(closed.data()), closed.size()});
+      const auto holes = grid.HoleRegions(member);
+      hasher.AddText({reinterpret_cast<const char*>(holes.data()), holes.size()});
     }
   }
   const std::vector<std::size_t> own =

@@ -16,7 +16,7 @@ namespace {
 std::vector<geo::TileRange> Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
   std::vector<geo::TileRange> parts;
   for (const geo::TileRange& range : ranges) {
-    const geo::TileRange common = geo::Common(range, geo::TilesBelow(key, level));
+    const geo::TileRange common = geo::Intersection(range, geo::TilesBelow(key, level));
     if (!geo::IsEmpty(common)) parts.push_back(common);
   }
   return geo::Disjoint(std::move(parts));
@@ -78,7 +78,7 @@ std::span<const std::vector<geo::TileRange>> DemSource::AvailabilityBelow(const 
   const auto least = static_cast<std::size_t>(finest_level()) + 1;
   const auto has_none = [&](std::size_t level) {
     return static_cast<int>(level) > key.level && std::ranges::none_of(all[level], [&](const geo::TileRange& range) {
-             return !geo::IsEmpty(geo::Common(range, geo::TilesBelow(key, static_cast<int>(level))));
+             return !geo::IsEmpty(geo::Intersection(range, geo::TilesBelow(key, static_cast<int>(level))));
            });
   };
   while (levels > least && has_none(levels - 1)) --levels;

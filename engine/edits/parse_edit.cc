@@ -10,7 +10,7 @@
 #include <string_view>
 #include <utility>
 
-#include "engine/edits/did_you_mean.h"
+#include "engine/core/nearest_name.h"
 #include "engine/edits/edit_polygon.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/ellipsoid.h"
@@ -51,6 +51,14 @@ bool LooksLikeEdit(const json& properties) {
   const auto op = properties.find("op");
   if (op == properties.end() || std::ranges::find(kEditOpNames, *op) == kEditOpNames.end()) return false;
   return std::ranges::any_of(kKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
+}
+
+// `; did you mean "..."?` with the nearest of the names; empty if none is near.
+template <typename Names>
+std::string NearestOf(std::string_view word, const Names& names) {
+  std::vector<KnownName> known;
+  for (const std::string_view name : names) known.push_back({name});
+  return DidYouMean(Quoted(NearestNames(word, known)));
 }
 
 class Parser {
@@ -109,7 +117,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   const auto known =
       std::ranges::find(kEditOpNames, std::string_view(op), [](const char* name) { return std::string_view(name); });
   if (known == kEditOpNames.end()) {
-    Fail(fmt::format("unknown op \"{}\"{}", op, DidYouMean(op, kEditOpNames)));
+    Fail(fmt::format("unknown op \"{}\"{}", op, NearestOf(op, kEditOpNames)));
     return std::nullopt;
   }
   edit_.op = static_cast<EditOp>(known - kEditOpNames.begin());
@@ -133,7 +141,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 void Parser::CheckKeys(const json& terrain) {
   for (const auto& [key, value] : terrain.items()) {
     if (std::ranges::find(kKeys, key) == kKeys.end()) {
-      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, DidYouMean(key, kKeys)));
+      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kKeys)));
     }
   }
 }
@@ -471,7 +479,7 @@ tl::expected<EditDatum, std::string> ParseDatum(const json& value) {
   constexpr std::array<const char*, 2> kNames = {"ellipsoid", "orthometric"};
   if (value == kNames[0]) return EditDatum::kEllipsoid;
   if (value == kNames[1]) return EditDatum::kOrthometric;
-  const std::string hint = value.is_string() ? DidYouMean(value.get<std::string>(), kNames) : "";
+  const std::string hint = value.is_string() ? NearestOf(value.get<std::string>(), kNames) : "";
   return tl::unexpected(
       fmt::format("vertical is {}; it must be \"ellipsoid\", or \"orthometric\" for heights above the geoid of the "
                   "sources{}",

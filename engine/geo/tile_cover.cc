@@ -65,12 +65,12 @@ std::vector<TileRange> Disjoint(std::vector<TileRange> ranges) {
   return cover;
 }
 
-TileRange Hull(const TileRange& a, const TileRange& b) {
+TileRange BoundingRange(const TileRange& a, const TileRange& b) {
   return {std::min(a.start_x, b.start_x), std::min(a.start_y, b.start_y), std::max(a.end_x, b.end_x),
           std::max(a.end_y, b.end_y)};
 }
 
-TileRange Common(const TileRange& a, const TileRange& b) {
+TileRange Intersection(const TileRange& a, const TileRange& b) {
   return {std::max(a.start_x, b.start_x), std::max(a.start_y, b.start_y), std::min(a.end_x, b.end_x),
           std::min(a.end_y, b.end_y)};
 }

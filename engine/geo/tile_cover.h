@@ -23,10 +23,10 @@ constexpr TileRange TilesBelow(const TileKey& key, int level) {
 }
 
 // Returns the smallest range that contains both ranges.
-TileRange Hull(const TileRange& a, const TileRange& b);
+TileRange BoundingRange(const TileRange& a, const TileRange& b);
 
 // Returns the intersection; empty (end before start) if there is none.
-TileRange Common(const TileRange& a, const TileRange& b);
+TileRange Intersection(const TileRange& a, const TileRange& b);
 constexpr bool IsEmpty(const TileRange& range) { return range.end_x < range.start_x || range.end_y < range.start_y; }
 constexpr std::int64_t Cells(const TileRange& range) {
   return IsEmpty(range) ? 0 : (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);

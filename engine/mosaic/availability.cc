@@ -56,7 +56,7 @@ Ranges Without(Ranges ranges, const Ranges& others) {
   for (const geo::TileRange& other : others) {
     Ranges left;
     for (const geo::TileRange& range : ranges) {
-      const geo::TileRange common = geo::Common(range, other);
+      const geo::TileRange common = geo::Intersection(range, other);
       if (geo::IsEmpty(common)) {
         left.push_back(range);
         continue;

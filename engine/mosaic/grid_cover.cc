@@ -43,7 +43,7 @@ GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) 
 
 bool GridCover::Covers(const geo::TileRange& pixels) const {
   std::int64_t covered = 0;
-  for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Common(boxes_[i], pixels));
+  for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Intersection(boxes_[i], pixels));
   return covered == geo::Cells(pixels);
 }
 

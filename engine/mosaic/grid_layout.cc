@@ -178,7 +178,7 @@ std::int64_t TurnOf(const Georeference& where) {
 }
 
 bool Touch(const geo::TileRange& a, const geo::TileRange& b) {
-  return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
+  return !geo::IsEmpty(geo::Intersection({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
 // Returns the member's column, moved by whole turns, at which it touches `pixels`; nothing if there is none.
@@ -278,7 +278,7 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
 // raster.
 GridLayout LayoutOf(const std::vector<Member>& members, std::int64_t turn) {
   geo::TileRange hull = members.front().pixels();
-  for (const Member& member : members) hull = geo::Hull(hull, member.pixels());
+  for (const Member& member : members) hull = geo::BoundingRange(hull, member.pixels());
   const bool around = turn > 0 && hull.end_x - hull.start_x + 1 >= turn && members.size() > 1;
   if (around) {
     const auto west = [](const Member& member) {

@@ -49,7 +49,7 @@ std::vector<Placed> PlacedIn(const std::vector<GridMember>& members, const BoxIn
     for (const std::int64_t shift : {std::int64_t{0}, -turn, turn}) {
       geo::TileRange at = members[i].pixels();
       at.start_x += shift, at.end_x += shift;
-      if (!geo::IsEmpty(geo::Common(at, box))) placed.push_back({&members[i], i, members[i].column + shift});
+      if (!geo::IsEmpty(geo::Intersection(at, box))) placed.push_back({&members[i], i, members[i].column + shift});
       if (turn == 0) break;
     }
   }
@@ -93,7 +93,7 @@ class Joints {
 
   std::size_t examinations() const { return examinations_; }
 
-  bool IsClosed(std::size_t member, std::uint32_t region) { return is_open_[RootOf(first_[member] + region)] == 0; }
+  bool IsHole(std::size_t member, std::uint32_t region) { return is_open_[RootOf(first_[member] + region)] == 0; }
 
  private:
   // Examines the pixel (x, y) of a member's rim and the pixel (x + dx, y + dy) beyond it. Returns the number of pixels
@@ -158,7 +158,7 @@ class Joints {
 }  // namespace
 
 GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn)
-    : turn_(turn), closed_(members.size()) {
+    : turn_(turn), hole_regions_(members.size()) {
   // A single raster's regions are sufficient, unless its first column is adjacent to the last.
   Joints joints(members, index, turn);
   for (std::size_t i = 0; i < members.size(); ++i) joints.Add(i);
@@ -166,15 +166,15 @@ GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& ind
   for (std::size_t i = 0; i < members.size(); ++i) {
     const RimVoids& voids = members[i].raster->rim_voids();
     for (std::uint32_t region = 0; region < voids.regions(); ++region) {
-      closed_[i].push_back(joints.IsClosed(i, region) ? 1 : 0);
+      hole_regions_[i].push_back(joints.IsHole(i, region) ? 1 : 0);
     }
-    if (std::ranges::none_of(closed_[i], [](std::uint8_t closed) { return closed != 0; })) continue;
+    if (std::ranges::none_of(hole_regions_[i], [](std::uint8_t is_hole) { return is_hole != 0; })) continue;
     geo::TileRange around{1, 1, 0, 0};
     for (const RimVoids::Run& run : voids.Runs()) {
-      if (closed_[i][run.region] == 0) continue;
+      if (hole_regions_[i][run.region] == 0) continue;
       const std::int64_t x = members[i].column, y = members[i].row + run.row;
       const geo::TileRange pixels{x + run.first, y, x + run.last, y};
-      around = geo::IsEmpty(around) ? pixels : geo::Hull(around, pixels);
+      around = geo::IsEmpty(around) ? pixels : geo::BoundingRange(around, pixels);
     }
     shared_.push_back(around);
   }
@@ -184,7 +184,7 @@ bool GridVoids::IsHole(const GridMember& member, std::size_t index, std::int64_t
                        std::int64_t& last_column) const {
   const RimVoids::Stretch stretch = member.raster->rim_voids().StretchAt(column, row);
   last_column = stretch.last_column;
-  return !stretch.region || closed_[index][*stretch.region] != 0;
+  return !stretch.region || hole_regions_[index][*stretch.region] != 0;
 }
 
 std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& members, const BoxIndex& index, int factor,

@@ -29,8 +29,9 @@ class GridVoids {
   bool SharesHole(const Box& pixels) const;
 
   // By region of the member's RimVoids: 1 if it is part of a hole. Empty: the member has no holes.
-  std::span<const std::uint8_t> Closed(std::size_t member) const {
-    return member < closed_.size() ? std::span<const std::uint8_t>(closed_[member]) : std::span<const std::uint8_t>();
+  std::span<const std::uint8_t> HoleRegions(std::size_t member) const {
+    return member < hole_regions_.size() ? std::span<const std::uint8_t>(hole_regions_[member])
+                                         : std::span<const std::uint8_t>();
   }
 
   // How often the constructor examined voids of a member: once for each change along the rims of members. For tests.
@@ -43,8 +44,8 @@ class GridVoids {
 
   std::int64_t turn_ = 0;
   std::size_t examinations_ = 0;
-  std::vector<std::vector<std::uint8_t>> closed_;  // by member and region of its RimVoids: 1 if part of a hole
-  std::vector<geo::TileRange> shared_;             // boxes of pixels around them
+  std::vector<std::vector<std::uint8_t>> hole_regions_;  // by member and region of its RimVoids: 1 if part of a hole
+  std::vector<geo::TileRange> shared_;                   // boxes of pixels around them
 };
 
 }  // namespace terrace::dem

@@ -157,7 +157,7 @@ class RasterGrid {
   std::vector<std::size_t> MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
                                         int deepest) const;
   // Which voids of a member are holes, by region.
-  std::span<const std::uint8_t> ClosedVoids(std::size_t member) const { return voids_.Closed(member); }
+  std::span<const std::uint8_t> HoleRegions(std::size_t member) const { return voids_.HoleRegions(member); }
 
   // Returns bounds on the ellipsoidal heights that Fill gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "engine/common/source_log.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
@@ -214,7 +214,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->footprint_ = Footprint::Of(source->georeference_);
   source->FillInfo(dataset, path, *prepared);
   source->info_.overviews_unused = std::move(overviews_unused);
-  source->info_.seconds_to_open = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  source->info_.seconds_to_open = SecondsSince(start);
   source->LogOpened(dataset, prepared->statistics.rim_voids.is_everything());
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));

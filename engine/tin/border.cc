@@ -119,8 +119,8 @@ Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, co
     const double padded = misfit + (has_limit ? of_chord_m : options.padding_m);
     const double weighted = std::max(padded * options.weight, padded + options.step_m);
     const double error =
-        options.scale *
-        limits.Counted(sample, has_limit && misfit > 0 ? weighted : std::min(weighted, kMaxBorderWeight * misfit));
+        options.scale * limits.WeightedError(
+                            sample, has_limit && misfit > 0 ? weighted : std::min(weighted, kMaxBorderWeight * misfit));
     if (error > worst.error) worst = {error, edge.SampleAt(k)};
   }
   return worst;

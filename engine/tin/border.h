@@ -37,7 +37,8 @@ ChordMisfit WorstOfChord(const Chord& chord, const BorderOptions& options);
 // BorderOptions.
 Candidate WorstBorderSample(const HeightField& field, const Corner& a, const Corner& b, const BorderOptions& options);
 
-// The same with errors as SampleLimits::Counted weights them. A cap applies to the error before BorderOptions::scale.
+// The same with errors as SampleLimits::WeightedError weights them. A cap applies to the error before
+// BorderOptions::scale.
 Candidate WorstLimitedBorderSample(const HeightField& field, const Corner& a, const Corner& b,
                                    const BorderOptions& options, const SampleLimits& limits);
 

@@ -148,7 +148,8 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
       });
   if (!star.is_closed) [[unlikely]] {
     for (std::size_t i = 0; i < suspect_count_; ++i) {
-      suspects_[i].edge = static_cast<std::uint32_t>((suspects_[i].edge + star.count - star.gap) % (star.count + 1));
+      suspects_[i].edge =
+          static_cast<std::uint32_t>((suspects_[i].edge + star.count - star.split_edge) % (star.count + 1));
     }
   }
   return star;

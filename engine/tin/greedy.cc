@@ -129,7 +129,7 @@ class GreedyTriangulation::Impl {
 
   const HeightField* field_;
   GreedyOptions options_;
-  SampleBox limited_;  // samples with limits of their own
+  BoundingBox limited_;  // samples with limits of their own
   Sagitta sagitta_;
   SeedCursor seeds_;
   Triangulation triangulation_;

@@ -97,7 +97,7 @@ struct GreedyOptions {
   Curvature curvature;
   std::vector<SeedGrid> seeds;  // in order of decreasing below_error
   SampleLimits limits;          // may be empty
-  double limits_scale = 1;      // `scale` of SampleLimits::Counted, inside; 1 on borders
+  double limits_scale = 1;      // `scale` of SampleLimits::WeightedError, inside; 1 on borders
   bool record = false;          // keep the order of insertions for MakeRefinement
 };
 

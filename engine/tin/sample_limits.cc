@@ -7,8 +7,8 @@
 
 namespace terrace::tin {
 
-SampleBox BoxOfLimits(const SampleLimits& limits, int width, int height) {
-  SampleBox box;
+BoundingBox BoxOfLimits(const SampleLimits& limits, int width, int height) {
+  BoundingBox box;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       const std::size_t k = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
@@ -33,7 +33,7 @@ Candidate WorstLimited(const HeightField& field, const std::array<Corner, 3>& co
     for (int x = first; x <= last; ++x) {
       const double distance = std::abs(plane.At(x, at_row) - static_cast<double>(row[x]));
       if (std::isnan(distance)) continue;
-      const double error = limits.Counted(begin + static_cast<std::size_t>(x), distance + sagitta_m, scale);
+      const double error = limits.WeightedError(begin + static_cast<std::size_t>(x), distance + sagitta_m, scale);
       if (error > worst.error) worst = {error, SampleNumber(x, y)};
     }
   });

@@ -36,7 +36,7 @@ struct SampleLimits {
 
   // The error of a sample, weighted as defined above. `scale`: factor on the caps; from 1024 on, forced samples count
   // like others. A run that exceeds a limit of vertices is repeated with a larger scale.
-  double Counted(std::size_t sample, double error, double scale = 1) const {
+  double WeightedError(std::size_t sample, double error, double scale = 1) const {
     constexpr double kBeyondCap = 0x1p34, kForced = 0x1p40, kGiveUp = 1024;
     if (!forced.empty() && forced[sample] != 0 && scale < kGiveUp) return std::max(error, 1.0) * kForced;
     if (weights.empty()) return error;
@@ -51,8 +51,8 @@ struct SampleLimits {
   }
 };
 
-// A box of samples.
-struct SampleBox {
+// The smallest box that contains the samples added; empty at first.
+struct BoundingBox {
   int west = std::numeric_limits<int>::max(), south = west, east = -1, north = -1;
 
   void Add(int x, int y) {
@@ -62,10 +62,10 @@ struct SampleBox {
 };
 
 // The samples that have a limit.
-SampleBox BoxOfLimits(const SampleLimits& limits, int width, int height);
+BoundingBox BoxOfLimits(const SampleLimits& limits, int width, int height);
 
-// The worst sample of a closed triangle, by SampleLimits::Counted, without its corners and without the field's border.
-// `sagitta_m` is added to distances. Safe to call from many threads at once.
+// The worst sample of a closed triangle, by SampleLimits::WeightedError, without its corners and without the field's
+// border. `sagitta_m` is added to distances. Safe to call from many threads at once.
 Candidate WorstLimited(const HeightField& field, const std::array<Corner, 3>& corners, double sagitta_m,
                        const SampleLimits& limits, double scale);
 

@@ -1,10 +1,10 @@
 #include "fly/flight/flight.h"
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <thread>
 
+#include "engine/core/elapsed_time.h"
 #include "fly/flight/client.h"
 #include "fly/flight/worker_pool.h"
 
@@ -12,8 +12,6 @@ namespace terrace::fly {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double SecondsSince(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 // Frames of every `step`-th client from `first`, until all have arrived.
 void DrawFrames(const std::vector<std::unique_ptr<Client>>& clients, std::size_t first, std::size_t step,

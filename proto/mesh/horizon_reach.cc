@@ -17,7 +17,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 // Of as many positions as the tag has lanes. Products are not fused with sums: the bits are those of scalars.
 template <class D>
-HWY_INLINE bool RaiseBy(D d, const geo::Vec3* positions, const geo::Vec3& ray, const geo::Vec3& radii, double most,
+HWY_INLINE bool RaiseBy(D d, const geo::Vec3* positions, const geo::Vec3& ray, const geo::Vec3& radii, double max_reach,
                         double& reach) {
   using V = hn::Vec<D>;
   static_assert(sizeof(geo::Vec3) == 3 * sizeof(double));
@@ -38,22 +38,22 @@ HWY_INLINE bool RaiseBy(D d, const geo::Vec3* positions, const geo::Vec3& ray, c
   const V cos_b = hn::Div(one, hn::Sqrt(squared));
   const V sin_b = hn::Mul(hn::Sqrt(hn::Sub(squared, one)), cos_b);
   const V here = hn::Div(one, minor(cos_a, cos_b, sin_a, sin_b));
-  if (!hn::AllTrue(d, hn::And(hn::Gt(here, hn::Zero(d)), hn::Le(here, hn::Set(d, most))))) return false;
+  if (!hn::AllTrue(d, hn::And(hn::Gt(here, hn::Zero(d)), hn::Le(here, hn::Set(d, max_reach))))) return false;
   reach = std::max(reach, hn::GetLane(hn::MaxOfLanes(d, here)));
   return true;
 }
 
-bool Raise(const std::vector<geo::Vec3>& positions, const geo::Vec3& ray, const geo::Vec3& radii, double most,
+bool Raise(const std::vector<geo::Vec3>& positions, const geo::Vec3& ray, const geo::Vec3& radii, double max_reach,
            double& reach) {
   const hn::CappedTag<double, 8> wide;
   const hn::CappedTag<double, 1> narrow;
   const std::size_t lanes = hn::Lanes(wide);
   std::size_t i = 0;
   for (; i + lanes <= positions.size(); i += lanes) {
-    if (!RaiseBy(wide, &positions[i], ray, radii, most, reach)) return false;
+    if (!RaiseBy(wide, &positions[i], ray, radii, max_reach, reach)) return false;
   }
   for (; i < positions.size(); ++i) {
-    if (!RaiseBy(narrow, &positions[i], ray, radii, most, reach)) return false;
+    if (!RaiseBy(narrow, &positions[i], ray, radii, max_reach, reach)) return false;
   }
   return true;
 }
@@ -71,10 +71,11 @@ HWY_EXPORT(Raise);
 
 }  // namespace
 
-bool RaiseReach(const std::vector<geo::Vec3>& positions, geo::Vec3 direction, double shrink_m, double most,
+bool RaiseReach(const std::vector<geo::Vec3>& positions, geo::Vec3 direction, double shrink_m, double max_reach,
                 double& reach) {
   const double major = geo::kSemiMajorAxis - shrink_m;
-  return HWY_DYNAMIC_DISPATCH(Raise)(positions, direction, {major, major, geo::kSemiMinorAxis - shrink_m}, most, reach);
+  return HWY_DYNAMIC_DISPATCH(Raise)(positions, direction, {major, major, geo::kSemiMinorAxis - shrink_m}, max_reach,
+                                     reach);
 }
 
 }  // namespace terrace::proto

@@ -18,8 +18,8 @@ namespace terrace::proto {
 //         /a |  \     .
 //     b_/.---+---.\_
 //
-// Raises `reach` to the largest of all positions. False: one of them is not in (0, most], or is NaN.
-bool RaiseReach(const std::vector<geo::Vec3>& positions, geo::Vec3 direction, double shrink_m, double most,
+// Raises `reach` to the largest of all positions. False: one of them is not in (0, max_reach], or is NaN.
+bool RaiseReach(const std::vector<geo::Vec3>& positions, geo::Vec3 direction, double shrink_m, double max_reach,
                 double& reach);
 
 }  // namespace terrace::proto

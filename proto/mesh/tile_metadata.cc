@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, int level) {
   Json below = Json::array();
   for (const geo::TileRange& range : ranges) {
-    const geo::TileRange part = geo::Common(range, geo::TilesBelow(key, level));
+    const geo::TileRange part = geo::Intersection(range, geo::TilesBelow(key, level));
     if (geo::IsEmpty(part)) continue;
     below.push_back({{"startX", part.start_x}, {"startY", part.start_y}, {"endX", part.end_x}, {"endY", part.end_y}});
   }
@@ -31,7 +31,7 @@ bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int finest_le
   const int below = key.level + 1;
   return below < static_cast<int>(available.size()) &&
          std::ranges::any_of(available[static_cast<std::size_t>(below)], [&](const geo::TileRange& range) {
-           return !geo::IsEmpty(geo::Common(range, geo::TilesBelow(key, below)));
+           return !geo::IsEmpty(geo::Intersection(range, geo::TilesBelow(key, below)));
          });
 }
 

@@ -9,7 +9,7 @@
 
 #include "server/http/text.h"
 #include "tiler/map/contour_tile.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
 namespace {

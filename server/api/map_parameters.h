@@ -9,7 +9,7 @@
 #include "engine/core/result.h"
 #include "proto/documents/map_picture.h"
 #include "server/tiles/catalog.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::server {
 

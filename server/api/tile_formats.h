@@ -16,9 +16,9 @@
 #include "proto/media_type.h"
 #include "server/api/request_context.h"
 #include "server/tiles/catalog.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/requested_error.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::server {
 

@@ -5,7 +5,7 @@
 #include "proto/compress.h"
 #include "server/api/tile_formats.h"
 #include "server/http/http_error.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {

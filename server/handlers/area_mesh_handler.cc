@@ -7,13 +7,14 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/error_text.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {
@@ -82,7 +83,7 @@ asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestConte
   Work<tiler::EncodedTile> work = [catalog = handlers.catalog, dataset, area, plan, coding,
                                    requested_at =
                                        TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
-    const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
+    const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
     Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
     if (!mesh) return mesh;
     mesh->times.queue = queued;

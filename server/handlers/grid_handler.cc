@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
@@ -15,7 +16,7 @@
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/grid_query.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {
@@ -147,20 +148,20 @@ asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContex
   Work<MadeGrid> work = [catalog = handlers.catalog, dataset, query, coding, most = handlers.max_mesh_samples,
                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
-    made.reply.times.queue = tiler::MicrosecondsSince(requested_at);
+    made.reply.times.queue = MicrosecondsSince(requested_at);
     auto begun = TileService::Clock::now();
     const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
     if (!grid) return tl::unexpected(grid.error());
     const Result<std::vector<float>> heights = ReadNodes(*catalog->pipeline, dataset, *query, *grid, stop);
     if (!heights) return tl::unexpected(heights.error());
-    made.reply.times.read = tiler::MicrosecondsSince(begun);
+    made.reply.times.read = MicrosecondsSince(begun);
     begun = TileService::Clock::now();
     const Steps steps = Steps::Of(*heights, query->range);
     const auto checked = CheckHasHeights(*query, *grid, steps, catalog->datasets[dataset]);
     if (!checked) return tl::unexpected(checked.error());
     Result<std::string> bytes = Encode(*query, *grid, *heights, steps);
     if (!bytes) return tl::unexpected(std::move(bytes).error());
-    made.reply.times.encode = tiler::MicrosecondsSince(begun);
+    made.reply.times.encode = MicrosecondsSince(begun);
     made.reply.bytes = tiler::Compress(*std::move(bytes), coding, stop);
     made.description = Describe(*grid, steps);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");

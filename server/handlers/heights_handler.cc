@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "engine/geo/ellipsoid.h"
 #include "proto/error_text.h"
 #include "server/api/caching.h"
@@ -20,7 +21,7 @@
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {
@@ -120,11 +121,11 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
   Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query, certified,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
-    made.times.queue = tiler::MicrosecondsSince(requested_at);
+    made.times.queue = MicrosecondsSince(requested_at);
     const auto begun = TileService::Clock::now();
     const Result<tiler::PointHeights> heights = ReadSurface(*catalog->pipeline, dataset, *query, stop);
     if (!heights) return tl::unexpected(heights.error());
-    made.times.read = tiler::MicrosecondsSince(begun);
+    made.times.read = MicrosecondsSince(begun);
     made.bytes = query->is_binary
                      ? HeightsBytes(*heights)
                      : HeightsJson(*query, *heights, catalog->datasets[dataset].name, certified.get(), stop);

@@ -8,13 +8,14 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/sight_query.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {
 namespace {
@@ -131,7 +132,7 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
   Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
-    made.times.queue = tiler::MicrosecondsSince(requested_at);
+    made.times.queue = MicrosecondsSince(requested_at);
     const auto begun = TileService::Clock::now();
     const tiler::TilePipeline& pipeline = *catalog->pipeline;
     if (query->from_ground) {
@@ -140,7 +141,7 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
     }
     const auto answers = pipeline.LookAlong(dataset, query->drawn, query->rays, query->options, stop);
     if (!answers) return tl::unexpected(answers.error());
-    made.times.read = tiler::MicrosecondsSince(begun);
+    made.times.read = MicrosecondsSince(begun);
     made.bytes = query->is_binary ? SightBytes(*query, *answers) : SightJson(*query, *answers, stop);
     made.bytes = tiler::Compress(std::move(made.bytes), coding, stop);
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");

@@ -11,8 +11,8 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
-#include "tiler/build_id.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::server {
 namespace {

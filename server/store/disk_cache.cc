@@ -19,8 +19,8 @@
 
 #include "engine/core/errno_text.h"
 #include "server/store/disk_store.h"
-#include "tiler/build_id.h"
 #include "tiler/store/tile_record.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::server {
 namespace {

@@ -11,8 +11,8 @@
 
 #include "server/store/look_up_gate.h"
 #include "server/store/shared_tier.h"
-#include "tiler/build_id.h"
 #include "tiler/store/tile_record.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::server {
 namespace {

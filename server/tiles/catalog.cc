@@ -4,14 +4,14 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
 namespace {
 
 // Columns may continue beyond the last one or below 0.
 bool Touches(const geo::TileRange& a, const geo::TileRange& b) {
-  return !geo::IsEmpty(geo::Common({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
+  return !geo::IsEmpty(geo::Intersection({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
 // Extends `box` by the ranges that touch it, around the whole Earth.
@@ -22,7 +22,7 @@ geo::TileRange Grown(geo::TileRange box, const std::vector<geo::TileRange>& rang
     for (const geo::TileRange& range : ranges) {
       for (const std::int64_t turn : {-columns, std::int64_t{0}, columns}) {
         const geo::TileRange turned{range.start_x + turn, range.start_y, range.end_x + turn, range.end_y};
-        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = geo::Hull(box, turned);
+        if (Touches(box, turned) && box.end_x - box.start_x < columns) box = geo::BoundingRange(box, turned);
       }
     }
     if (box == before) break;

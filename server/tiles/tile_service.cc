@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
+
 namespace terrace::server {
 namespace {
 
@@ -81,13 +83,13 @@ tiler::TilePtr TileService::Finish(const tiler::TileRequest& request, tiler::Enc
 Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
                                                  const tiler::CacheKey& key, Clock::time_point requested_at,
                                                  std::stop_token stop) {
-  const std::chrono::microseconds queued = tiler::MicrosecondsSince(requested_at);
+  const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
   // An earlier flight may have ended between the look-up in the cache and the start of this one.
   if (tiler::TilePtr tile = cache_.Find(key)) return tile;
   for (auto store = stores_.begin(); store != stores_.end(); ++store) {
     const auto begun = Clock::now();
     std::optional<tiler::EncodedTile> kept = (*store)->Find(key);
-    store_times_[static_cast<std::size_t>(store - stores_.begin())].fetch_add(tiler::MicrosecondsSince(begun).count(),
+    store_times_[static_cast<std::size_t>(store - stores_.begin())].fetch_add(MicrosecondsSince(begun).count(),
                                                                               std::memory_order_relaxed);
     if (!kept) continue;
     kept->store = (*store)->name();

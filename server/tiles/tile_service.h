@@ -17,9 +17,9 @@
 #include "server/jobs/single_flight.h"
 #include "server/jobs/worker_pool.h"
 #include "server/tiles/catalog.h"
-#include "tiler/encoded_tile.h"
 #include "tiler/store/tile_store.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::server {
 

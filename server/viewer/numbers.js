@@ -16,8 +16,9 @@ export function formatMetres(metres) {
 const fourDigits = (value) => formatNumber(Number(value.toPrecision(4)));
 export const formatArea = (squareMetres) =>
   (squareMetres < 1e6 ? `${fourDigits(squareMetres)} m²` : `${fourDigits(squareMetres / 1e6)} km²`);
+// One unit for all large volumes: cut and fill stand side by side.
 export const formatVolume = (cubicMetres) =>
-  (cubicMetres < 1e9 ? `${fourDigits(cubicMetres)} m³` : `${fourDigits(cubicMetres / 1e9)} km³`);
+  (cubicMetres < 1e6 ? `${fourDigits(cubicMetres)} m³` : `${fourDigits(cubicMetres / 1e6)} million m³`);
 
 // Heights are in metres however large they are.
 export const formatHeight = (metres) => `${formatNumber(Number(metres.toFixed(Math.abs(metres) < 10 ? 1 : 0)))} m`;

@@ -8,7 +8,7 @@
 #include "archive/tile_writer.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::archive {
 namespace {

@@ -10,7 +10,7 @@
 #include "archive/pmtiles/tile_id.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::archive {
 namespace {

@@ -7,7 +7,7 @@
 #include <iterator>
 #include <map>
 
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::archive {
 

@@ -8,7 +8,7 @@
 #include "archive/manifest.h"
 #include "archive/tile_writer.h"
 #include "engine/geo/tile_key.h"
-#include "tiler/encoded_tile.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::archive {
 

@@ -1,58 +1,24 @@
 """The baker as a user runs it: bake_test.py BINARY [--long]. --long: 200 kills instead of 20."""
 import contextlib
-import filecmp
 import http.client
 import json
-import os
-import pathlib
 import random
 import re
 import resource
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
-from pmtiles import archive, tiles_of  # noqa: E402
-from srtm import write_hgt  # noqa: E402
+from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_hgt
+from pmtiles import archive, tiles_of
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
-KILLS = 200 if "--long" in sys.argv else 20
-sys.argv = [argument for argument in sys.argv if argument != "--long"]
-CELLS = ("N46E006", "N46E007", "N46E012", "N30E012")
+KILLS = 200 if IS_LONG else 20
 
 
-def files_of(place):
-    return sorted(path.relative_to(place).as_posix() for path in pathlib.Path(place).rglob("*") if path.is_file())
-
-
-class Bake(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(scratch.cleanup)
-        cls.scratch = pathlib.Path(scratch.name)
-        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
-        cls.config = cls.make_sources("dems", (0, 0, 0, 0))
-        cls.reference = cls.scratch / "reference"
-        begun = time.monotonic()
-        done = cls.run_bake("--out", cls.reference, "--threads", 2)
-        assert done.returncode == 0, done.stderr
-        cls.seconds = time.monotonic() - begun
-
-    @classmethod
-    def make_sources(cls, folder, phases):
-        (cls.scratch / folder).mkdir()
-        for cell, phase in zip(CELLS, phases):
-            write_hgt(cls.scratch / folder / f"{cell}.hgt", phase)
-        config = cls.scratch / folder / "terrace.json"
-        # Without a stated floor, the lowest height of all sources is part of every unit.
-        config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
-        return config
+class Bake(BakeCase):
+    THREADS = 2
 
     @classmethod
     def command(cls, *arguments, config=None, levels="0-11"):
@@ -64,27 +30,7 @@ class Bake(unittest.TestCase):
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, **options)
 
     def start(self, *arguments, config=None):
-        process = subprocess.Popen(self.command(*arguments, config=config), env=self.environment, text=True,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-
-        def end():
-            if process.poll() is None:
-                process.kill()
-            process.communicate()
-        self.addCleanup(end)
-        return process
-
-    def place(self, name):
-        place = self.scratch / f"{self.id().rpartition('.')[2]}-{name}"
-        self.addCleanup(shutil.rmtree, place, ignore_errors=True)
-        return place
-
-    def expect_equal(self, place, reference=None):
-        reference = reference or self.reference
-        names = files_of(reference)
-        self.assertEqual(files_of(place), names)
-        _, different, unreadable = filecmp.cmpfiles(reference, place, names, shallow=False)
-        self.assertEqual((different, unreadable), ([], []))
+        return self.begin(self.command(*arguments, config=config))
 
     def units(self, done):
         """{unit: outcome} of the lines of --json."""
@@ -249,7 +195,7 @@ class Bake(unittest.TestCase):
         process = self.start("--out", place, "--json", "--threads", 1, config=config)
         process.stdout.readline()
         process.send_signal(signal.SIGSTOP)
-        for cell in CELLS:
+        for cell in self.CELLS:
             write_hgt(config.parent / f"{cell}.hgt", 2)
         process.send_signal(signal.SIGCONT)
         _, errors = process.communicate(timeout=120)

@@ -1,44 +1,28 @@
 """`terrace bake` into a bucket, with a store of this folder: bucket_test.py BINARY."""
 import json
-import os
-import pathlib
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 import urllib.request
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-import in_parallel  # noqa: E402
-from fake_s3 import FakeS3  # noqa: E402
-from redis_process import Redis, free_port  # noqa: E402
-from srtm import write_hgt  # noqa: E402
+from bake_case import BINARY, BakeCase, files_of
+import in_parallel  # bake_case has set the path
+from fake_s3 import FakeS3
+from redis_process import Redis, free_port
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 PLACE, BELOW = "/vsis3/terrain/maps/alps", "terrain/maps/alps"
 UNIT = "units/7-132-96.pmtiles"
 
 
-class Bucket(unittest.TestCase):
+class Bucket(BakeCase):
+    CELLS = ("N46E006", "N46E012")
+
     @classmethod
     def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(scratch.cleanup)
-        cls.scratch = pathlib.Path(scratch.name)
-        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
-        cls.config = cls.scratch / "dems/terrace.json"
-        cls.config.parent.mkdir()
-        for cell in ("N46E006", "N46E012"):
-            write_hgt(cls.config.parent / f"{cell}.hgt")
-        cls.config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
-        done = subprocess.run(cls.command(cls.scratch / "reference"), env=cls.environment, text=True, stderr=subprocess.PIPE)
-        assert done.returncode == 0, done.stderr
-        cls.reference = {file.relative_to(cls.scratch / "reference").as_posix(): file.read_bytes()
-                         for file in (cls.scratch / "reference").rglob("*") if file.is_file()}
+        super().setUpClass()
+        cls.expected = {name: (cls.reference / name).read_bytes() for name in files_of(cls.reference)}
 
     @classmethod
     def command(cls, place, *arguments, levels="0-11"):
@@ -49,15 +33,7 @@ class Bucket(unittest.TestCase):
         self.addCleanup(self.store.close)
 
     def start(self, *arguments, place=PLACE, environment=None, before=(), **options):
-        process = subprocess.Popen([*before, *self.command(place, *arguments, **options)], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                   env={**self.environment, **self.store.environment(), **(environment or {})})
-
-        def end():
-            if process.poll() is None:
-                process.kill()
-            process.communicate()
-        self.addCleanup(end)
-        return process
+        return self.begin([*before, *self.command(place, *arguments, **options)], {**self.store.environment(), **(environment or {})})
 
     def bake(self, *arguments, code=0, **options):
         process = self.start(*arguments, **options)
@@ -71,8 +47,8 @@ class Bucket(unittest.TestCase):
 
     def expect_all(self, place=BELOW):
         files = self.files(place)
-        self.assertEqual(set(files), set(self.reference))
-        self.assertEqual([name for name in files if files[name] != self.reference[name]], [])
+        self.assertEqual(set(files), set(self.expected))
+        self.assertEqual([name for name in files if files[name] != self.expected[name]], [])
 
     def outcomes(self, out):
         return sorted(line["outcome"] for line in map(json.loads, out.splitlines()) if "unit" in line)
@@ -115,7 +91,7 @@ class Bucket(unittest.TestCase):
         self.assertEqual(self.files(), {"planet.pmtiles": b"of somebody else"})
 
     def test_a_failed_upload_leaves_the_object_that_was_there(self):
-        of_another = self.reference[UNIT]
+        of_another = self.expected[UNIT]
 
         def refuse(method, key, query):  # another worker's unit appears while this one's is being put
             if query.get("partNumber") != "2" or not key.endswith(UNIT):
@@ -143,7 +119,7 @@ class Bucket(unittest.TestCase):
             process.communicate()
             self.assertNotIn("manifest.json", set(self.files()))
             for name, data in self.files().items():
-                self.assertTrue(data == self.reference.get(name, data), name)
+                self.assertTrue(data == self.expected.get(name, data), name)
         process = self.start("--json")
         process.stdout.readline()
         process.send_signal(signal.SIGTERM)
@@ -158,7 +134,7 @@ class Bucket(unittest.TestCase):
         out, errors = self.bake(code=1)
         self.assertIn("unit 7-132-96 of terrain failed: /vsis3/terrain/maps/alps/units/7-132-96.pmtiles cannot be written", errors)
         self.assertIn("check the bucket, the credentials and their right to write", errors)
-        self.assertEqual(set(self.files()), set(self.reference) - {UNIT, "manifest.json"} | {"bake.json"})
+        self.assertEqual(set(self.files()), set(self.expected) - {UNIT, "manifest.json"} | {"bake.json"})
         refused = []
 
         def refuse_now_and_then(method, key, query):
@@ -220,10 +196,10 @@ class Bucket(unittest.TestCase):
 
     def test_damaged_objects_are_baked_again(self):
         self.bake()
-        changed = bytearray(self.reference[UNIT])
+        changed = bytearray(self.expected[UNIT])
         changed[len(changed) // 2] ^= 1
         self.store.objects[f"{BELOW}/{UNIT}"] = bytes(changed)
-        self.store.objects[BELOW + "/top.pmtiles"] = self.reference["top.pmtiles"][:-1]
+        self.store.objects[BELOW + "/top.pmtiles"] = self.expected["top.pmtiles"][:-1]
         _, errors = self.bake("--finish", code=1)
         self.assertIn("unit 7-132-96 of terrain is missing", errors)
         out, _ = self.bake("--json")

@@ -1,60 +1,25 @@
 """What the tests of many bakers share: sources, an archive of a single process, a redis-server, workers."""
 import concurrent.futures
-import filecmp
 import json
-import os
-import pathlib
 import resource
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import time
 import unittest
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-from redis_process import Redis  # noqa: E402
-from srtm import write_hgt  # noqa: E402
+from bake_case import BINARY, BakeCase
+from redis_process import Redis
 
-BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
-IS_LONG = "--long" in sys.argv
-sys.argv = [argument for argument in sys.argv if argument != "--long"]
-CELLS = ("N46E006", "N46E007", "N46E012", "N30E012")
 LEASE = 1.5  # seconds; the heartbeat is a third
 
 
-def files_of(place):
-    return sorted(path.relative_to(place).as_posix() for path in pathlib.Path(place).rglob("*") if path.is_file())
-
-
 @unittest.skipUnless(shutil.which("redis-server"), "redis-server is not installed")
-class QueueCase(unittest.TestCase):
+class QueueCase(BakeCase):
     @classmethod
     def setUpClass(cls):
-        scratch = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(scratch.cleanup)
-        cls.scratch = pathlib.Path(scratch.name)
-        cls.environment = {**os.environ, "XDG_CACHE_HOME": str(cls.scratch / "cache")}
-        cls.environment.pop("TERRACE_QUEUE_PASSWORD", None)
-        cls.config = cls.make_sources("dems")
-        cls.reference = cls.scratch / "reference"
-        begun = time.monotonic()
-        done = subprocess.run([BINARY, "bake", "--config", cls.config, "--levels", "0-11", "--out", cls.reference, "--threads", "1"],
-                              env=cls.environment, text=True, stderr=subprocess.PIPE)
-        assert done.returncode == 0, done.stderr
-        cls.seconds = time.monotonic() - begun
+        super().setUpClass()
         cls.units = [unit["name"] for unit in json.loads((cls.reference / "manifest.json").read_text())["units"]]
-
-    @classmethod
-    def make_sources(cls, folder):
-        (cls.scratch / folder).mkdir()
-        for cell in CELLS:
-            write_hgt(cls.scratch / folder / f"{cell}.hgt")
-        config = cls.scratch / folder / "terrace.json"
-        config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
-        return config
 
     def setUp(self):
         self.redis = self.start_redis("redis")
@@ -65,28 +30,14 @@ class QueueCase(unittest.TestCase):
         self.addCleanup(redis.kill)
         return redis
 
-    def place(self, name="out"):
-        place = self.scratch / f"{self.id().rpartition('.')[2]}-{name}"
-        self.addCleanup(shutil.rmtree, place, ignore_errors=True)
-        return place
-
     def command(self, place, *arguments, url=None, config=None, levels="0-11", lease=LEASE):
         return [str(part) for part in (
             BINARY, "bake", "--config", config or self.config, "--levels", levels, "--out", place, "--queue", url or self.redis.url,
             "--job", self.job, "--lease", lease, "--json", "--threads", 1, *arguments)]
 
     def start(self, place, *arguments, before=(), environment=None, limit=None, **options):
-        process = subprocess.Popen(
-            [*before, *self.command(place, *arguments, **options)], env={**self.environment, **(environment or {})}, text=True,
-            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-            preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))))
-
-        def end():
-            if process.poll() is None:
-                process.kill()
-            process.communicate()
-        self.addCleanup(end)
-        return process
+        return self.begin([*before, *self.command(place, *arguments, **options)], environment,
+                          preexec_fn=limit and (lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))))
 
     def joined(self, place, count, **options):
         """Workers that have all joined the job, each with a unit or about to take one."""
@@ -132,13 +83,6 @@ class QueueCase(unittest.TestCase):
 
     def key(self, what):
         return f"terrace:{{{self.job}}}:{what}"
-
-    def expect_equal(self, place, reference=None):
-        reference = reference or self.reference
-        names = files_of(reference)
-        self.assertEqual(files_of(place), names)
-        _, different, unreadable = filecmp.cmpfiles(reference, place, names, shallow=False)
-        self.assertEqual((different, unreadable), ([], []))
 
     def baked(self, *outputs, outcomes=("baked",)):
         """The units of the lines of --json, sorted, each as often as it was baked."""

@@ -6,8 +6,9 @@ import signal
 import subprocess
 import time
 
-from queue_case import BINARY, QueueCase, files_of
-import in_parallel  # queue_case has set the path
+from bake_case import BINARY, files_of
+from queue_case import QueueCase
+import in_parallel  # bake_case has set the path
 from redis_process import Listener, proxy
 
 

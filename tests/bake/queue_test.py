@@ -8,8 +8,9 @@ import subprocess
 import sys
 import time
 
-from queue_case import BINARY, IS_LONG, QueueCase, files_of, write_hgt
-import in_parallel  # queue_case has set the path
+from bake_case import BINARY, IS_LONG, files_of, write_hgt
+from queue_case import QueueCase
+import in_parallel  # bake_case has set the path
 
 KILLS = 200 if IS_LONG else 8
 

@@ -4,14 +4,12 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { chromium } from 'playwright-core';
 import { assertAccessible } from './axe.mjs';
+import { end, openBrowser } from './browser.mjs';
 import { json, request, run, samples, serve } from './harness.mjs';
 import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
+import { formatVolume } from '../../server/viewer/numbers.js';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 const kWait = { timeout: 120000, polling: 200 };
 const hills = path.join(samples, 'jacksboro.tif');
 const at = (longitude, latitude) => ({ longitude, latitude });
@@ -41,6 +39,10 @@ describe('shapes of edits', () => {
     assert.deepEqual(earthwork([10, 20, undefined, 30, 40], 25, 400), { samples: 4, raised: 15, lowered: 15, fill: 2000, cut: 2000 });
   });
 
+  it('have volumes in one unit', () => {
+    assert.deepEqual([2000, 571.2e6, 4.981e9].map(formatVolume), ['2,000 m³', '571.2 million m³', '4,981 million m³']);
+  });
+
   it('are closed and counterclockwise in the file', () => {
     const { features: [{ geometry, properties }] } = flattenGeoJson(square, 500.12345, 0);
     const [ring] = geometry.coordinates;
@@ -64,17 +66,10 @@ describe('edits in the viewer', () => {
       { name: 'hills', sources: [hills], edits: [edits] }, { name: 'plain', sources: [hills] },
     ] }));
     server = await serve('--config', config);
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
-    page = await browser.newPage({ viewport: { width: 700, height: 420 }, deviceScaleFactor: 0.5, acceptDownloads: true });
-    page.wrongs = [];
-    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+    ({ browser, page } = await openBrowser(700, 420, { acceptDownloads: true }));
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-    fs.rmSync(folder, { recursive: true });
-  });
+  after(() => end(browser, server, folder));
 
   it('are offered as GeoJSON, where there are any', async () => {
     const { datasets } = await json(`${server.url}/datasets`);

@@ -4,15 +4,12 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { chromium } from 'playwright-core';
 import { assertAccessible } from './axe.mjs';
+import { end, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 import { lineOfSight, measurePath } from '../../server/viewer/ground_path.js';
 import { fromLocalMeanTime, sunAltitude, sunDirection } from '../../server/viewer/sun.js';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 const kWait = { timeout: 90000, polling: 200 };
 
 describe('numbers of the viewer', () => {
@@ -64,19 +61,12 @@ describe('features of the viewer', () => {
   before(async () => {
     write(dataset);
     server = await serve('--config', config);
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
-    page = await browser.newPage({ viewport: { width: 760, height: 480 }, deviceScaleFactor: 0.5 });
-    page.wrongs = [];
-    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+    ({ browser, page } = await openBrowser(760, 480));
     await page.goto(`${server.url}/#dataset=hills&fraction=1`);
     await settled();
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-    fs.rmSync(folder, { recursive: true });
-  });
+  after(() => end(browser, server, folder));
 
   it('keep colours true under exaggeration', async () => {
     const uniform = () => page.evaluate(() => terrace.globe.material.uniforms.exaggeration);
@@ -193,7 +183,7 @@ describe('features of the viewer', () => {
   });
 
   it('show a flat map without WebGL 2', async () => {
-    const plain = await chromium.launch({ executablePath: kChromium, args: ['--no-sandbox', '--disable-3d-apis'] });
+    const plain = await launchWithoutWebGl();
     const flat = await plain.newPage({ viewport: { width: 700, height: 450 } });
     await flat.goto(`${server.url}/`);
     await flat.getByText('no WebGL 2').waitFor({ timeout: 30000 });

@@ -5,13 +5,10 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { chromium } from 'playwright-core';
 import { assertAccessible } from './axe.mjs';
+import { end, launch, launchWithoutWebGl } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 const kWait = { timeout: 120000, polling: 200 };
 const hills = path.join(samples, 'jacksboro.tif');
 const hasGdal = (() => {
@@ -35,14 +32,10 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
                                     '-a_nodata', 'none', hills, image]);
     fs.writeFileSync(config, JSON.stringify({ datasets: [{ name: 'hills', sources: [hills], imagery: { image } }] }));
     server = await serve('--config', config);
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    browser = await launch();
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-    fs.rmSync(folder, { recursive: true });
-  });
+  after(() => end(browser, server, folder));
 
   // The share of magenta in the right part of the window.
   async function shareOfMagenta(page) {
@@ -79,7 +72,7 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
   });
 
   it('lies on the flat map, which has contours too', async (test) => {
-    const plain = await chromium.launch({ executablePath: kChromium, args: ['--no-sandbox', '--disable-3d-apis'] });
+    const plain = await launchWithoutWebGl();
     test.after(() => plain.close());
     const page = await plain.newPage({ viewport: { width: 640, height: 400 } });
     await page.goto(server.url);

@@ -4,13 +4,10 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { chromium } from 'playwright-core';
+import { end, openBrowser } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 const kWait = { timeout: 90000, polling: 200 };
 
 // An ASCII grid in degrees; `height(x, y)` of each sample, -9999 is a void.
@@ -48,17 +45,10 @@ describe('the viewer', () => {
     const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
     const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
     server = await serve(isle, level, small, path.join(samples, 'jacksboro.tif'));
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
-    page = await browser.newPage({ viewport: { width: 640, height: 400 }, deviceScaleFactor: 0.5 });
-    page.wrongs = [];
-    page.on('pageerror', (error) => page.wrongs.push(String(error)));
+    ({ browser, page } = await openBrowser(640, 400));
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-    fs.rmSync(folder, { recursive: true });
-  });
+  after(() => end(browser, server, folder));
 
   it('draws the floor around an inland raster as ground, not as water', async () => {
     await open('#dataset=isle&camera=10.03,45.03,9000,0,-90');

@@ -4,12 +4,9 @@ import fs from 'node:fs';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { fileURLToPath } from 'node:url';
-import { chromium } from 'playwright-core';
+import { end, launch } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 const kWait = { timeout: 90000, polling: 200 };
 const kMaxBytes = 1_620_000;  // of the page without tiles, compressed
 const viewer = path.resolve(path.dirname(fileURLToPath(import.meta.url)), '../../server/viewer');
@@ -28,13 +25,10 @@ describe('the start of the viewer', () => {
 
   before(async () => {
     server = await serve('--config', path.join(samples, 'samples.json'));
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    browser = await launch();
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  after(() => end(browser, server));
 
   const newPage = () => browser.newPage({ viewport: { width: 480, height: 300 }, colorScheme: 'dark' });
   const ground = (page) => page.waitForFunction(() => window.terrace?.globe.hasGround, undefined, kWait);

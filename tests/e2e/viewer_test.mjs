@@ -5,13 +5,10 @@ import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
-import { chromium } from 'playwright-core';
 import { assertAccessible } from './axe.mjs';
+import { chromiumPath, end, launch } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 
-const kChromium = process.env.TERRACE_CHROMIUM ?? '/usr/bin/chromium';
-const kFlags = ['--no-sandbox', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist',
-                '--disable-background-networking', '--no-first-run'];
 // A software renderer draws a quarter of the pixels.
 const kScale = 0.5;
 const kSettleMs = 90000;  // a software renderer on a busy machine draws two frames a second
@@ -80,15 +77,12 @@ describe('the viewer', () => {
     const { datasets } = await (await fetch(`${url}/datasets`)).json();
     [regional, other] = [...datasets].sort((a, b) => widthOf(a) - widthOf(b));
     assert.ok(other, 'the test needs two datasets');
-    assert.ok(fs.existsSync(kChromium), `${kChromium} is missing`);
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    assert.ok(fs.existsSync(chromiumPath), `${chromiumPath} is missing`);
+    browser = await launch();
     page = await openPage(browser, `${url}/#dataset=${regional.name}`);
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  after(() => end(browser, server));
 
   it('draws terrain in many colours', async () => {
     const drawn = await settle(page);
@@ -254,14 +248,11 @@ describe('a region of fine data on a globe', { skip: process.env.TERRACE_URL ? '
 
   before(async () => {
     server = await serveConfig({ datasets: [{ name: 'mosaic', sources: [hills, earth] }, { name: 'earth', sources: [earth] }] });
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    browser = await launch();
     page = await openPage(browser, server.url);
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  after(() => end(browser, server));
 
   const camera = () => page.evaluate(() => terrace.globe.camera);
 
@@ -293,13 +284,10 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
 
   before(async () => {
     server = await serveConfig({ tokens, datasets: [{ name: 'earth', sources: [earth], public: true }, hidden] });
-    browser = await chromium.launch({ executablePath: kChromium, args: kFlags });
+    browser = await launch();
   });
 
-  after(async () => {
-    await browser?.close();
-    await server?.stop();
-  });
+  after(() => end(browser, server));
 
   it('are asked for and shown', async () => {
     const page = await openPage(browser, `${server.url}/#dataset=hills`);

@@ -9,7 +9,7 @@
 #include "proto/error_text.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/area/area_mesh.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "tests/proto/quantized_mesh_decoder.h"
+#include "tiler/tile/tile_request.h"
 #include "tiler/tile_pipeline.h"
-#include "tiler/tile_request.h"
 
 namespace terrace::tiler {
 

@@ -1,7 +1,6 @@
 #include "tiler/area/area_mesh.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <sstream>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "engine/core/check.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
@@ -19,7 +19,7 @@
 #include "tiler/area/area_surface.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
 namespace {

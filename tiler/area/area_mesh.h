@@ -7,7 +7,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "proto/gltf/mesh_file.h"
-#include "tiler/encoded_tile.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 

@@ -1,5 +1,4 @@
-#include <chrono>
-
+#include "engine/core/elapsed_time.h"
 #include "proto/documents/vector_tile.h"
 #include "tiler/encoders.h"
 #include "tiler/map/contour_tile.h"

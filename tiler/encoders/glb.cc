@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/gltf/glb_tile.h"
@@ -17,7 +17,6 @@
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
-#include "tiler/surface/drawn_triangles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {

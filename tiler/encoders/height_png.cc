@@ -1,10 +1,10 @@
 #include "proto/documents/height_png.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "tiler/encoders.h"
 #include "tiler/tile_pipeline.h"
 

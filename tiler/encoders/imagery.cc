@@ -1,6 +1,6 @@
-#include <chrono>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/documents/map_picture.h"
 #include "tiler/encoders.h"
 #include "tiler/tile_pipeline.h"

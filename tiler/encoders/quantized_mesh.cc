@@ -1,8 +1,8 @@
 #include "proto/mesh/quantized_mesh.h"
 
-#include <chrono>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/tile_metadata.h"
 #include "proto/mesh/tile_normals.h"
@@ -10,6 +10,7 @@
 #include "tiler/encoders.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/surface/drawn_triangles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
@@ -59,6 +60,15 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
 }
 
 }  // namespace
+
+Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop) {
+  const Result<MeshedTile> meshed = MeshTile(*input.dataset.source, input.lattice(), input.refined->refinement,
+                                             input.dataset.mesh_options, input.error_m, stop);
+  if (!meshed) return tl::unexpected(meshed.error());
+  DrawnTriangles drawn = TrianglesOf(meshed->tile);
+  drawn.in_hole = TrianglesInHoles(*input.dataset.source, meshed->tile.key, meshed->mesh);
+  return drawn;
+}
 
 Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;

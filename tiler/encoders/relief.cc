@@ -1,11 +1,11 @@
 // Hillshades and slopes.
 #include "tiler/map/relief.h"
 
-#include <chrono>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "proto/documents/map_picture.h"
 #include "tiler/encoders.h"
 #include "tiler/map/map_heights.h"

@@ -10,7 +10,7 @@
 
 namespace terrace::tiler {
 
-double MeshError(double error_m) {
+double NodeErrorBound(double error_m) {
   constexpr double kRounding = 0x1p-11 + 0x1p-14;
   return std::max(error_m - kRounding, error_m / 2);
 }
@@ -21,7 +21,7 @@ tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
-  for (float& cap : demands.caps) cap = static_cast<float>(MeshError(static_cast<double>(cap)));
+  for (float& cap : demands.caps) cap = static_cast<float>(NodeErrorBound(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
   limits.caps = std::move(demands.caps);
   limits.forced = std::move(demands.forced);

@@ -14,7 +14,7 @@ namespace terrace::tiler {
 
 // The error bound of a tile's mesh at its nodes for an error of at most `error_m` to the ground. It is smaller, because
 // the heights of nodes are rounded to 2^-10 m and their positions are inexact.
-double MeshError(double error_m);
+double NodeErrorBound(double error_m);
 
 // The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);

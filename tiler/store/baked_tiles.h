@@ -9,9 +9,9 @@
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
 #include "proto/gltf/texture.h"
-#include "tiler/coding.h"
-#include "tiler/encoded_tile.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/coding.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 

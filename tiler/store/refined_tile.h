@@ -8,7 +8,7 @@
 #include "engine/geo/tile_key.h"
 #include "engine/tin/refinement.h"
 #include "tiler/store/byte_cache.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 

@@ -9,9 +9,9 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "tiler/encoded_tile.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/tile_store.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 

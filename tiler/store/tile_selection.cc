@@ -1,6 +1,6 @@
 #include "tiler/store/tile_selection.h"
 
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::tiler {
 

@@ -10,11 +10,11 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "tiler/encoded_tile.h"
 #include "tiler/store/byte_cache.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/tile_selection.h"
-#include "tiler/tile_request.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 

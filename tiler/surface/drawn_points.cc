@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "engine/geo/error_ladder.h"
-#include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
 namespace {

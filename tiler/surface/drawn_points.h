@@ -1,6 +1,7 @@
 // Heights as drawn: of the mesh that a client decodes at some level and error.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -13,13 +14,21 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "proto/gltf/glb_tile.h"
-#include "tiler/encoders.h"
-#include "tiler/requested_error.h"
 #include "tiler/surface/drawn_mesh.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 
-struct PointHeights;  // tile_pipeline.h
+// Heights of a dataset at points, NaN where it has none.
+struct PointHeights {
+  std::vector<float> heights;
+  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled in; empty: none was
+  std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
+  // Of drawn surfaces: the tiles that were read, and the index of each point's tile. Empty: heights of the sources.
+  std::vector<geo::TileKey> tiles = {};
+  std::vector<std::uint32_t> tile_of_point = {};
+};
 
 // The surface to read. The error and the rest are those of a tile's URL.
 struct DrawnSurface {

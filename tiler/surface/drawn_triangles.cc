@@ -3,18 +3,10 @@
 #include <array>
 #include <cstdint>
 #include <optional>
-#include <utility>
-#include <vector>
-
-#include "tiler/mesh/mesh_limits.h"
-#include "tiler/mesh/tile_mesher.h"
-#include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
 
-namespace {
-
-DrawnTriangles Placed(const proto::QuantizedTile& tile) {
+DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile) {
   const geo::TileKey& key = tile.key;
   const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
   const double west = static_cast<double>(key.x) * side - 180, south = static_cast<double>(key.y) * side - 90;
@@ -31,17 +23,6 @@ DrawnTriangles Placed(const proto::QuantizedTile& tile) {
   return drawn;
 }
 
-}  // namespace
-
-Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop) {
-  const Result<MeshedTile> meshed = MeshTile(*input.dataset.source, input.lattice(), input.refined->refinement,
-                                             input.dataset.mesh_options, input.error_m, stop);
-  if (!meshed) return tl::unexpected(meshed.error());
-  DrawnTriangles drawn = Placed(meshed->tile);
-  drawn.in_hole = TrianglesInHoles(*input.dataset.source, meshed->tile.key, meshed->mesh);
-  return drawn;
-}
-
 Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key) {
   std::optional<proto::QuantizedTile> tile = proto::ReadQuantizedMesh(bytes, key);
   if (!tile) {
@@ -55,7 +36,7 @@ Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& 
     covered += (std::int64_t{tile->u[b]} - tile->u[a]) * (std::int64_t{tile->v[c]} - tile->v[a]) -
                (std::int64_t{tile->v[b]} - tile->v[a]) * (std::int64_t{tile->u[c]} - tile->u[a]);
   }
-  DrawnTriangles drawn = Placed(*tile);
+  DrawnTriangles drawn = TrianglesOf(*tile);
   drawn.lacks_holes = has_holes || covered != std::int64_t{2} * proto::kQuantizedMax * proto::kQuantizedMax;
   return drawn;
 }

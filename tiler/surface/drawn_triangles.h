@@ -1,21 +1,18 @@
-// The triangles that clients decode from a tile of each format.
+// The triangles that clients decode from a quantized-mesh tile.
 #pragma once
 
-#include <stop_token>
 #include <string_view>
 
 #include "engine/core/result.h"
+#include "proto/mesh/quantized_mesh.h"
 #include "tiler/surface/drawn_mesh.h"
 
 namespace terrace::tiler {
 
-struct EncoderInput;  // tile_pipeline.h
+// All triangles of a tile.
+DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile);
 
-// The triangles in the bytes that EncodeQuantizedMesh and EncodeGlb (encoders.h) make of the same input. Same errors.
-Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
-Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);  // encoders/glb.cc
-
-// The triangles of a finished quantized-mesh tile. kUnavailable: the bytes are not such a tile.
+// The triangles of a finished tile. kUnavailable: the bytes are not such a tile.
 Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key);
 
 }  // namespace terrace::tiler

@@ -151,12 +151,12 @@ bool CandidateQueue::Refill() {
   return false;
 }
 
-// Fills the run with all candidates that are not much smaller than `most`; false if there are none.
-bool CandidateQueue::SweepFrom(float most) {
+// Fills the run with all candidates that are not much smaller than `max_error`; false if there are none.
+bool CandidateQueue::SweepFrom(float max_error) {
   run_.clear();
   run_begin_ = 0;
-  if (!(most > 0) || std::isinf(most)) return false;
-  threshold_ = std::max(static_cast<float>(most * step_), std::numeric_limits<float>::denorm_min());
+  if (!(max_error > 0) || std::isinf(max_error)) return false;
+  threshold_ = std::max(static_cast<float>(max_error * step_), std::numeric_limits<float>::denorm_min());
   swept_.clear();
   std::array<std::uint32_t, kSwept + kBeyond> found;
   for (std::size_t first = 0; first < errors_.size(); first += kSwept) {

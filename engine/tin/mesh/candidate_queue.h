@@ -88,7 +88,7 @@ class CandidateQueue {
   void Grow(std::size_t slots);
   void Insert(std::uint32_t slot);
   bool Refill();
-  bool SweepFrom(float most);
+  bool SweepFrom(float max_error);
   void SortSwept();
   void SortPairs();
   void Shorten();

@@ -59,8 +59,8 @@ struct Star {
   // fans; the triangle between the end of one and the beginning of the next is left out.
   static constexpr std::size_t kMaxLeftOut = 32;
   std::uint32_t left_out = 0;
-  // Open stars: the index of the outline's edge that contains the centre. The ring begins after this edge.
-  std::size_t gap = 0;
+  // Open stars: the index of the outline's edge that the centre splits. The ring begins after this edge.
+  std::size_t split_edge = 0;
   Ring ring;
   std::vector<TriangleId> triangles;  // the first `count` are valid; padded after an insertion, as a ring is
   std::vector<HalfEdgeId> outside;    // by triangle: the twin of the ring's edge

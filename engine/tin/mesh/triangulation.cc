@@ -144,7 +144,7 @@ void Triangulation::PrefetchBeyond(TriangleId t) const {
 
 // Makes the ring begin after the edge that contains the centre.
 void Triangulation::OpenRing(std::size_t edges) {
-  const auto first = static_cast<std::ptrdiff_t>(star_.gap + 1), count = static_cast<std::ptrdiff_t>(edges);
+  const auto first = static_cast<std::ptrdiff_t>(star_.split_edge + 1), count = static_cast<std::ptrdiff_t>(edges);
   const auto turn = [=](auto& values) { std::rotate(values.begin(), values.begin() + first, values.begin() + count); };
   turn(star_.ring.ids);
   turn(star_.ring.dx);

@@ -283,7 +283,7 @@ void Triangulation::Replace(Triangles& triangles, SamplePosition point, Triangle
       star_.has_border = true;
       if (Cross(u, top->end) == 0) {
         star_.is_closed = false;
-        star_.gap = edges;
+        star_.split_edge = edges;
       }
     }
     keeps(edges);

@@ -9,7 +9,7 @@
 #include "bake/baker.h"
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "tiler/coding.h"
+#include "tiler/tile/coding.h"
 
 namespace terrace::cli {
 

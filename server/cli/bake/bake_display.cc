@@ -11,9 +11,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "server/cli/common/progress.h"
-#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -73,7 +73,7 @@ void BakeDisplay::Show() {
 }
 
 std::string BakeDisplay::Line() const {
-  const double seconds = tiler::SecondsSince(start_);
+  const double seconds = SecondsSince(start_);
   const std::uint64_t built = counters_.tiles, passed = counters_.passed;
   const std::uint64_t done = std::min(built + passed, tiles_);
   const double pace = seconds > 0 ? static_cast<double>(built) / seconds : 0;

@@ -5,7 +5,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
@@ -18,6 +17,7 @@
 #include "bake/cell_list.h"
 #include "bake/estimate.h"
 #include "bake/place.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/remote_file.h"
@@ -33,9 +33,8 @@
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
-#include "tiler/build_id.h"
-#include "tiler/encoded_tile.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::cli {
 namespace {
@@ -201,7 +200,7 @@ int BakeJob(const PlacedBake& bake, const std::string& worker) {
       {bake.arguments, bake.pipeline, bake.targets, bake.plan, bake.options, bake.place, worker, bake.identity, finish},
       counters, reports);
   if (bake.signals.signal() != 0) return StopCode(bake.signals);
-  BakeSummary summary = Summarize(reports, counters, bake.place, tiler::SecondsSince(start));
+  BakeSummary summary = Summarize(reports, counters, bake.place, SecondsSince(start));
   summary.is_complete = code == kExitOk;
   if (code == kExitUsage) return code;
   fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
@@ -230,7 +229,7 @@ int BakeAlone(const PlacedBake& bake) {
     const BakeDisplay display(bake.pipeline.datasets().front().name, bake.plan.tiles, bake.plan.files, counters);
     reports = bake::Bake(bake.pipeline, bake.targets, bake.plan, bake.options, counters);
   }
-  BakeSummary summary = Summarize(reports, counters, bake.place, tiler::SecondsSince(start));
+  BakeSummary summary = Summarize(reports, counters, bake.place, SecondsSince(start));
   const std::uint64_t done = summary.baked + summary.kept + summary.copied;
   if (bake.signals.signal() != 0) {
     std::fprintf(stderr, "terrace: stopped: %s of %s files are done; run the same command again to go on\n",

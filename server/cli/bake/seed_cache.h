@@ -8,7 +8,7 @@
 #include "config/config.h"
 #include "server/cli/bake/bake_arguments.h"
 #include "server/cli/bake/stop_signals.h"
-#include "tiler/coding.h"
+#include "tiler/tile/coding.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::cli {

@@ -10,8 +10,8 @@
 #include <system_error>
 #include <vector>
 
-#include "config/common/nearest_name.h"
 #include "engine/core/errno_text.h"
+#include "engine/core/nearest_name.h"
 #include "engine/gdal/source_policy.h"
 
 namespace terrace::cli {
@@ -29,9 +29,9 @@ std::string SimilarFile(const std::string& path) {
     names.push_back(entry->path().filename().string());
   }
   std::ranges::sort(names);  // the order of a folder is not fixed
-  std::vector<config::KnownName> known;
+  std::vector<KnownName> known;
   for (const std::string& name : names) known.push_back({name});
-  const std::vector<std::string_view> similar = config::NearestNames(wanted.filename().string(), known);
+  const std::vector<std::string_view> similar = NearestNames(wanted.filename().string(), known);
   return similar.empty() ? "" : fmt::format("; did you mean {}?", similar.front());
 }
 

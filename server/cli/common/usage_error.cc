@@ -9,21 +9,17 @@
 #include <string_view>
 #include <system_error>
 
-#include "config/common/nearest_name.h"
 #include "config/options/options.h"
+#include "engine/core/nearest_name.h"
 
 namespace terrace::cli {
 namespace {
 
-std::string DidYouMean(const std::vector<std::string>& meant) {
-  return meant.empty() ? std::string() : "; did you mean " + config::Alternatives(meant) + "?";
-}
-
 std::string ExplainCommand(const CLI::App& program, const std::string& word) {
-  std::vector<config::KnownName> known;
+  std::vector<KnownName> known;
   for (const CLI::App* command : program.get_subcommands({})) known.push_back({command->get_name()});
   std::vector<std::string> meant;
-  for (const std::string_view name : config::NearestNames(word, known)) meant.emplace_back(name);
+  for (const std::string_view name : NearestNames(word, known)) meant.emplace_back(name);
   std::error_code ignored;
   if (meant.empty() && std::filesystem::exists(word, ignored)) meant.push_back("terrace serve " + word);
   return "unknown command " + word + DidYouMean(meant);
@@ -50,13 +46,13 @@ std::vector<std::string> NearestFlags(const CLI::App& command, const std::string
   for (const CLI::Option* option : command.get_options()) {
     for (const std::string& name : option->get_lnames()) options.emplace("--" + name, option);
   }
-  std::vector<config::KnownName> known;
+  std::vector<KnownName> known;
   for (const auto& [name, option] : options) {
     const auto words = other_words.find(name);
     known.push_back({name, words == other_words.end() ? std::string_view() : words->second});
   }
   std::vector<std::string> nearest;
-  for (const std::string_view name : config::NearestNames(flag, known)) {
+  for (const std::string_view name : NearestNames(flag, known)) {
     nearest.push_back(WithValue(*options.at(std::string(name)), name));
   }
   return nearest;
@@ -93,7 +89,7 @@ std::string ExplainFlag(const CLI::App& command, const CLI::App& program, const 
   for (const CLI::App* other : others) {
     const std::vector<std::string> theirs = NearestFlags(*other, flag);
     if (!theirs.empty()) {
-      elsewhere.push_back(fmt::format("{} of 'terrace {}'", config::Alternatives(theirs), other->get_name()));
+      elsewhere.push_back(fmt::format("{} of 'terrace {}'", Alternatives(theirs), other->get_name()));
     }
   }
   return unknown + DidYouMean(elsewhere);

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -22,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "engine/gdal/source_policy.h"
@@ -41,7 +41,6 @@
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
 #include "server/cli/mesh/mesh_placement.h"
-#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -266,19 +265,19 @@ int Mesh(const MeshArguments& arguments) {
   if (!placement) return Fail(placement.error().message, kExitUsage);
   const auto field = tin::HeightField::Make(raster->width, raster->height, std::move(raster->heights));
   if (!field) return Fail(arguments.dem + ": " + field.error().message, kExitFailure);
-  seconds.read = tiler::SecondsSince(start);
+  seconds.read = SecondsSince(start);
 
   start = Clock::now();
   tin::TinMesh mesh = Triangulate(arguments, *field);
   // The run cannot be stopped.
   if (arguments.compact) mesh = *tin::DropVertices(*field, mesh, {.max_error = arguments.max_error});
-  seconds.triangulate = tiler::SecondsSince(start);
+  seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
   const Result<void> written =
       output->Write(VerticesOf(mesh, *field, *placement), TrianglesOf(mesh, *placement), placement->grid);
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = tiler::SecondsSince(start);
+  seconds.write = SecondsSince(start);
   Print(arguments, *field, mesh, tin::MeasureError(*field, mesh), seconds);
   ReportUnused(arguments.dem, arguments.points, mesh.vertices.size());
   return kExitOk;

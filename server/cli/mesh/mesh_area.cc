@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -18,6 +17,7 @@
 #include "config/config.h"
 #include "config/file/parse.h"
 #include "config/options/options.h"
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
 #include "proto/gltf/mesh_file.h"
@@ -29,7 +29,6 @@
 #include "server/cli/mesh/mesh_output.h"
 #include "server/handlers/handlers.h"
 #include "tiler/area/area_mesh.h"
-#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -132,18 +131,18 @@ int MeshArea(const AreaMeshArguments& arguments) {
   const Result<tiler::AreaPlan> plan = tiler::PlanArea(**source, dataset->error_fraction, *request,
                                                        std::size_t{std::numeric_limits<std::int64_t>::max()});
   if (!plan) return Fail(plan.error());
-  seconds.read = tiler::SecondsSince(start);
+  seconds.read = SecondsSince(start);
 
   start = Clock::now();
   const Result<tiler::EncodedTile> mesh = tiler::BuildAreaMesh(**source, *plan, *request, {});
   if (!mesh) return Fail(mesh.error().message, kExitFailure);
-  seconds.triangulate = tiler::SecondsSince(start);
+  seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
   if (const Result<void> written = output->Write(mesh->bytes); !written) {
     return Fail(written.error().message, kExitFailure);
   }
-  seconds.write = tiler::SecondsSince(start);
+  seconds.write = SecondsSince(start);
   Print(arguments, **source, *request, *plan, *mesh, seconds);
   return kExitOk;
 }

@@ -6,13 +6,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
 
+#include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/image/raster_colors.h"
 #include "engine/sources/read_raster.h"
@@ -24,7 +24,6 @@
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
 #include "server/cli/mesh/mesh_placement.h"
-#include "tiler/encoded_tile.h"
 
 namespace terrace::cli {
 namespace {
@@ -156,17 +155,17 @@ int MeshColored(const ColoredMeshArguments& arguments) {
   if (!source) return Fail(source.error().message, kExitFailure);
   const Result<Placement> placement = PlacementFor(arguments, *source);
   if (!placement) return Fail(placement.error().message, kExitUsage);
-  seconds.read = tiler::SecondsSince(start);
+  seconds.read = SecondsSince(start);
 
   start = Clock::now();
   const tin::ColoredMesh mesh = Triangulate(source->field, arguments.goal);
-  seconds.triangulate = tiler::SecondsSince(start);
+  seconds.triangulate = SecondsSince(start);
 
   start = Clock::now();
   const Result<void> written = output->Write(VerticesOf(mesh.tin, source->field.heights(), *placement),
                                              TrianglesOf(mesh.tin, *placement), placement->grid, mesh.colors);
   if (!written) return Fail(written.error().message, kExitFailure);
-  seconds.write = tiler::SecondsSince(start);
+  seconds.write = SecondsSince(start);
   Print(arguments, source->field, mesh, tin::MeasureExtendedError(source->field, mesh), seconds);
   if (arguments.goal.max_points != tin::ExtendedGoal{}.max_points) {
     ReportUnused(arguments.raster, arguments.goal.max_points, mesh.tin.vertices.size());

@@ -27,7 +27,7 @@
 #include "server/cli/serve/serve_run.h"
 #include "server/cli/serve/service_manager.h"
 #include "server/server.h"
-#include "tiler/build_id.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::cli {
 namespace {

@@ -117,7 +117,7 @@ TEST_F(TerrainEdits, HashTheTilesBelowATile) {
           bool is_deeper = false;
           for (int below = level + 1; below <= edited->max_level() && !is_deeper; ++below) {
             for (const geo::TileRange& of_level : edited->Available(below)) {
-              const geo::TileRange common = geo::Common(of_level, geo::TilesBelow(key, below));
+              const geo::TileRange common = geo::Intersection(of_level, geo::TilesBelow(key, below));
               is_deeper |= !geo::IsEmpty(common) && !plain->IsAvailable({below, common.start_x, common.start_y});
             }
           }

@@ -95,7 +95,7 @@ std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level) {
                            tile(bounds.north + 90)};
   std::vector<geo::TileRange> ranges;
   for (const geo::TileRange& range : source.Available(level)) {
-    if (const auto common = geo::Common(range, box); !geo::IsEmpty(common)) ranges.push_back(common);
+    if (const auto common = geo::Intersection(range, box); !geo::IsEmpty(common)) ranges.push_back(common);
   }
   return ranges;
 }

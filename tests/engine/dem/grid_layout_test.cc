@@ -116,7 +116,7 @@ class Pairs {
 
   static GridLayout Counted(const std::vector<LaidRaster>& group, const std::vector<PlacedRaster>& rasters) {
     geo::TileRange hull = PixelsOf(group.front(), rasters);
-    for (const LaidRaster& member : group) hull = geo::Hull(hull, PixelsOf(member, rasters));
+    for (const LaidRaster& member : group) hull = geo::BoundingRange(hull, PixelsOf(member, rasters));
     const std::int64_t turn = TurnOf(rasters[group.front().raster]);
     const bool around = turn > 0 && group.size() > 1 && hull.end_x - hull.start_x + 1 >= turn;
     if (around) {

@@ -9,11 +9,29 @@
 #include "proto/documents/height_png.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
-#include "tiler/coding.h"
-#include "tiler/encoders.h"
 #include "tiler/map/map_parameters.h"
+#include "tiler/tile/coding.h"
 
 namespace terrace::tiler {
+
+enum class TileFormat : std::uint8_t {
+  kQuantizedMesh,
+  kGlb,
+  kHeightPng,
+  // Tiles for maps, which archives do not have.
+  kHillshade,
+  kSlope,
+  kContours,
+  kImagery,
+  kGeodeticImagery
+};
+
+// Whether keys are in Web Mercator's XYZ scheme, y from the NORTH; else in TMS geodetic.
+constexpr bool IsMercator(TileFormat format) {
+  return format == TileFormat::kHeightPng || format == TileFormat::kHillshade || format == TileFormat::kSlope ||
+         format == TileFormat::kContours || format == TileFormat::kImagery;
+}
+constexpr bool IsForMaps(TileFormat format) { return format > TileFormat::kHeightPng; }
 
 // Pixels along an edge of a height tile or of a picture for maps; the first is the default.
 inline constexpr std::array<int, 2> kHeightSizes = {256, 512};

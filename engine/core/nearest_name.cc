@@ -1,11 +1,13 @@
-#include "config/common/nearest_name.h"
+#include "engine/core/nearest_name.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <numeric>
 #include <string>
 #include <vector>
 
-namespace terrace::config {
+namespace terrace {
 namespace {
 
 std::string Fold(std::string_view name) {
@@ -97,6 +99,12 @@ std::vector<std::string_view> NearestNames(std::string_view word, std::span<cons
 
 bool IsSameName(std::string_view a, std::string_view b) { return Fold(a) == Fold(b); }
 
+std::vector<std::string> Quoted(const std::vector<std::string_view>& names) {
+  std::vector<std::string> quoted;
+  for (const std::string_view name : names) quoted.push_back(fmt::format("\"{}\"", name));
+  return quoted;
+}
+
 std::string Alternatives(std::span<const std::string> names) {
   std::string text;
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -105,4 +113,8 @@ std::string Alternatives(std::span<const std::string> names) {
   return text;
 }
 
-}  // namespace terrace::config
+std::string DidYouMean(std::span<const std::string> names) {
+  return names.empty() ? "" : fmt::format("; did you mean {}?", Alternatives(names));
+}
+
+}  // namespace terrace

@@ -1,4 +1,4 @@
-#include "tiler/coding.h"
+#include "tiler/tile/coding.h"
 
 #include "proto/compress.h"
 

@@ -1,4 +1,4 @@
-#include "tiler/tile_bounds.h"
+#include "tiler/tile/tile_bounds.h"
 
 #include "engine/geo/mercator_grid.h"
 

@@ -1,4 +1,4 @@
-#include "config/common/nearest_name.h"
+#include "engine/core/nearest_name.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace terrace::config {
+namespace terrace {
 namespace {
 
 using testing::ElementsAre;
@@ -82,4 +82,4 @@ TEST(Alternatives, AreJoinedByOr) {
 }
 
 }  // namespace
-}  // namespace terrace::config
+}  // namespace terrace

@@ -1,4 +1,4 @@
-#include "tiler/tile_request.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 namespace {

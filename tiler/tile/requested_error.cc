@@ -1,4 +1,4 @@
-#include "tiler/requested_error.h"
+#include "tiler/tile/requested_error.h"
 
 #include <algorithm>
 #include <limits>

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "tiler/coding.h"
+#include "tiler/tile/coding.h"
 
 namespace terrace::tiler {
 

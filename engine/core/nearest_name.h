@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-namespace terrace::config {
+namespace terrace {
 
 struct KnownName {
   std::string_view name;              // "cache_bytes" or "--cache-bytes"
@@ -26,7 +26,12 @@ std::vector<std::string_view> NearestNames(std::string_view word, std::span<cons
 // Whether two names are equal apart from the differences that NearestNames ignores.
 bool IsSameName(std::string_view a, std::string_view b);
 
+std::vector<std::string> Quoted(const std::vector<std::string_view>& names);
+
 // "a", "a or b", "a, b or c".
 std::string Alternatives(std::span<const std::string> names);
 
-}  // namespace terrace::config
+// "; did you mean a, b or c?"; empty without names.
+std::string DidYouMean(std::span<const std::string> names);
+
+}  // namespace terrace

@@ -1,9 +1,9 @@
-#include "tiler/strong_etag.h"
+#include "tiler/tile/strong_etag.h"
 
 #include <fmt/format.h>
 #include <xxhash.h>
 
-#include "tiler/build_id.h"
+#include "tiler/tile/build_id.h"
 
 namespace terrace::tiler {
 

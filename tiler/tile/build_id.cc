@@ -1,4 +1,4 @@
-#include "tiler/build_id.h"
+#include "tiler/tile/build_id.h"
 
 #include <elf.h>
 #include <fmt/format.h>

@@ -16,13 +16,6 @@ struct StageTimes {
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 
-inline std::chrono::microseconds MicrosecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration_cast<std::chrono::microseconds>(std::chrono::steady_clock::now() - start);
-}
-inline double SecondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 // How a build used the refinement cache. kNone: the format has no mesh.
 enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
