@@ -46,14 +46,14 @@ std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
   }
 }
 
-// Where the bytes of a file wait until it is complete.
-struct WaitingPlace {
+// Where a file is until it is complete.
+struct TemporaryPlace {
   bool is_object;      // an object of a bucket: in the folder of temporary files
   std::string folder;  // else that of the file
   std::string name;    // of a file in the folder
 };
 
-WaitingPlace WaitingPlaceOf(const std::string& path) {
+TemporaryPlace TemporaryPlaceOf(const std::string& path) {
   if (!IsBucket(path)) {
     const std::string folder = std::filesystem::path(path).parent_path().string();
     return {false, folder.empty() ? "." : folder, path};
@@ -65,7 +65,7 @@ WaitingPlace WaitingPlaceOf(const std::string& path) {
 }
 
 // A nameless file. On file systems without nameless files it has a name for a moment. Below 0: errno says why.
-int CreateNameless(const WaitingPlace& place) {
+int CreateNameless(const TemporaryPlace& place) {
   int descriptor = ::open(place.folder.c_str(), O_RDWR | O_TMPFILE | O_CLOEXEC, kMode);
   if (descriptor >= 0) return descriptor;
   std::string partial;
@@ -74,7 +74,7 @@ int CreateNameless(const WaitingPlace& place) {
   return descriptor;
 }
 
-Result<void> MakeFolder(const WaitingPlace& place) {
+Result<void> MakeFolder(const TemporaryPlace& place) {
   std::error_code error;
   std::filesystem::create_directories(place.folder, error);
   if (error) return CannotWrite(place.folder, error.value());
@@ -84,7 +84,7 @@ Result<void> MakeFolder(const WaitingPlace& place) {
 }  // namespace
 
 struct OutputFile::Impl {
-  explicit Impl(const std::string& p) : path(p), place(WaitingPlaceOf(p)) {}
+  explicit Impl(const std::string& p) : path(p), place(TemporaryPlaceOf(p)) {}
   ~Impl() {
     if (descriptor < 0) return;
     ::close(descriptor);
@@ -100,7 +100,7 @@ struct OutputFile::Impl {
   }
 
   const std::string path;
-  const WaitingPlace place;
+  const TemporaryPlace place;
   std::string partial;  // of objects: the folder of the nameless file
   dem::ContentHasher hasher;
   int descriptor = -1;
@@ -162,7 +162,7 @@ Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {
   const auto open = [&] { return ::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, kMode); };
   int descriptor = open();
   if (descriptor < 0 && errno == ENOENT) {
-    if (Result<void> made = MakeFolder(WaitingPlaceOf(path)); !made) return made;
+    if (Result<void> made = MakeFolder(TemporaryPlaceOf(path)); !made) return made;
     descriptor = open();
   }
   if (descriptor < 0) return CannotWrite(path, errno);
@@ -182,7 +182,7 @@ SpoolFile::~SpoolFile() {
 }
 
 Result<SpoolFile> SpoolFile::Create(const std::string& path) {
-  const WaitingPlace place = WaitingPlaceOf(path);
+  const TemporaryPlace place = TemporaryPlaceOf(path);
   if (Result<void> made = MakeFolder(place); !made) return tl::unexpected(std::move(made.error()));
   const int descriptor = CreateNameless(place);
   if (descriptor < 0) return CannotWrite(path, errno);
