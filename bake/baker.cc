@@ -57,7 +57,7 @@ class Run {
     {
       const std::stop_callback wake(options_.stop, [this] {
         const std::lock_guard lock(mutex_);
-        changed_.notify_all();
+        TellOthers();
       });
       std::vector<std::jthread> threads;
       for (unsigned i = 0; i < options_.threads; ++i) threads.emplace_back([this] { Work(); });
@@ -79,6 +79,7 @@ class Run {
       if (own && own->parts.empty()) own = nullptr;
       UnitPtr unit = own;
       UnitQueue::Taken taken;
+      const std::uint64_t seen = changes_;
       if (!unit) {
         lock.unlock();
         taken = queue_.Take();
@@ -86,19 +87,19 @@ class Run {
         lock.lock();
         if (own) {
           open_.push_back(own);
-          changed_.notify_all();
+          TellOthers();
         }
         if (taken.state == UnitQueue::Taken::State::kUnit) continue;
         unit = UnitToHelp();
       }
       if (!unit) {
         if (taken.state == UnitQueue::Taken::State::kOver && open_.empty()) {
-          changed_.notify_all();  // the others need not wait
+          TellOthers();  // they need not wait
           return;
         }
         // A shared queue may hand out units again that other processes gave back; nothing notifies this one.
         constexpr std::chrono::milliseconds kPause{200};
-        changed_.wait_for(lock, kPause);
+        changed_.wait_for(lock, kPause, [&] { return changes_ != seen || options_.stop.stop_requested(); });
         continue;
       }
       // The owner begins at the front, helpers at the back: far from each other.
@@ -124,8 +125,14 @@ class Run {
       Close(*unit);
       lock.lock();
       open_.remove(unit);
-      changed_.notify_all();
+      TellOthers();
     }
+  }
+
+  // Wakes the threads that wait. The caller holds the lock.
+  void TellOthers() {
+    ++changes_;
+    changed_.notify_all();
   }
 
   UnitPtr UnitToHelp() const {
@@ -310,6 +317,7 @@ class Run {
 
   std::mutex mutex_;
   std::condition_variable changed_;
+  std::uint64_t changes_ = 0;  // so that none is missed between Take, which needs no lock, and waiting
   std::list<UnitPtr> open_;
   std::vector<std::vector<UnitReport>> reports_;  // by unit
 };

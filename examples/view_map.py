@@ -52,7 +52,7 @@ def main(dataset, out, place, eye="2", radius="0.15", side="301"):
     colour[visible] = (1, 0.35, 0, 0.55)
     axes.imshow(colour, extent=(box[0], box[2], box[1], box[3]), aspect=wide / radius)
     axes.plot(longitude, latitude, "c^", markersize=9)
-    axes.set_title(f"{100 * visible.sum() / (~unknown).sum():.1f} % of the map are seen from {eye} m above the ground at the triangle")
+    axes.set_title(f"{100 * visible.sum() / (~unknown).sum():.1f} % of the pixels with a height are seen from {eye} m above the ground at the triangle")
     figure.tight_layout()
     figure.savefig(out, dpi=80)
 

@@ -61,7 +61,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     admission.depends_on_token = admission_control.DependsOnToken(context_);
     if (row.takes_post()) {
       admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
-      admission.body_remedy = "the limit follows from max_locations of this server: send fewer points at once";
+      admission.body_remedy = "the limit follows from max_locations of this server: send fewer at once";
     }
     return admission;
   }

@@ -26,7 +26,9 @@ TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended"
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]
 CONFIG = ["config/common", "config", "config/input", "config/options", "config/file"]
-TILER = ["tiler/map", "tiler/mesh", "tiler/tile", "tiler/area", "tiler/store", "tiler/surface", "tiler"]
+TILER_OF = {"tiler/map": [], "tiler/mesh": [], "tiler/tile": ["tiler/map"], "tiler/area": ["tiler/map", "tiler/tile", "tiler/mesh"],
+            "tiler/store": ["tiler/map", "tiler/tile"], "tiler/surface": ["tiler/map", "tiler/tile", "tiler/mesh", "tiler/store"]}
+TILER = [*TILER_OF, "tiler"]
 ENGINE = GEOMETRY + ["engine/dem"] + PROTO + ["config"] + TILER + ["archive", "server/asio"]
 ARCHIVE = ["archive/files", "archive/pmtiles", "archive"]
 # Modules of elevation models: each may include those before it.
@@ -62,7 +64,7 @@ MODULES = {
     "proto": GEOMETRY,
     **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
     **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
-    **{room: GEOMETRY + ["engine/dem"] + PROTO + TILER[:i] for i, room in enumerate(TILER)},
+    **{room: GEOMETRY + ["engine/dem"] + PROTO + others for room, others in {**TILER_OF, "tiler": [*TILER_OF]}.items()},
     "archive/files": ["engine/core", "engine/dem"] + PROTO,
     "archive/pmtiles": ["engine/core", "engine/dem"] + PROTO + TILER + ["archive/files"],
     "archive": GEOMETRY + ["engine/dem"] + PROTO + TILER + ARCHIVE[:2],

@@ -49,7 +49,7 @@ std::pair<int, std::string> CreatePartial(const std::string& path, int access) {
 // Where a file is until it is complete.
 struct TemporaryPlace {
   bool is_object;      // an object of a bucket: in the folder of temporary files
-  std::string folder;  // else that of the file
+  std::string folder;  // of temporary files for objects; else the file's own
   std::string name;    // of a file in the folder
 };
 

@@ -53,7 +53,7 @@ bool LooksLikeEdit(const json& properties) {
   return std::ranges::any_of(kKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
 }
 
-// `; did you mean "..."?` with the nearest of the names; empty if none is near.
+// `; did you mean "..."?` with the names that may be meant; empty if there are none.
 template <typename Names>
 std::string NearestOf(std::string_view word, const Names& names) {
   std::vector<KnownName> known;

@@ -139,14 +139,15 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
 }
 
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area) {
-  if (grid.epsg == kWgs84) return area;
-  const double east = area.east < area.west ? area.east + 360 : area.east;
+  if (grid.is_geographic) return area;  // datum shifts are far smaller than what a bbox needs
+  // The edges of an area across the antimeridian or around a pole do not bound it.
+  if (area.east < area.west || area.south <= -90 || area.north >= 90) return std::nullopt;
   std::vector<Position> edge;
   constexpr int kSteps = 32;
   for (int i = 0; i <= kSteps; ++i) {
     const double along = static_cast<double>(i) / kSteps;
-    const double x = std::lerp(area.west, east, along), y = std::lerp(area.south, area.north, along);
-    for (const Position& on_edge : {Position{x, area.south}, {x, area.north}, {area.west, y}, {east, y}}) {
+    const double x = std::lerp(area.west, area.east, along), y = std::lerp(area.south, area.north, along);
+    for (const Position& on_edge : {Position{x, area.south}, {x, area.north}, {area.west, y}, {area.east, y}}) {
       edge.push_back(on_edge);
     }
   }

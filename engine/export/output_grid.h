@@ -45,7 +45,8 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
 Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
                                              const std::stop_token& stop);
 
-// The smallest box around `area` in the CRS of the grid, for messages; nothing: a part of the area has no place there.
+// A box around `area` in the CRS of the grid, for messages: `area` itself in degrees, without shifts between datums;
+// else the smallest. Nothing: a part of the area has no place there, or it contains a pole or the antimeridian.
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
 // A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL

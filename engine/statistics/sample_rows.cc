@@ -43,7 +43,7 @@ HWY_INLINE V Larger(V worst, V average, V step, V weight, V sample) {
   return hn::IfThenElse(hn::Gt(distance, worst), distance, worst);
 }
 
-// Vectors of as many runs. Returns how many runs were measured.
+// One lane for each run. Returns how many runs were measured.
 template <class D>
 HWY_INLINE std::size_t MeasureShort(D d, const SampleRuns& runs, hn::Vec<D>& worst) {
   const hn::Rebind<float, D> f;

@@ -1,4 +1,5 @@
 // Statistics of rows of samples, in vectors. Results have the same bits on every set of instructions.
+// Samples are never -0.
 #pragma once
 
 #include <cstdint>

@@ -7,8 +7,10 @@ namespace {
 constexpr MediaNote kDatasetsReplies[] = {{"application/json", "Datasets"}};
 constexpr ExampleRequest kDatasetsExamples[] = {{"/datasets"}};
 
-constexpr ParameterNote kIgnoredExtensionsNote{
-    "extensions", "Accepted and ignored: clients append it. May be repeated.", R"({"type":"string"})"};
+constexpr ParameterNote kIgnoredExtensionsNote{"extensions",
+                                               "Accepted and ignored: clients append it. May be repeated. Other words "
+                                               "than the known extensions make the reply private.",
+                                               R"({"type":"string"})"};
 constexpr ParameterNote kLayerParameters[] = {kErrorNote, kFractionNote, kIgnoredExtensionsNote};
 constexpr MediaNote kLayerReplies[] = {{"application/json", "Layer"}};
 constexpr ExampleRequest kLayerExamples[] = {{"/jacksboro/layer.json"},

@@ -25,10 +25,12 @@ bool HasMediaType(std::string_view content_type, std::string_view type) {
 bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
 bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
 
-// Printable ASCII, tabs and ends of lines, which is all that forms have.
+// Without control characters; forms may have bytes of UTF-8. Floats nearly always have some.
 bool IsText(std::string_view body) {
-  return std::all_of(body.begin(), body.end(),
-                     [](char c) { return (c >= ' ' && c <= '~') || c == '\t' || c == '\r' || c == '\n'; });
+  return std::none_of(body.begin(), body.end(), [](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    return (byte < ' ' && c != '\t' && c != '\r' && c != '\n') || byte == 0x7F;
+  });
 }
 
 // Longitude and latitude of each point as 64-bit floats.

@@ -103,7 +103,7 @@ describe('vertical datums', () => {
   });
 
   it('logs the operation and the lack of one', () => {
-    assert.match(server.log(), /heights count from EGM96 height, made ellipsoidal by PROJ operation/);
+    assert.match(server.log(), /heights are above EGM96 height, converted to the ellipsoid by PROJ operation/);
     assert.match(server.log(), /no vertical datum stated/);
   });
 

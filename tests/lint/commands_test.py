@@ -52,7 +52,7 @@ class Commands(unittest.TestCase):
             urls = {(match.group(1).rstrip(".,;"), page.relative_to(ROOT)) for page in pages() for match in URL.finditer(page.read_text())}
             wrong, total = [], 0
             for url, page in sorted(urls):
-                if OTHER_DATA.match(url) or "[" in url:
+                if OTHER_DATA.match(url) or "[" in url or "$" in url:
                     continue
                 total += 1
                 try:

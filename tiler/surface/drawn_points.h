@@ -1,4 +1,4 @@
-// Heights as drawn: of the mesh that a client decodes at some level and error.
+// Heights of points, of the sources or as drawn: of the mesh that a client decodes at some level and error.
 #pragma once
 
 #include <array>

@@ -86,7 +86,7 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   }
   if (info.void_samples > 0) {
     advice.push_back(
-        fmt::format("voids: small ones are filled from their edges, larger ones with data all around them with a "
+        fmt::format("voids: small ones are filled from their edges, larger ones that have data all around them get a "
                     "smooth surface; those that touch the rim of the raster show the floor of {} m",
                     PlainNumber(floor)));
   }

@@ -212,6 +212,15 @@ TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
   ASSERT_TRUE(degrees);
   EXPECT_EQ(degrees->unit, "degree");
   EXPECT_EQ(dem::BoundsInCrs(*degrees, {8, 46, 10, 47})->east, 10);
+  // Across the antimeridian: as a bbox takes it, and nothing in metres.
+  const auto etrs = dem::PlanOutputGrid({4258, 1, 2, 3, 4, 5, 5, {}}, 100);
+  ASSERT_TRUE(etrs);
+  EXPECT_EQ(dem::BoundsInCrs(*etrs, {170, 0, -170, 10})->east, -170);
+  const auto mercator = dem::PlanOutputGrid({3857, 0, 0, 1000, 1000, 5, 5, {}}, 100);
+  ASSERT_TRUE(mercator);
+  EXPECT_FALSE(dem::BoundsInCrs(*mercator, {170, 0, -170, 10}));
+  EXPECT_FALSE(dem::BoundsInCrs(*mercator, {-180, -90, 180, 90}));
+  EXPECT_NEAR(dem::BoundsInCrs(*mercator, {-180, -60, 180, 60})->east, 20037508.34, 0.01);
 }
 
 TEST(SightQuery, ReadsOneRayAndMany) {
