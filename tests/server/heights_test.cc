@@ -155,7 +155,7 @@ TEST_F(HeightsTest, RefusesBodiesThatAreTooLarge) {
     EXPECT_EQ(reply->status, 413) << length;
     EXPECT_NE(
         reply->body.find(std::string(length) + " bytes, more than the 4736 that this URL takes; the limit follows "
-                                               "from max_locations of this server: send fewer points at once"),
+                                               "from max_locations of this server: send fewer at once"),
         std::string::npos)
         << reply->body;
     EXPECT_EQ(reply->Field("connection"), "close");
