@@ -1,5 +1,6 @@
 #include "engine/statistics/sample_rows.h"
 
+#include <algorithm>
 #include <cmath>
 
 #undef HWY_TARGET_INCLUDE
@@ -14,6 +15,14 @@ namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+// Calls step(lane) for each lane. Highway's reductions are not exact for infinities with every compiler.
+template <class D, class Step>
+void ForLanes(D d, hn::Vec<D> v, const Step& step) {
+  HWY_ALIGN hn::TFromD<D> lanes[hn::MaxLanes(d)];
+  hn::Store(v, d, lanes);
+  for (std::size_t i = 0; i < hn::Lanes(d); ++i) step(lanes[i]);
+}
+
 std::int64_t AddTo(std::span<const float> samples, BlockRange& range) {
   const hn::CappedTag<float, 16> d;
   const std::size_t lanes = hn::Lanes(d);
@@ -25,12 +34,12 @@ std::int64_t AddTo(std::span<const float> samples, BlockRange& range) {
     least = hn::IfThenElse(hn::Lt(height, least), height, least);  // never a void
     most = hn::IfThenElse(hn::Gt(height, most), height, most);
   }
-  range.min = hn::GetLane(hn::MinOfLanes(d, least));
-  range.max = hn::GetLane(hn::MaxOfLanes(d, most));
+  ForLanes(d, least, [&](float height) { range.min = std::min(range.min, height); });
+  ForLanes(d, most, [&](float height) { range.max = std::max(range.max, height); });
   for (; i < samples.size(); ++i) {
     if (std::isnan(samples[i])) continue;
-    range.min = samples[i] < range.min ? samples[i] : range.min;
-    range.max = samples[i] > range.max ? samples[i] : range.max;
+    range.min = std::min(range.min, samples[i]);
+    range.max = std::max(range.max, samples[i]);
     ++valid;
   }
   range.has_voids |= valid < samples.size();
@@ -89,7 +98,8 @@ double Largest(const SampleRuns& runs) {
       }
     }
   }
-  double largest = hn::GetLane(hn::MaxOfLanes(d, worst));
+  double largest = 0;
+  ForLanes(d, worst, [&](double distance) { largest = std::max(largest, distance); });
   for (; i < runs.runs; ++i) {
     const double average = runs.averages[i], step = runs.averages[i + 1] - average;
     for (std::size_t k = 0; k < length; ++k) {
