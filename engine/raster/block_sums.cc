@@ -44,29 +44,6 @@ void AddPairs(const float* samples, double weight, std::span<BlockSum> sums) {
   }
 }
 
-void AddFours(const float* samples, double weight, std::span<BlockSum> sums) {
-  const hn::CappedTag<double, 8> d;
-  const hn::Rebind<float, decltype(d)> f;
-  using F = decltype(f);
-  const std::size_t lanes = hn::Lanes(d);
-  const auto weight_of = hn::Set(d, weight);
-  std::size_t i = 0;
-  for (; i + lanes <= sums.size(); i += lanes) {
-    hn::Vec<decltype(d)> sum, weights;
-    hn::Vec<F> first, second, third, fourth;
-    hn::LoadInterleaved2(d, &sums[i].sum, sum, weights);
-    hn::LoadInterleaved4(f, samples + 4 * i, first, second, third, fourth);
-    AddSamples<decltype(d), F>(d, first, weight_of, sum, weights);
-    AddSamples<decltype(d), F>(d, second, weight_of, sum, weights);
-    AddSamples<decltype(d), F>(d, third, weight_of, sum, weights);
-    AddSamples<decltype(d), F>(d, fourth, weight_of, sum, weights);
-    hn::StoreInterleaved2(sum, weights, d, &sums[i].sum);
-  }
-  for (; i < sums.size(); ++i) {
-    for (std::size_t k = 0; k < 4; ++k) sums[i].Add(samples[4 * i + k], weight);
-  }
-}
-
 // Blocks of a multiple of 4 samples: vectors of 4 blocks, whose samples are transposed, 4 of each at a time.
 void AddBlocks(const float* samples, std::size_t block, double weight, std::span<BlockSum> sums) {
   std::size_t i = 0;
@@ -105,16 +82,13 @@ void Take(std::span<BlockSum> sums, float* means) {
   const hn::CappedTag<double, 8> d;
   const hn::Rebind<float, decltype(d)> f;
   const std::size_t lanes = hn::Lanes(d);
-  const auto zero = hn::Zero(d), one = hn::Set(d, 1.0);
-  const auto none = hn::Set(f, SampleRules::kVoid);
+  const auto zero = hn::Zero(d), none = hn::Set(d, double{SampleRules::kVoid});
   std::size_t i = 0;
   for (; i + lanes <= sums.size(); i += lanes) {
     hn::Vec<decltype(d)> sum, weights;
     hn::LoadInterleaved2(d, &sums[i].sum, sum, weights);
-    const auto is_void = hn::Eq(weights, zero);
-    const auto mean = hn::DemoteTo(f, hn::Div(sum, hn::IfThenElse(is_void, one, weights)));
-    const auto voids = hn::Eq(hn::DemoteTo(f, weights), hn::Zero(f));
-    hn::StoreU(hn::IfThenElse(voids, none, mean), f, means + i);
+    const auto mean = hn::IfThenElse(hn::Eq(weights, zero), none, hn::Div(sum, weights));
+    hn::StoreU(hn::DemoteTo(f, mean), f, means + i);
     hn::StoreInterleaved2(zero, zero, d, &sums[i].sum);
   }
   for (; i < sums.size(); ++i) {
@@ -133,7 +107,6 @@ namespace terrace::dem {
 namespace {
 
 HWY_EXPORT(AddPairs);
-HWY_EXPORT(AddFours);
 HWY_EXPORT(AddBlocks);
 HWY_EXPORT(Take);
 
@@ -141,7 +114,6 @@ HWY_EXPORT(Take);
 
 void AddRowOfBlocks(const float* samples, int block, double weight, std::span<BlockSum> sums) {
   if (block == 2) return HWY_DYNAMIC_DISPATCH(AddPairs)(samples, weight, sums);
-  if (block == 4) return HWY_DYNAMIC_DISPATCH(AddFours)(samples, weight, sums);
   if (block % 4 == 0) return HWY_DYNAMIC_DISPATCH(AddBlocks)(samples, static_cast<std::size_t>(block), weight, sums);
   for (BlockSum& to : sums) {
     BlockSum sum = to;
