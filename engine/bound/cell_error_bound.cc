@@ -41,6 +41,12 @@ class CellSurface {
   // Adds to the uncertainty of the samples' heights, in metres.
   void Widen(double error) { widened_ += error; }
 
+  // An upper bound of the distance between a sample and the surface, wherever the sample lies.
+  double DistanceBound(double sample) const {
+    const auto [lowest, highest] = std::minmax_element(heights_.begin(), heights_.end());
+    return std::max(*highest - sample, sample - *lowest) + widened_;
+  }
+
   // An upper bound of the distance between a sample and the surface; 0 if the position is outside the cell.
   double DistanceBound(const Position& at, double sample) const {
     double u = 0.5, v = 0.5, u_slack = std::numeric_limits<double>::infinity(), v_slack = u_slack;
@@ -60,8 +66,7 @@ class CellSurface {
       u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
       v_slack = (std::abs(uy) * x + std::abs(ux) * y) * scale;
     }
-    const auto [lowest, highest] = std::minmax_element(heights_.begin(), heights_.end());
-    const double anywhere = std::max(*highest - sample, sample - *lowest) + widened_;
+    const double anywhere = DistanceBound(sample);
     if (!(u_slack < 1 && v_slack < 1)) return anywhere;  // also where it did not converge
     if (u < -u_slack || u > 1 + u_slack || v < -v_slack || v > 1 + v_slack) return 0;
     const double south = heights_[0] + u * (heights_[1] - heights_[0]);
@@ -262,7 +267,7 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
   return true;
 }
 
-double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
+double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
                                            std::optional<CellSamples>& cell_samples) const {
   const HeightRange& all = grid_.heights();
   const auto corners = CornersOf(cell);
@@ -299,13 +304,13 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;
     error = std::min(error, BoundBySamples(cell, *cell_samples, trace_.window, trace_.samples,
-                                           turn * static_cast<std::int64_t>(grid_.columns())));
+                                           turn * static_cast<std::int64_t>(grid_.columns()), known));
   }
   return error;
 }
 
 double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
-                                      const std::vector<float>& samples, std::int64_t turn) const {
+                                      const std::vector<float>& samples, std::int64_t turn, double known) const {
   const SampleBox& in = cell_samples.samples;
   if (in.empty()) return 0;
   if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
@@ -334,7 +339,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
       const double sample = line[column];
       if (std::isnan(sample)) continue;
       lowest = std::min(lowest, sample), highest = std::max(highest, sample);
-      if (cell_samples.between) continue;
+      if (cell_samples.between || surface.DistanceBound(sample) <= std::max(error, known)) continue;
       error = std::max(
           error, surface.DistanceBound({static_cast<double>(column) + 0.5, static_cast<double>(row) + 0.5}, sample));
     }

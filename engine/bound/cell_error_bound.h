@@ -59,19 +59,20 @@ class CellErrorBound {
   };
 
   // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
-  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
-  // `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
-  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills,
+  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. A bound not
+  // above `known` need not be tight. Sets `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
+  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
                              std::optional<CellSamples>& cell_samples) const;
 
   // Whether BoundBySurroundings returns 0 for every cell of a box, because all samples around them are voids, as on the
   // sea. Precondition: nothing is blended. False does not mean the contrary.
   bool HasNoSamples(const CellBox& box) const;
 
-  // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `turn`: offset of
-  // the window's columns against the cell's, in columns.
+  // Returns a bound from the samples in the cell that could have one above `known`; at most `known` if there are none.
+  // Infinite if some samples lie outside the window. `turn`: offset of the window's columns against the cell's, in
+  // columns.
   double BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
-                        const std::vector<float>& samples, std::int64_t turn) const;
+                        const std::vector<float>& samples, std::int64_t turn, double known) const;
 
  private:
   std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;

@@ -26,11 +26,11 @@ class LooseCells {
   // The arguments must outlive this.
   LooseCells(const RasterGrid& grid, const CellErrorBound& single) : grid_(grid), single_(single) {}
 
-  // Cells of a group are adjacent; their samples are read together.
-  void BeginGroup() { groups_.emplace_back(); }
-
-  // `error`: the known bound of the cell. Precondition: a group has begun.
+  // `error`: the known bound of the cell. The samples of successive cells of one group are read together.
   void Add(const TileCell& cell, const CellErrorBound::CellSamples& cell_samples, double error) {
+    constexpr int kGroup = SourceErrorBound::kGroup;
+    const auto group_of = [](const TileCell& of) { return std::pair(of.i / kGroup, of.j / kGroup); };
+    if (groups_.empty() || group_of(groups_.back().cells.front().cell) != group_of(cell)) groups_.emplace_back();
     groups_.back().cells.push_back({cell, cell_samples, error});
     groups_.back().error = std::max(groups_.back().error, error);
   }
@@ -60,8 +60,8 @@ class LooseCells {
       if (!samples) return tl::unexpected(samples.error());
       for (const Cell& loose : group.cells) {
         if (loose.error <= bound) continue;
-        bound = std::max(
-            bound, std::min(loose.error, single_.BoundBySamples(loose.cell, loose.cell_samples, window, *samples, 0)));
+        const double error = single_.BoundBySamples(loose.cell, loose.cell_samples, window, *samples, 0, bound);
+        bound = std::max(bound, std::min(loose.error, error));
       }
     }
     return {};
@@ -85,7 +85,8 @@ class LooseCells {
 
 }  // namespace
 
-// The bound for one raster grid: by groups of cells, and by single cells of groups that cannot be bounded as a whole.
+// The bound for one raster grid: by groups of cells, then by quarters of the groups that cannot be bounded as a whole,
+// and so on down to single cells. Large boxes come first, because cells below the bound known by then need no work.
 class GridErrorBound {
  public:
   GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridTrace& trace)
@@ -115,6 +116,8 @@ class GridErrorBound {
         AddGroup({west, south, std::min(west + kGroup, cells), std::min(south + kGroup, cells)});
       }
     }
+    // Dividing adds smaller boxes to the end.
+    for (std::size_t k = 0; k < uneven_.size(); ++k) Divide(uneven_[k].box, uneven_[k].may_blend);
     return loose_.Read(tile_.bound_, stop);
   }
 
@@ -205,12 +208,11 @@ class GridErrorBound {
   void AddGroup(const CellBox& box) {
     if (IsCovered(box) || !Touches(box)) return;
     Prepare(box);
-    has_loose_group_ = false;
     AddBox(box, true);
   }
 
-  // Bounds the box as a whole if possible; else its quarters, down to single cells. `may_give_way`: false if the box
-  // that this is a quarter of has no blended heights.
+  // Bounds the box as a whole if possible; else it is divided later. `may_give_way`: false if the box that this is a
+  // quarter of has no blended heights.
   void AddBox(const CellBox& box, bool may_give_way) {
     if (!Touches(box)) return;
     const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
@@ -218,7 +220,8 @@ class GridErrorBound {
     const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
     if (!std::isfinite(error)) {
       if (!tile_.blends_ && HasNoHeights(box) && single_.HasNoSamples(box)) return;
-      return Divide(box, may_blend);
+      uneven_.push_back({box, may_blend});
+      return;
     }
     Raise(error);
     if (may_blend) return;
@@ -239,7 +242,8 @@ class GridErrorBound {
     return true;
   }
 
-  void Divide(const CellBox& box, bool may_blend) {
+  // By value: AddBox may move the boxes.
+  void Divide(CellBox box, bool may_blend) {
     constexpr int kSmallest = 2;
     if (box.east - box.west <= kSmallest) {
       for (int j = box.south; j < box.north; ++j) {
@@ -267,13 +271,10 @@ class GridErrorBound {
     bool has_voids = false;
     double error = single_.BoundByAverages(cell, has_voids);
     if (fills && (has_voids || MayBeFilled(cell.box()))) return AddUneven(cell, true, true, kUnknownError);
-    double smooth = kUnknownError;
-    if (!has_voids) {
-      if (!may_blend) tile_.covered_[CellIndex(i, j)] = 1;
-      smooth = smooth_.BoundOver(cell.box());
-      if (smooth < error) error = smooth;
-    }
-    if (std::isfinite(smooth)) return Raise(error);
+    if (!has_voids && !may_blend) tile_.covered_[CellIndex(i, j)] = 1;
+    if (error <= tile_.bound_) return;
+    const double smooth = has_voids ? kUnknownError : smooth_.BoundOver(cell.box());
+    if (std::isfinite(smooth)) return Raise(std::min(smooth, error));
     AddUneven(cell, may_blend, fills, error);
   }
 
@@ -281,11 +282,10 @@ class GridErrorBound {
   void AddUneven(const TileCell& cell, bool may_blend, bool fills, double known) {
     if (known <= tile_.bound_) return;
     std::optional<CellErrorBound::CellSamples> cell_samples;
-    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, cell_samples));
+    const double error =
+        std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, tile_.bound_, cell_samples));
     if (error <= tile_.bound_) return;
     if (!cell_samples || !LooseCells::MayRead(trace_.factor)) return Raise(error);
-    if (!has_loose_group_) loose_.BeginGroup();
-    has_loose_group_ = true;
     loose_.Add(cell, *cell_samples, error);
   }
 
@@ -299,7 +299,11 @@ class GridErrorBound {
   const CellErrorBound single_;
   LooseCells loose_;
   int prepared_south_ = -1, prepared_north_ = -1;  // of smooth_
-  bool has_loose_group_ = false;                   // the current group
+  struct UnevenBox {
+    CellBox box;
+    bool may_blend;
+  };
+  std::vector<UnevenBox> uneven_;  // not bounded as a whole
 };
 
 SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,
