@@ -11,6 +11,7 @@
 #include "engine/crs/node_positions.h"
 #include "engine/mosaic/feather_weights.h"
 #include "engine/mosaic/void_fill.h"
+#include "engine/mosaic/window_values.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/node_rows.h"
 
@@ -48,19 +49,6 @@ void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> w
   trace.heights.resize(wanted.size());
   for (std::size_t n = 0; n < wanted.size(); ++n) {
     trace.heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
-  }
-}
-
-std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::int64_t row) {
-  return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
-}
-
-// Copies a part into the window that it lies in.
-void CopyInto(const std::vector<float>& part, const GridWindow& at, const GridWindow& window,
-              std::vector<float>& heights) {
-  for (std::int64_t row = 0; row < at.rows; ++row) {
-    const auto to = static_cast<std::ptrdiff_t>(IndexIn(window, at.column, at.row + row));
-    std::copy_n(part.begin() + row * at.columns, at.columns, heights.begin() + to);
   }
 }
 
