@@ -18,50 +18,28 @@ double ChordError(double length) { return length < 1 ? length / 4 : (length * le
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-// A row of averages with its neighbours, null where they lie outside the range. First and second differences of the
-// average in column c, to the east (X) and to the south (Y).
-struct Row {
-  const float *above, *here, *below;
-
-  float X(std::size_t c) const { return here[c + 1] - here[c]; }
-  float XX(std::size_t c) const { return here[c + 2] - here[c + 1] - (here[c + 1] - here[c]); }
-  float Y(std::size_t c) const { return below[c] - here[c]; }
-  float YY(std::size_t c) const { return below[c] - here[c] - (here[c] - above[c]); }
-  float XY(std::size_t c) const { return here[c + 1] - here[c] - (below[c + 1] - below[c]); }
-};
-
-// Several independent running maxima, so that the compiler can vectorize.
-class Lanes {
- public:
-  // The largest |value(i)| for i in 0 .. count - 1; ignores NaN.
-  template <typename Value>
-  void Raise(std::size_t count, const Value& value) {
-    ForEach(count, [&](std::size_t lane, std::size_t i) {
-      const float size = std::abs(value(i));
-      lanes_[lane] = size > lanes_[lane] ? size : lanes_[lane];
-    });
+// In several independent lanes, so that the compiler can vectorize.
+template <typename Step>
+std::array<float, 8> InLanes(const float* values, std::size_t count, const Step& step) {
+  std::array<float, 8> lanes{};
+  std::size_t i = 0;
+  for (; i + lanes.size() <= count; i += lanes.size()) {
+    for (std::size_t lane = 0; lane < lanes.size(); ++lane) lanes[lane] = step(lanes[lane], values[i + lane]);
   }
-  template <typename Value>
-  void Add(std::size_t count, const Value& value) {
-    ForEach(count, [&](std::size_t lane, std::size_t i) { lanes_[lane] += value(i); });
-  }
-  float Largest() const { return *std::ranges::max_element(lanes_); }
-  float Sum() const { return std::accumulate(lanes_.begin(), lanes_.end(), 0.0f); }
+  for (; i < count; ++i) lanes[i % lanes.size()] = step(lanes[i % lanes.size()], values[i]);
+  return lanes;
+}
 
- private:
-  static constexpr std::size_t kLanes = 8;
+// The largest of values that are 0 or greater.
+float Largest(const float* values, std::size_t count) {
+  const auto lanes = InLanes(values, count, [](float known, float value) { return value > known ? value : known; });
+  return *std::ranges::max_element(lanes);
+}
 
-  template <typename Step>
-  static void ForEach(std::size_t count, const Step& step) {
-    std::size_t i = 0;
-    for (; i + kLanes <= count; i += kLanes) {
-      for (std::size_t lane = 0; lane < kLanes; ++lane) step(lane, i + lane);
-    }
-    for (; i < count; ++i) step(i % kLanes, i);
-  }
-
-  std::array<float, kLanes> lanes_{};
-};
+float Sum(const float* values, std::size_t count) {
+  const auto lanes = InLanes(values, count, [](float known, float value) { return known + value; });
+  return std::accumulate(lanes.begin(), lanes.end(), 0.0f);
+}
 
 }  // namespace
 
@@ -222,7 +200,7 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBo
   return std::isfinite(finite);
 }
 
-double SmoothErrorBound::BoundOver(const CellBox& box) const {
+double SmoothErrorBound::BoundOver(const CellBox& box) {
   NodeSteps steps;
   PixelBounds at;
   if (!Measure(box, steps, at)) return kUnknown;
@@ -247,48 +225,28 @@ SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const
           std::min(range.bottom, window.row + window.rows - 1)};
 }
 
-bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) const {
+bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) {
   const SampleRange in = Clipped(range);
-  constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
-  if (in.top == band_.top && in.bottom == band_.bottom) {
-    const auto first = static_cast<std::size_t>(in.left - trace_.window.column);
-    const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
-    const auto largest = [&](const std::vector<float>& of_column, std::size_t count) {
-      Lanes lanes;
-      lanes.Raise(count, [&](std::size_t c) { return of_column[first + c]; });
-      return lanes.Largest() * kUp;
-    };
-    Lanes sum;
-    sum.Add(columns, [&](std::size_t c) { return band_.sum[first + c]; });
-    bends = {largest(band_.x, columns - 1), largest(band_.y, columns), largest(band_.xx, columns > 2 ? columns - 2 : 0),
-             largest(band_.yy, columns), largest(band_.xy, columns - 1)};
-    return std::isfinite(sum.Sum());
-  }
+  const bool is_in_band = in.top == band_.top && in.bottom == band_.bottom;
+  if (!is_in_band) MeasureColumns(in, box_);
+  const ColumnBends& of_column = is_in_band ? band_ : box_;
+  const auto first = static_cast<std::size_t>(is_in_band ? in.left - trace_.window.column : 0);
   const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
-  Lanes x, y, xx, yy, xy, sum;
-  ForRows(in, [&](const Row& row) {
-    sum.Add(columns, [&](std::size_t c) { return row.here[c]; });
-    x.Raise(columns - 1, [&](std::size_t c) { return row.X(c); });
-    if (columns > 2) xx.Raise(columns - 2, [&](std::size_t c) { return row.XX(c); });
-    if (row.below == nullptr) return;
-    y.Raise(columns, [&](std::size_t c) { return row.Y(c); });
-    xy.Raise(columns - 1, [&](std::size_t c) { return row.XY(c); });
-    if (row.above != nullptr) yy.Raise(columns, [&](std::size_t c) { return row.YY(c); });
-  });
-  bends = {x.Largest() * kUp, y.Largest() * kUp, xx.Largest() * kUp, yy.Largest() * kUp, xy.Largest() * kUp};
-  return std::isfinite(sum.Sum());
+  const auto largest = [&](const std::vector<float>& values, std::size_t count) {
+    constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
+    return dem::Largest(values.data() + first, count) * kUp;
+  };
+  bends = {largest(of_column.x, columns - 1), largest(of_column.y, columns),
+           largest(of_column.xx, columns > 2 ? columns - 2 : 0), largest(of_column.yy, columns),
+           largest(of_column.xy, columns - 1)};
+  return std::isfinite(Sum(of_column.sum.data() + first, columns));
 }
 
-// Calls step(row) for all rows of the range.
-template <typename Step>
-void SmoothErrorBound::ForRows(const SampleRange& range, const Step& step) const {
+void SmoothErrorBound::MeasureColumns(const SampleRange& range, ColumnBends& bends) const {
   const GridWindow& window = trace_.window;
-  for (std::int64_t row = range.top; row <= range.bottom; ++row) {
-    const float* const here =
-        trace_.samples.data() + (row - window.row) * window.columns + (range.left - window.column);
-    step(Row{row == range.top ? nullptr : here - window.columns, here,
-             row == range.bottom ? nullptr : here + window.columns});
-  }
+  bends.Resize(static_cast<std::size_t>(range.right - range.left + 1));
+  MeasureBends(trace_.samples.data() + (range.top - window.row) * window.columns + (range.left - window.column),
+               static_cast<std::size_t>(window.columns), static_cast<std::size_t>(range.bottom - range.top + 1), bends);
 }
 
 // All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
@@ -311,8 +269,7 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
   range.left = window.column, range.right = window.column + window.columns - 1;
   range = Clipped(range);
   band_.top = range.top, band_.bottom = range.bottom;
-  band_.Reset(static_cast<std::size_t>(window.columns));
-  ForRows(range, [&](const Row& row) { AddRow(row.above, row.here, row.below, band_); });
+  MeasureColumns(range, band_);
 }
 
 }  // namespace terrace::dem

@@ -7,10 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "engine/bound/column_bends.h"
 #include "engine/bound/geoid_error_bound.h"
 #include "engine/bound/grid_statistics.h"
 #include "engine/bound/node_steps.h"
-#include "engine/bound/row_bends.h"
 #include "engine/bound/tile_cells.h"
 #include "engine/mosaic/raster_grid.h"
 
@@ -27,7 +27,7 @@ class SmoothErrorBound {
 
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
   // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
-  double BoundOver(const CellBox& box) const;
+  double BoundOver(const CellBox& box);
 
   // Returns the bounds of the box's nodes, in averages; empty if one of them is not evenly spaced.
   PixelBounds BoundsOf(const CellBox& box) const;
@@ -49,9 +49,8 @@ class SmoothErrorBound {
   SampleRange RangeOf(const PixelBounds& at) const;
   SampleRange Clipped(SampleRange range) const;
   // Returns false if one of the averages is void.
-  bool Measure(const SampleRange& range, Bends& bends) const;
-  template <typename Step>
-  void ForRows(const SampleRange& range, const Step& step) const;
+  bool Measure(const SampleRange& range, Bends& bends);
+  void MeasureColumns(const SampleRange& range, ColumnBends& bends) const;
   static double Largest(const Bends& bends, const NodeSteps& steps);
   double LargestBlend(const CellBox& box) const;
 
@@ -71,6 +70,7 @@ class SmoothErrorBound {
     std::int64_t top = 0, bottom = -1;
   };
   Band band_;
+  ColumnBends box_;  // of the box that was measured last
 };
 
 }  // namespace terrace::dem

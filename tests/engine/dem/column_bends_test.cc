@@ -1,6 +1,4 @@
 // Differences of samples are measured in vectors; what comes out is what each sample gives on its own.
-#include "engine/bound/row_bends.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "engine/bound/column_bends.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {
@@ -18,11 +17,11 @@ void Raise(float& largest, float value) {
   if (std::abs(value) > largest) largest = std::abs(value);
 }
 
-// Sample by sample. Three rows; the differences of a row with its neighbours are those of the middle one.
+// Sample by sample.
 ColumnBends Expected(const std::vector<std::vector<float>>& rows) {
   ColumnBends bends;
   const std::size_t columns = rows.front().size();
-  bends.Reset(columns);
+  bends.Resize(columns);
   for (std::size_t j = 0; j < rows.size(); ++j) {
     const auto at = [&](std::size_t row, std::size_t c) { return rows[row][c]; };
     for (std::size_t c = 0; c < columns; ++c) {
@@ -38,7 +37,7 @@ ColumnBends Expected(const std::vector<std::vector<float>>& rows) {
   return bends;
 }
 
-TEST(RowBends, AreThoseOfSingleSamples) {
+TEST(ColumnBends, AreThoseOfSingleSamples) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> metres(-500, 3000);
   for (std::size_t columns = 1; columns <= 50; ++columns) {
@@ -46,13 +45,17 @@ TEST(RowBends, AreThoseOfSingleSamples) {
     for (auto& row : rows) std::ranges::generate(row, [&] { return metres(random); });
     if (columns % 5 == 0) rows[2][columns / 2] = std::numeric_limits<float>::quiet_NaN();
     const ColumnBends expected = Expected(rows);
+    const std::size_t stride = columns + 3;
+    std::vector<float> samples;
+    for (const auto& row : rows) {
+      samples.insert(samples.end(), row.begin(), row.end());
+      samples.resize(samples.size() + stride - columns, 9e9f);  // must not be used
+    }
+    samples.resize(samples.size() - (stride - columns));
     tin::ForEachInstructionSet([&] {
       ColumnBends bends;
-      bends.Reset(columns);
-      for (std::size_t j = 0; j < rows.size(); ++j) {
-        AddRow(j > 0 ? rows[j - 1].data() : nullptr, rows[j].data(), j + 1 < rows.size() ? rows[j + 1].data() : nullptr,
-               bends);
-      }
+      bends.Resize(columns);
+      MeasureBends(samples.data(), stride, rows.size(), bends);
       EXPECT_EQ(bends.x, expected.x) << columns;
       EXPECT_EQ(bends.y, expected.y) << columns;
       EXPECT_EQ(bends.xx, expected.xx) << columns;
