@@ -37,44 +37,47 @@ class CellSurface {
     slack_y_ = bulge * extent(east_.y, north_.y, twist_.y) + slack.y;
   }
 
-  void SetHeight(std::size_t corner, double height) { heights_[corner] = height; }
-  // Adds to the uncertainty of the samples' heights, in metres.
-  void Widen(double error) { widened_ += error; }
-
-  // An upper bound of the distance between a sample and the surface, wherever the sample lies.
-  double DistanceBound(double sample) const {
-    const auto [lowest, highest] = std::minmax_element(heights_.begin(), heights_.end());
-    return std::max(*highest - sample, sample - *lowest) + widened_;
+  // `heights`: of the corners. `widened`: uncertainty of the samples' heights. In metres.
+  void SetHeights(const std::array<double, 4>& heights, double widened) {
+    heights_ = heights;
+    widened_ = widened;
+    const auto [lowest, highest] = std::ranges::minmax(heights);
+    lowest_ = lowest - widened, highest_ = highest + widened;
+    along_ = std::max(std::abs(heights[1] - heights[0]), std::abs(heights[3] - heights[2]));
+    across_ = std::max(std::abs(heights[2] - heights[0]), std::abs(heights[3] - heights[1]));
   }
 
-  // An upper bound of the distance between a sample and the surface; 0 if the position is outside the cell.
+  // An upper bound of the distance between a sample and the surface, wherever the sample lies.
+  double DistanceBound(double sample) const { return std::max(highest_ - sample, sample - lowest_); }
+
+  // The same; 0 if the position is outside the cell.
   double DistanceBound(const Position& at, double sample) const {
-    double u = 0.5, v = 0.5, u_slack = std::numeric_limits<double>::infinity(), v_slack = u_slack;
-    constexpr int kSteps = 4;
-    for (int step = 0; step < kSteps; ++step) {
+    double u = 0.5, v = 0.5, u_slack = 0, v_slack = 0;
+    constexpr int kMaxSteps = 4;
+    constexpr double kConverged = 1e-7;  // pixels
+    for (int step = 1;; ++step) {
       const double right_x = at.x - origin_.x - u * east_.x - v * north_.x - u * v * twist_.x;
       const double right_y = at.y - origin_.y - u * east_.y - v * north_.y - u * v * twist_.y;
       const double ux = east_.x + v * twist_.x, uy = east_.y + v * twist_.y;
       const double vx = north_.x + u * twist_.x, vy = north_.y + u * twist_.y;
-      const double scale = 1 / std::abs(ux * vy - uy * vx);
-      const double sign = ux * vy - uy * vx < 0 ? -scale : scale;
-      u += (right_x * vy - right_y * vx) * sign;
-      v += (ux * right_y - uy * right_x) * sign;
+      const double determinant = ux * vy - uy * vx;
+      u += (right_x * vy - right_y * vx) / determinant;
+      v += (ux * right_y - uy * right_x) / determinant;
+      const double off_x = std::abs(right_x), off_y = std::abs(right_y);
+      if (step < kMaxSteps && !(off_x < kConverged && off_y < kConverged)) continue;
       // The remaining error is much smaller than the last step.
-      const double x = slack_x_ + (step + 1 < kSteps ? 0 : std::abs(right_x));
-      const double y = slack_y_ + (step + 1 < kSteps ? 0 : std::abs(right_y));
-      u_slack = (std::abs(vy) * x + std::abs(vx) * y) * scale;
-      v_slack = (std::abs(uy) * x + std::abs(ux) * y) * scale;
+      const double x = slack_x_ + off_x, y = slack_y_ + off_y;
+      u_slack = (std::abs(vy) * x + std::abs(vx) * y) / std::abs(determinant);
+      v_slack = (std::abs(uy) * x + std::abs(ux) * y) / std::abs(determinant);
+      break;
     }
     const double anywhere = DistanceBound(sample);
     if (!(u_slack < 1 && v_slack < 1)) return anywhere;  // also where it did not converge
     if (u < -u_slack || u > 1 + u_slack || v < -v_slack || v > 1 + v_slack) return 0;
     const double south = heights_[0] + u * (heights_[1] - heights_[0]);
     const double north = heights_[2] + u * (heights_[3] - heights_[2]);
-    const double along = std::max(std::abs(heights_[1] - heights_[0]), std::abs(heights_[3] - heights_[2]));
-    const double across = std::max(std::abs(heights_[2] - heights_[0]), std::abs(heights_[3] - heights_[1]));
     // Within the slack outside the cell, slopes differ from the cell's only by the twist: twice the slope is enough.
-    const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along + v_slack * across);
+    const double here = std::abs(south + v * (north - south) - sample) + 2 * (u_slack * along_ + v_slack * across_);
     return std::min(anywhere, here + widened_);
   }
 
@@ -82,7 +85,8 @@ class CellSurface {
   Position origin_, east_, north_, twist_;
   double slack_x_ = 0, slack_y_ = 0;
   std::array<double, 4> heights_{};
-  double widened_ = 0;
+  double widened_ = 0, lowest_ = 0, highest_ = 0;
+  double along_ = 0, across_ = 0;  // the largest differences of heights along an edge
 };
 
 }  // namespace
@@ -326,12 +330,13 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
   const double geoid_error = geoid_.BoundOver(cell.box());
   const bool is_known = std::isfinite(geoid_error);
   const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
+  std::array<double, 4> heights{};
   for (std::size_t k = 0; k < 4; ++k) {
     const bool is_added = is_known && geoid_.is_added();
     const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
-    surface.SetHeight(k, double{tile_.heights[cell.nodes[k]]} - geoid);
+    heights[k] = double{tile_.heights[cell.nodes[k]]} - geoid;
   }
-  surface.Widen(is_known ? geoid_error : (range.max - range.min) / 2);
+  surface.SetHeights(heights, is_known ? geoid_error : (range.max - range.min) / 2);
   double error = 0, lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = in.north; row <= in.south; ++row) {
     const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);

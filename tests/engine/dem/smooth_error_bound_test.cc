@@ -48,7 +48,7 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
       const TileNodes nodes{lattice, window, heights};
       const GridStatistics statistics(*grid, trace);
       const GeoidErrorBound geoid(nodes, nullptr, {});
-      const SmoothErrorBound plain(nodes, *grid, trace, statistics, geoid, false);
+      SmoothErrorBound plain(nodes, *grid, trace, statistics, geoid, false);
       SmoothErrorBound prepared(nodes, *grid, trace, statistics, geoid, false);
       for (int south = 0; south < lattice.cells; south += 16) {
         prepared.PrepareRows(south, south + 16);
