@@ -60,7 +60,8 @@ class CellErrorBound {
 
   // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
   // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. A bound not
-  // above `known` need not be tight. Sets `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
+  // above `known` need not be tight. Sets `cell_samples` if BoundBySamples can give a tighter bound from samples that
+  // have not been read.
   double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
                              std::optional<CellSamples>& cell_samples) const;
 
