@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <memory>
 #include <utility>
 
 #include "engine/common/dem_types.h"
@@ -80,17 +81,17 @@ Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int ind
                      east = std::min(left + place.columns, window.column + window.columns);
   const std::int64_t north = std::max(top, window.row), south = std::min(top + place.rows, window.row + window.rows);
   if (west >= east || north >= south || offsets_[static_cast<std::size_t>(index)] == 0) return {};
-  std::string bytes(sizeof(std::uint64_t) + place.bytes(), '\0');
+  const std::size_t size = sizeof(std::uint64_t) + place.bytes();
+  const auto bytes = std::make_unique_for_overwrite<char[]>(size);
   std::uint64_t checksum = 0;
-  const bool read =
-      ReadAt(file.get(), offsets_[static_cast<std::size_t>(index)] + place.offset, bytes.data(), bytes.size());
-  std::memcpy(&checksum, bytes.data(), sizeof checksum);
-  const char* floats = bytes.data() + sizeof checksum;
+  const bool read = ReadAt(file.get(), offsets_[static_cast<std::size_t>(index)] + place.offset, bytes.get(), size);
+  std::memcpy(&checksum, bytes.get(), sizeof checksum);
+  const char* const floats = bytes.get() + sizeof checksum;
   if (!read || XXH3_64bits(floats, place.bytes()) != checksum) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of chunk {} by factor {} are damaged", path_, index,
                      factor);
   }
-  bytes_read_ += bytes.size();
+  bytes_read_ += size;
   for (std::int64_t row = north; row < south; ++row) {
     std::memcpy(out + (row - window.row) * window.columns + (west - window.column),
                 floats + ((row - top) * place.columns + west - left) * std::ptrdiff_t{sizeof(float)},
