@@ -227,6 +227,7 @@ SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const
 
 bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) {
   const SampleRange in = Clipped(range);
+  if (in.empty()) return false;
   const bool is_in_band = in.top == band_.top && in.bottom == band_.bottom;
   if (!is_in_band) MeasureColumns(in, box_);
   const ColumnBends& of_column = is_in_band ? band_ : box_;
@@ -268,6 +269,7 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
   SampleRange range = RangeOf(at);
   range.left = window.column, range.right = window.column + window.columns - 1;
   range = Clipped(range);
+  if (range.empty()) return;
   band_.top = range.top, band_.bottom = range.bottom;
   MeasureColumns(range, band_);
 }

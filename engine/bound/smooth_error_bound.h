@@ -45,10 +45,11 @@ class SmoothErrorBound {
   // Columns and rows of averages, ends included.
   struct SampleRange {
     std::int64_t left = 0, top = 0, right = -1, bottom = -1;
+    bool empty() const { return left > right || top > bottom; }
   };
   SampleRange RangeOf(const PixelBounds& at) const;
   SampleRange Clipped(SampleRange range) const;
-  // Returns false if one of the averages is void.
+  // Returns false if one of the averages is void, or none was read.
   bool Measure(const SampleRange& range, Bends& bends);
   void MeasureColumns(const SampleRange& range, ColumnBends& bends) const;
   static double Largest(const Bends& bends, const NodeSteps& steps);

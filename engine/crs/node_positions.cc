@@ -2,19 +2,24 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <utility>
 
 namespace terrace::dem {
 namespace {
 
-constexpr int kCellNodes = 32;  // divides the size of all grids, so cells never cross the antimeridian or a pole
+constexpr int kMaxCell = 128;
 
 // A square of `size` x `size` nodes; it owns the nodes on its western and southern edges.
 struct Cell {
   std::int64_t column, row;
   int size;
 };
+
+// The size of the largest cells of a grid with this number of rows. It divides the size of the grid, so that cells
+// never cross the antimeridian or a pole.
+int LargestCell(std::int64_t rows) { return static_cast<int>(std::min<std::int64_t>(rows & -rows, kMaxCell)); }
 
 // Cells are interpolated from kKnots x kKnots positions, the outermost on their edges.
 constexpr int kKnots = 5;
@@ -34,20 +39,19 @@ std::array<double, kKnots> Weights(double step, int size) {
   return weights;
 }
 
-using CellWeights = std::array<std::array<double, kKnots>, kCellNodes>;
+using CellWeights = std::array<std::array<double, kKnots>, kMaxCell>;
 
 // By step, for cells of this size: each size is computed once.
 const CellWeights& WeightsOf(int size) {
   static const auto all = [] {
-    std::array<CellWeights, 3> weights{};
+    std::array<CellWeights, std::bit_width(unsigned{kMaxCell / kMinCell})> weights{};
     for (std::size_t i = 0; i < weights.size(); ++i) {
       const int cell = kMinCell << i;
       for (int step = 0; step < cell; ++step) weights[i][static_cast<std::size_t>(step)] = Weights(step, cell);
     }
     return weights;
   }();
-  static_assert(kMinCell << 2 == kCellNodes);
-  return all[size == kMinCell ? 0 : size < kCellNodes ? 1 : 2];
+  return all[static_cast<std::size_t>(std::countr_zero(static_cast<unsigned>(size / kMinCell)))];
 }
 
 // Centres of a lattice's cells, each counted as the node at its south-western corner.
@@ -81,23 +85,21 @@ class GridNodes {
     if (georeference_.is_affine()) {
       FillExactly(window_.column, window_.row, window_.columns, window_.rows);
     } else {
+      const int size = LargestCell(grid_.rows());
+      const auto floor = [size](std::int64_t node) { return node - (node % size + size) % size; };
       const std::int64_t last_row = std::min(window_.row + window_.rows - 1, grid_.rows() - 1);
       const std::int64_t east = window_.column + window_.columns;
-      first_column_ = FloorCell(window_.column);
-      first_row_ = FloorCell(std::max<std::int64_t>(window_.row, 0));
-      knots_across_ = (FloorCell(east - 1) - first_column_) / kKnotSpacing + kKnots;
-      const std::int64_t knots_up = std::max<std::int64_t>(FloorCell(last_row) - first_row_, 0) / kKnotSpacing + kKnots;
+      first_column_ = floor(window_.column);
+      first_row_ = floor(std::max<std::int64_t>(window_.row, 0));
+      knots_across_ = (floor(east - 1) + size - first_column_) / kKnotSpacing + 1;
+      const std::int64_t knots_up = std::max<std::int64_t>(floor(last_row) + size - first_row_, 0) / kKnotSpacing + 1;
       knots_.assign(static_cast<std::size_t>(knots_across_ * knots_up), kNotAsked);
-      for (std::int64_t row = first_row_; row <= last_row; row += kCellNodes) {
-        for (std::int64_t column = first_column_; column < east; column += kCellNodes) {
-          Fill({column, row, kCellNodes});
-        }
+      for (std::int64_t row = first_row_; row <= last_row; row += size) {
+        for (std::int64_t column = first_column_; column < east; column += size) Fill({column, row, size});
       }
     }
     FillPoleRows();
   }
-
-  static std::int64_t FloorCell(std::int64_t node) { return node - (node % kCellNodes + kCellNodes) % kCellNodes; }
 
   Position Degrees(std::int64_t column, std::int64_t row) const {
     return {grid_.Longitude(column), grid_.Latitude(row)};
@@ -161,34 +163,31 @@ class GridNodes {
   }
 
   bool Interpolate(const Cell& cell, const Part& part) {
-    // The knots, and four nodes where a polynomial term of the next degree is near its maximum.
-    constexpr std::size_t kTried = 4;
-    const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8;
+    // The knots, and eight nodes where a polynomial term of the next degree is near its maximum.
+    constexpr std::size_t kTried = 8;
+    const int spacing = cell.size / (kKnots - 1), half = cell.size / 2, near = cell.size / 8, far = cell.size - near;
     const std::array<std::array<int, 2>, kTried> tried = {
-        {{near, half}, {half, near}, {cell.size - near, half}, {half, cell.size - near}}};
+        {{near, half}, {half, near}, {far, half}, {half, far}, {near, near}, {far, near}, {near, far}, {far, far}}};
     constexpr std::size_t kAll = kKnots * kKnots + kTried;
     std::array<Position, kAll> known, fresh;
-    std::array<Position*, kAll> place_of;
+    std::array<Position*, kAll> place_of, asked_for;
     std::size_t asked = 0;
-    const auto ask = [&](std::int64_t column, std::int64_t row, Position* place) {
+    const bool are_shared = near % kKnotSpacing == 0;
+    const auto ask = [&](std::size_t i, std::int64_t column, std::int64_t row) {
+      place_of[i] = are_shared ? KnotAt(column, row) : &known[i];
+      if (are_shared && IsAsked(*place_of[i])) return;
       fresh[asked] = Degrees(column, row);
-      place_of[asked++] = place;
+      asked_for[asked++] = place_of[i];
     };
-    // Whole cells share the knots on their edges.
-    const bool is_whole = cell.size == kCellNodes;
     for (int i = 0; i < kKnots * kKnots; ++i) {
-      const std::int64_t column = cell.column + i % kKnots * spacing, row = cell.row + i / kKnots * spacing;
-      Position* const place = is_whole ? KnotAt(column, row) : &known[static_cast<std::size_t>(i)];
-      if (!is_whole || !IsAsked(*place)) ask(column, row, place);
+      ask(static_cast<std::size_t>(i), cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
     }
     for (std::size_t i = 0; i < kTried; ++i) {
-      ask(cell.column + tried[i][0], cell.row + tried[i][1], &known[kKnots * kKnots + i]);
+      ask(kKnots * kKnots + i, cell.column + tried[i][0], cell.row + tried[i][1]);
     }
     georeference_.ToPixels({fresh.data(), asked});
-    for (std::size_t i = 0; i < asked; ++i) *place_of[i] = fresh[i];
-    for (int i = 0; i < kKnots * kKnots && is_whole; ++i) {
-      known[static_cast<std::size_t>(i)] = *KnotAt(cell.column + i % kKnots * spacing, cell.row + i / kKnots * spacing);
-    }
+    for (std::size_t i = 0; i < asked; ++i) *asked_for[i] = fresh[i];
+    for (std::size_t i = 0; i < kAll; ++i) known[i] = *place_of[i];
     if (std::ranges::any_of(known, [](const Position& p) { return std::isnan(p.x); })) return false;
     // Interpolates the knots' columns at one row, then any node of that row.
     const CellWeights& weights = WeightsOf(cell.size);
@@ -247,8 +246,9 @@ class GridNodes {
   const double tolerance_;
   std::vector<Position> positions_;
 
-  // Of whole cells, row by row from the first one.
-  static constexpr int kKnotSpacing = kCellNodes / (kKnots - 1);
+  // Exact positions of every kKnotSpacing-th node, row by row from the first cell's; cells of 32 nodes and more share
+  // them with the cells beside them and with their parts.
+  static constexpr int kKnotSpacing = 4;
   static constexpr Position kNotAsked{std::numeric_limits<double>::infinity(), 0};
   std::int64_t first_column_ = 0, first_row_ = 0, knots_across_ = 0;
   std::vector<Position> knots_;

@@ -33,7 +33,7 @@ NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
 
 // Pixel positions of a window's nodes. A position depends only on the global node and has the same bits in every
 // window. Nodes are ordered row by row: lattices from the south-west, Mercator grids from the north-west. Positions are
-// exact for sources in WGS 84 degrees. For other sources, 5 x 5 nodes of each global cell of 32 x 32 nodes are
+// exact for sources in WGS 84 degrees. For other sources, 5 x 5 nodes of each global cell of 128 x 128 nodes are
 // transformed, and the others are interpolated by polynomials of degree four. Cells where this is off by more than
 // `tolerance` pixels are divided.
 class NodePositions {
