@@ -340,7 +340,8 @@ double ChordDeviation(const Ground& ground, double steps) {
   return kCurvatureMargin * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
-// The largest difference along edges from the lattice surface, in metres, with ChordDeviation. `heights`: by vertex, of
+// The largest difference along edges from the lattice surface, in metres, with ChordDeviation, if it is larger than
+// `known`; else `known`. `heights`: by vertex, of
 // the surface that is linear in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat
 // triangles, which lie `beside_m` beside their places at most.
 //
@@ -348,7 +349,7 @@ double ChordDeviation(const Ground& ground, double steps) {
 // shift. Most chords are therefore known to stay below the largest difference found so far, and are not measured.
 double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
-                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+                    const std::vector<std::array<std::uint32_t, 3>>& triangles, double known_m) {
   const EdgeBound bound(lattice);
   const EdgeMeter meter(lattice, bound);
   const Ground ground(lattice);
@@ -364,7 +365,7 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
   const LatticePoint step = ground.WidestStep(), narrowest = ground.NarrowestStep();
   const double deviation =
       ChordDeviation(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
-  double largest = deviation;
+  double largest = std::max(deviation, known_m);
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
     const double sagitta = kCurvatureMargin * (x * x + y * y) / (8 * kSmallestRadius);
@@ -394,8 +395,8 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
 
 }  // namespace
 
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile,
-                        const std::vector<geo::Vec3>& positions) {
+double MeasureSurfaceError(const LatticeView& lattice, const QuantizedTile& tile,
+                           const std::vector<geo::Vec3>& positions, double at_samples_m) {
   std::vector<LatticePoint> places;
   std::vector<double> heights;
   places.reserve(tile.u.size());
@@ -405,11 +406,11 @@ double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile,
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  return MeasureEdges(lattice, places, heights, positions, 0, tile.triangles);
+  return MeasureEdges(lattice, places, heights, positions, 0, tile.triangles, at_samples_m);
 }
 
-double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
-                            const std::vector<geo::Vec3>& positions) {
+double MeasureFlatSurfaceError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                               const std::vector<geo::Vec3>& positions, double at_samples_m) {
   std::vector<LatticePoint> places;
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
@@ -420,7 +421,7 @@ double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh
     const tin::SamplePosition node = mesh.vertices[k];
     beside_m = std::max(beside_m, plumb.PositionOf(positions[k], node.x, node.y).beside_m);
   }
-  return MeasureEdges(lattice, places, {}, positions, beside_m, mesh.triangles);
+  return MeasureEdges(lattice, places, {}, positions, beside_m, mesh.triangles, at_samples_m);
 }
 
 }  // namespace terrace::proto

@@ -1,8 +1,8 @@
 // The distance between a tile's surface and the surface through its lattice samples, everywhere and not only at the
 // samples.
 //
-// The lattice surface is bilinear in longitude and latitude between four neighbouring samples. The error measured here
-// and the error at the samples (tile_error.h) together bound the distance at every position of the tile.
+// The lattice surface is bilinear in longitude and latitude between four neighbouring samples. The error at the samples
+// (tile_error.h) and the error along the edges of triangles together bound the distance at every position of the tile.
 #pragma once
 
 #include <vector>
@@ -14,15 +14,16 @@
 
 namespace terrace::proto {
 
-// Metres: at least the distance between the two surfaces along the edges of all triangles, both for the height
-// interpolated in longitude and latitude and for the flat triangles in ECEF. The larger of this and TileError::max_m
-// bounds both surfaces everywhere in the tile; docs/decisions/0011-certified-error.md has the proof.
+// Returns a bound on the distance between the two surfaces in metres, everywhere in the tile, both for the height
+// interpolated in longitude and latitude and for the flat triangles in ECEF. It is `at_samples_m` (TileError::max_m) if
+// the distance along the edges of all triangles is not larger; docs/decisions/0011-certified-error.md has the proof.
 //
 // `positions`: of the tile's vertices, DecodePositions.
-double MeasureEdgeError(const LatticeView& lattice, const QuantizedTile& tile, const std::vector<geo::Vec3>& positions);
+double MeasureSurfaceError(const LatticeView& lattice, const QuantizedTile& tile,
+                           const std::vector<geo::Vec3>& positions, double at_samples_m);
 
 // The same for flat triangles with their vertices at exact lattice positions, as in TileErrorMeter::MeasureFlat.
-double MeasureFlatEdgeError(const LatticeView& lattice, const tin::TinMesh& mesh,
-                            const std::vector<geo::Vec3>& positions);
+double MeasureFlatSurfaceError(const LatticeView& lattice, const tin::TinMesh& mesh,
+                               const std::vector<geo::Vec3>& positions, double at_samples_m);
 
 }  // namespace terrace::proto

@@ -96,7 +96,7 @@ TEST(SurfaceError, IsReachedAndNeverPassedAtAnyPlaceOfTheTile) {
     const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 4 + seed * 20});
     const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
     const double at_samples = TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m;
-    const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, DecodePositions(tile)));
+    const double measured = MeasureSurfaceError(ground.view(), tile, DecodePositions(tile), at_samples);
     const Largest sampled = SampledTile(ground.view(), tile);
     EXPECT_GE(measured, sampled.planar);
     EXPECT_GE(measured, sampled.drawn);
@@ -115,7 +115,8 @@ TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 200});
   const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
   ASSERT_LT(TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m, 1);
-  EXPECT_GE(MeasureEdgeError(ground.view(), tile, DecodePositions(tile)), SampledTile(ground.view(), tile).planar);
+  EXPECT_GE(MeasureSurfaceError(ground.view(), tile, DecodePositions(tile), 0),
+            SampledTile(ground.view(), tile).planar);
 }
 
 TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
@@ -128,7 +129,7 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
       const tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_points = 600});
       const QuantizedTile tile = QuantizeTile(ground.view(), mesh, kFineSteps);
       const double at_samples = TileErrorMeter(ground.view(), 1e9).Measure(tile).max_m;
-      const double measured = std::max(at_samples, MeasureEdgeError(ground.view(), tile, DecodePositions(tile)));
+      const double measured = MeasureSurfaceError(ground.view(), tile, DecodePositions(tile), at_samples);
       const Largest sampled = SampledTile(ground.view(), tile);
       EXPECT_GE(measured, std::max(sampled.drawn, sampled.planar)) << level << " " << latitude;
       // The term for the curvature between samples decreases with the square of the cell size.
@@ -142,8 +143,8 @@ TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
         positions.push_back(
             geo::ToEcef(ground.view().Longitude(p.x), ground.view().Latitude(p.y), ground.view().At(p.x, p.y)));
       }
-      const double flat = std::max(TileErrorMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m,
-                                   MeasureFlatEdgeError(ground.view(), mesh, positions));
+      const double flat = MeasureFlatSurfaceError(
+          ground.view(), mesh, positions, TileErrorMeter(ground.view(), 1e9).MeasureFlat(mesh, positions).max_m);
       EXPECT_GE(flat, Sampled(ground.view(), places, {}, positions, mesh.triangles).drawn) << level << " " << latitude;
     }
   }

@@ -83,7 +83,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
-  meshed.surface_error_m = std::max(error->max_m, proto::MeasureFlatEdgeError(lattice, mesh, positions));
+  meshed.surface_error_m = proto::MeasureFlatSurfaceError(lattice, mesh, positions, error->max_m);
   meshed.mesh =
       proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m,
                           depth_m, TrianglesInHoles(*dataset.source, lattice.key, mesh));

@@ -55,7 +55,7 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
   meshed.positions = meter.positions();
-  meshed.surface_error_m = std::max(error->max_m, proto::MeasureEdgeError(lattice, meshed.tile, meshed.positions));
+  meshed.surface_error_m = proto::MeasureSurfaceError(lattice, meshed.tile, meshed.positions, error->max_m);
   meshed.mesh = std::move(mesh);
   return meshed;
 }
