@@ -32,7 +32,7 @@ Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
 }
 
 struct Purged {
-  TileService::Erased tiles;
+  tiler::TileTiers::Erased tiles;
   tiler::RefinementCache::Erased refinements;
 };
 
@@ -40,7 +40,7 @@ struct Purged {
 Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection, const std::stop_token& stop) {
   Result<tiler::RefinementCache::Erased> refinements;
   if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection, stop);
-  Result<TileService::Erased> tiles = parts.tiles.Erase(selection, stop);
+  Result<tiler::TileTiers::Erased> tiles = parts.tiles.Erase(selection, stop);
   if (!refinements) return tl::unexpected(std::move(refinements.error()));
   if (!tiles) return tl::unexpected(std::move(tiles.error()));
   return Purged{*std::move(tiles), *refinements};
