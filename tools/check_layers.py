@@ -126,7 +126,7 @@ LIBRARIES = [
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|fly/http/http_client|redis/socket|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/(common|edits)/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
-    Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc)"),
+    Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc|fly/flight/)"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),
