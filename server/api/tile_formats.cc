@@ -149,13 +149,12 @@ Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::strin
 }
 
 Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
-  constexpr std::pair<std::string_view, proto::TextureFormat> kNames[] = {{"none", proto::TextureFormat::kNone},
-                                                                          {"jpeg", proto::TextureFormat::kJpeg},
-                                                                          {"webp", proto::TextureFormat::kWebp}};
-  for (const auto& [name, texture] : kNames) {
-    if (text == name) return SetOnce(to, texture, "texture", /*repeatable=*/true);
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
+  using proto::TextureFormat;
+  TextureFormat texture{};
+  Result<void> set =
+      SetOneOf(texture, "texture", text,
+               {{"jpeg", TextureFormat::kJpeg}, {"webp", TextureFormat::kWebp}, {"none", TextureFormat::kNone}});
+  return set ? SetOnce(to, texture, "texture", /*repeatable=*/true) : set;
 }
 
 Result<void> CheckTogether(const RequestedError& requested) {
@@ -211,9 +210,8 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
       set = SetPositive(requested.fraction, "fraction", value, repeatable);
     } else if (name == "atleast" && allow_at_least) {
       if (at_least_given) return MakeError(ErrorCode::kInvalidArgument, "atleast is given more than once");
-      if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
       at_least_given = true;
-      requested.at_least = value == "1";
+      set = SetOneOf(requested.at_least, "atleast", value, {{"0", false}, {"1", true}});
     } else if (name == "compression" && allow_compression) {
       set = SetCompression(parameters.compression, value);
     } else if (name == "texture" && allow_compression) {
@@ -229,29 +227,15 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
 }
 
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
-  std::optional<proto::HeightEncoding> encoding;
-  std::optional<int> size;
-  for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
-    if (name == "encoding") {
-      if (encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding is given more than once");
-      if (value == "mapbox") encoding = proto::HeightEncoding::kMapbox;
-      if (value == "terrarium") encoding = proto::HeightEncoding::kTerrarium;
-      if (!encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding must be mapbox or terrarium");
-    } else if (name == "size") {
-      if (size) return MakeError(ErrorCode::kInvalidArgument, "size is given more than once");
-      const Result<int> known = ParseTileSize(value);
-      if (!known) return tl::unexpected(known.error());
-      size = *known;
-    } else {
-      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are encoding, size");
-    }
-  }
+  using proto::HeightEncoding;
+  constexpr std::array<const char*, 2> kNames = {"encoding", "size"};
   HeightTileParameters parameters;
-  parameters.encoding = encoding.value_or(parameters.encoding);
-  parameters.size = size.value_or(parameters.size);
+  const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) {
+    return i == 0 ? SetOneOf(parameters.encoding, kNames[i], value,
+                             {{"mapbox", HeightEncoding::kMapbox}, {"terrarium", HeightEncoding::kTerrarium}})
+                  : SetTileSize(parameters.size, value);
+  });
+  if (!read) return tl::unexpected(read.error());
   return parameters;
 }
 

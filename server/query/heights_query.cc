@@ -138,15 +138,6 @@ Result<int> ParseCertifyLevel(std::string_view text) {
   return level;
 }
 
-Result<void> SetDatum(std::string_view text, HeightsQuery& query) {
-  if (text == "ellipsoid") return {};
-  if (text != "orthometric") {
-    return MakeError(ErrorCode::kInvalidArgument, "datum must be ellipsoid or orthometric");
-  }
-  query.datum = dem::HeightDatum::kOrthometric;
-  return {};
-}
-
 }  // namespace
 
 Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters) {
@@ -185,11 +176,11 @@ Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_loc
     query->certify_level = *level;
   }
   if (const auto& datum = parameters.text(HeightsParameters::kDatum)) {
-    if (const Result<void> set = SetDatum(*datum, *query); !set) return tl::unexpected(set.error());
+    if (const Result<void> set = SetDatum(query->datum, *datum); !set) return tl::unexpected(set.error());
   }
   if (const auto& normals = parameters.text(HeightsParameters::kNormals)) {
-    if (*normals != "0" && *normals != "1") return MakeError(ErrorCode::kInvalidArgument, "normals must be 0 or 1");
-    query->wants_normals = *normals == "1";
+    const Result<void> set = SetOneOf(query->wants_normals, "normals", *normals, {{"0", false}, {"1", true}});
+    if (!set) return tl::unexpected(set.error());
   }
   DrawnTexts texts;
   for (const auto& [text, of] :
