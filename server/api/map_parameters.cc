@@ -152,8 +152,7 @@ int MinMapLevel(const MapTileParameters& parameters) {
 }
 
 dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
-  if (IsImagery(format)) return dataset.imagery->bounds;
-  return {dataset.west, dataset.south, dataset.east, dataset.north};
+  return IsImagery(format) ? dataset.imagery->bounds : dataset.bounds;
 }
 
 Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format) {

@@ -32,13 +32,6 @@ std::string OriginOf(const Request& request) {
   return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
 }
 
-void SetBounds(const dem::GeoBounds& bounds, proto::TileJsonDescription& tiles) {
-  tiles.west = bounds.west;
-  tiles.south = bounds.south;
-  tiles.east = bounds.east;
-  tiles.north = bounds.north;
-}
-
 Response ServeTileJson(const Handlers& handlers, const RequestContext& context,
                        const proto::TileJsonDescription& tiles) {
   Response response =
@@ -67,7 +60,7 @@ Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
-  SetBounds({dataset.west, dataset.south, dataset.east, dataset.north}, tiles);
+  tiles.bounds = dataset.bounds;
   return ServeTileJson(handlers, context, tiles);
 }
 
@@ -103,7 +96,7 @@ Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context
                                                   tiler::MinIntervalCm(tiles.max_zoom) / 100.0, tiles.max_zoom)});
   }
   tiles.tile_size = parameters->size;
-  SetBounds(MapBounds(dataset, row->format), tiles);
+  tiles.bounds = MapBounds(dataset, row->format);
   return ServeTileJson(handlers, context, tiles);
 }
 
