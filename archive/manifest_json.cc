@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
+#include "engine/core/parse_number.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::archive {
@@ -242,10 +242,7 @@ Manifest Read(const Json& json) {
 
 std::optional<std::uint64_t> ParseHex16(std::string_view text) {
   constexpr std::size_t kDigits = 16;
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (text.size() != kDigits || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  return text.size() == kDigits ? ParseNumber<std::uint64_t>(text, 16) : std::nullopt;
 }
 
 std::string ToJson(const Manifest& manifest) {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -18,6 +17,7 @@
 #include "archive/files/bucket.h"
 #include "bake/place_files.h"
 #include "engine/core/errno_text.h"
+#include "engine/core/parse_number.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::bake {
@@ -68,9 +68,8 @@ struct Owner {
     if (host != HostName()) return false;
     if (boot != BootOf()) return true;
     if (space != NumberSpace()) return false;
-    long number = 0;
-    const auto [end, error] = std::from_chars(pid.data(), pid.data() + pid.size(), number);
-    if (error != std::errc() || number <= 0) return false;
+    const long number = ParseNumber<long>(pid).value_or(0);
+    if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
     const std::string now = StartOf(number);
     return !start.empty() && !now.empty() && now != start;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
 #include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
@@ -182,10 +183,8 @@ double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
     const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
     if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
-    double quality = 0;
-    const char* const last = parameter.data() + parameter.size();
-    const auto [end, error] = std::from_chars(parameter.data() + 2, last, quality, std::chars_format::fixed);
-    return error == std::errc() && end == last && quality >= 0 && quality <= 1 ? quality : 0;
+    const double quality = ParseNumber<double>(parameter.substr(2), std::chars_format::fixed).value_or(0);
+    return quality >= 0 && quality <= 1 ? quality : 0;
   }
   return 1;
 }

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
+
+#include "engine/core/parse_number.h"
 
 namespace terrace::server {
 namespace {
@@ -52,11 +53,8 @@ int HexDigit(char c) {
 }
 
 std::optional<double> FiniteNumber(std::string_view text) {
-  double value = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  if (error != std::errc() || end != last || !std::isfinite(value)) return std::nullopt;
-  return value;
+  const auto value = ParseNumber<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 std::optional<double> PositiveNumber(std::string_view text) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/core/bytes.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/plain_number.h"
 #include "engine/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
@@ -130,12 +131,11 @@ Result<HeightsQuery> ParsePoints(HeightsParameters& parameters, std::size_t max_
 
 Result<int> ParseCertifyLevel(std::string_view text) {
   if (text == "deepest") return geo::kMaxLevel;
-  int level = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
-  if (text.empty() || end != text.data() + text.size() || error != std::errc() || level < 0 || level > geo::kMaxLevel) {
+  const auto level = ParseNumber<int>(text);
+  if (!level || *level < 0 || *level > geo::kMaxLevel) {
     return MakeError(ErrorCode::kInvalidArgument, "certify must be deepest, or a level from 0 to {}", geo::kMaxLevel);
   }
-  return level;
+  return *level;
 }
 
 }  // namespace
