@@ -23,7 +23,7 @@ template <typename Target>
 struct Codec {
   std::function<void(const Json&, const ConfigLocation&, Target&)> read;
   std::function<Json(const Target&)> write;
-  Json (*from_text)(const std::string&) = nullptr;  // null: the option has no flag
+  std::function<Json(const std::string&)> from_text = nullptr;  // null: the option has no flag
   Json schema = {};
 };
 

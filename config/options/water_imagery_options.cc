@@ -88,17 +88,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
 Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson, WaterSchema()}; }
 
 Codec<DatasetConfig> ImageryCodec() {
-  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
-            if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})");
-            ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
-          },
-          [](const DatasetConfig& dataset) {
-            return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
-          },
-          [](const std::string& text) {
-            return Json{{"image", text}};
-          },
-          ObjectSchema(ImageryOptionTable())};
+  return ObjectOf(&DatasetConfig::imagery, &ImageryConfig::image, ImageryOptionTable(), R"({"image": "photo.tif"})");
 }
 
 }  // namespace terrace::config
