@@ -129,8 +129,7 @@ Result<std::string> OtherLock(const std::string& place, const std::string& own) 
 
 // Whether it is a file or folder of tiles.
 bool IsContent(const std::string& name) {
-  return name == archive::UnitPath("top") || name == "units" ||
-         std::ranges::any_of(archive::kFormatNames, [&](const auto& format) { return format.second == name; });
+  return name == archive::UnitPath("top") || name == "units" || ValueNamed(archive::kFormatNames, name).has_value();
 }
 
 bool IsOurs(const std::string& name) {
@@ -240,7 +239,7 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
     if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
   }
   std::vector<std::string> archives = {place};
-  for (const auto& [format, name] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
+  for (const auto& [name, format] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
   for (const std::string& archive : archives) {
     if (!Exists(fs::path(archive) / archive::kManifestFile)) continue;
     is_known = true;

@@ -8,8 +8,6 @@
 
 namespace terrace::proto {
 
-const char* ToString(HeightEncoding encoding) { return encoding == HeightEncoding::kMapbox ? "mapbox" : "terrarium"; }
-
 std::string EncodeTileJson(const TileJsonDescription& tiles) {
   using Json = nlohmann::ordered_json;
   const bool crosses_antimeridian = tiles.bounds.west > tiles.bounds.east;
@@ -30,7 +28,7 @@ std::string EncodeTileJson(const TileJsonDescription& tiles) {
                  : tiles.kind == TileJsonKind::kPictures ? "raster"
                                                          : "vector";
   json["format"] = tiles.format;
-  if (tiles.kind == TileJsonKind::kHeights) json["encoding"] = ToString(tiles.encoding);
+  if (tiles.kind == TileJsonKind::kHeights) json["encoding"] = NameIn(kHeightEncodingNames, tiles.encoding);
   if (tiles.kind == TileJsonKind::kContours) {
     json["vector_layers"] = Json::array({{{"id", kContourLayer},
                                           {"description", "lines of equal height"},

@@ -27,7 +27,4 @@ struct TileJsonDescription {
 // UTF-8 JSON. Latitudes are clipped to Web Mercator's.
 std::string EncodeTileJson(const TileJsonDescription& tiles);
 
-// "mapbox", "terrarium": as in URLs and in TileJSON.
-const char* ToString(HeightEncoding encoding);
-
 }  // namespace terrace::proto

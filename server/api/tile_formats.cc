@@ -142,20 +142,11 @@ Result<void> SetPositive(std::optional<double>& to, const char* name, std::strin
   return SetOnce(to, *value, name, repeatable);
 }
 
-Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
-  if (const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(text)) {
-    return SetOnce(to, *compression, "compression", /*repeatable=*/true);
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
-}
-
-Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
-  using proto::TextureFormat;
-  TextureFormat texture{};
-  Result<void> set =
-      SetOneOf(texture, "texture", text,
-               {{"jpeg", TextureFormat::kJpeg}, {"webp", TextureFormat::kWebp}, {"none", TextureFormat::kNone}});
-  return set ? SetOnce(to, texture, "texture", /*repeatable=*/true) : set;
+template <typename T, std::size_t kCount>
+Result<void> SetNamed(std::optional<T>& to, const char* name, std::string_view text, const Names<T, kCount>& names) {
+  T value{};
+  Result<void> set = SetOneOf(value, name, text, names);
+  return set ? SetOnce(to, value, name, /*repeatable=*/true) : set;
 }
 
 Result<void> CheckTogether(const RequestedError& requested) {
@@ -212,9 +203,9 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
       at_least_given = true;
       set = SetOneOf(requested.at_least, "atleast", value, {{"0", false}, {"1", true}});
     } else if (name == "compression" && allow_compression) {
-      set = SetCompression(parameters.compression, value);
+      set = SetNamed(parameters.compression, "compression", value, proto::kGlbCompressionNames);
     } else if (name == "texture" && allow_compression) {
-      set = SetTexture(parameters.texture, value);
+      set = SetNamed(parameters.texture, "texture", value, proto::kTextureFormatNames);
     } else {
       set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
                       allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression, texture" : "");
@@ -226,12 +217,10 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
 }
 
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
-  using proto::HeightEncoding;
   constexpr std::array<const char*, 2> kNames = {"encoding", "size"};
   HeightTileParameters parameters;
   const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) {
-    return i == 0 ? SetOneOf(parameters.encoding, kNames[i], value,
-                             {{"mapbox", HeightEncoding::kMapbox}, {"terrarium", HeightEncoding::kTerrarium}})
+    return i == 0 ? SetOneOf(parameters.encoding, kNames[i], value, proto::kHeightEncodingNames)
                   : SetTileSize(parameters.size, value);
   });
   if (!read) return tl::unexpected(read.error());

@@ -20,7 +20,8 @@ std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParamete
   std::string query = "v=" + dataset.version();
   const auto add = [&query](const std::string& text) { query += "&" + text; };
   const HeightTileParameters defaults;
-  if (parameters.encoding != defaults.encoding) add(fmt::format("encoding={}", proto::ToString(parameters.encoding)));
+  if (parameters.encoding != defaults.encoding)
+    add(fmt::format("encoding={}", NameIn(proto::kHeightEncodingNames, parameters.encoding)));
   if (parameters.size != defaults.size) add(fmt::format("size={}", parameters.size));
   return query;
 }

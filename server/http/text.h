@@ -1,11 +1,9 @@
 // Small parsers for the text in requests. ASCII only, independent of the locale.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <initializer_list>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/names.h"
 #include "engine/core/result.h"
 
 namespace terrace::server {
@@ -79,19 +78,22 @@ Result<void> ReadParameters(std::string_view query, std::span<const char* const>
 
 // Sets what one of a few words stands for. kInvalidArgument: another text; the message is "size must be 256 or 512" for
 // the parameter `name` "size".
-template <typename T>
-Result<void> SetOneOf(T& to, std::string_view name, std::string_view text,
-                      std::initializer_list<std::pair<std::string_view, std::type_identity_t<T>>> words) {
-  const auto* const found = std::ranges::find(words, text, [](const auto& word) { return word.first; });
-  if (found != words.end()) {
-    to = found->second;
+template <typename T, std::size_t kCount>
+Result<void> SetOneOf(T& to, std::string_view name, std::string_view text, const Names<T, kCount>& words) {
+  if (const std::optional<T> meaning = ValueNamed(words, text)) {
+    to = *meaning;
     return {};
   }
   std::string allowed;
-  for (const auto* word = words.begin(); word != words.end(); ++word) {
-    allowed.append(word == words.begin() ? "" : word + 1 == words.end() ? " or " : ", ").append(word->first);
+  for (const auto& [word, meaning] : words) {
+    allowed.append(allowed.empty() ? "" : word == words.back().first ? " or " : ", ").append(word);
   }
   return MakeError(ErrorCode::kInvalidArgument, "{} must be {}", name, allowed);
+}
+template <typename T, std::size_t kCount>
+Result<void> SetOneOf(T& to, std::string_view name, std::string_view text,
+                      const std::pair<std::string_view, std::type_identity_t<T>> (&words)[kCount]) {
+  return SetOneOf(to, name, text, std::to_array(words));
 }
 
 // For URLs that have no parameters except `v`.

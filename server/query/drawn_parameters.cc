@@ -46,12 +46,7 @@ Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
   if (drawn.format != tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
   }
-  const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(*texts.compression);
-  if (!compression) {
-    return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
-  }
-  drawn.compression = *compression;
-  return {};
+  return SetOneOf(drawn.compression, "compression", *texts.compression, proto::kGlbCompressionNames);
 }
 
 }  // namespace
