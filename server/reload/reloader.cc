@@ -1,6 +1,5 @@
 #include "server/reload/reloader.h"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -67,10 +66,7 @@ config::Config AsWritten(config::Config config) {
 
 std::string TextOf(const std::vector<config::ConfigError>& errors) {
   std::string text;
-  for (const config::ConfigError& error : errors) {
-    text +=
-        fmt::format("{}{}{}{}", text.empty() ? "" : "; ", error.path, error.path.empty() ? "" : ": ", error.message);
-  }
+  for (const config::ConfigError& error : errors) text += (text.empty() ? "" : "; ") + error.Text();
   return text;
 }
 
