@@ -83,15 +83,11 @@ Reloader::~Reloader() { Stop(); }
 
 void Reloader::Start(bool watch) {
   watch_ = watch;
-  thread_ = std::thread([this] { Run(); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
 void Reloader::Stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  wake_.notify_all();
+  thread_.request_stop();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -107,17 +103,18 @@ void Reloader::Reload() {
   wake_.notify_all();
 }
 
-void Reloader::Run() {
+void Reloader::Run(const std::stop_token& stop) {
   Clock::time_point next_check = Clock::now() + kPeriod, next_config = next_check;
   std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, kMinPause, [this] { return stop_; })) {
-    const auto is_due = [this] { return check_now_ || reload_ || stop_; };
+  for (;;) {
+    wake_.wait_for(lock, stop, kMinPause, [] { return false; });
+    const auto is_due = [this] { return check_now_ || reload_; };
     if (IsBusy() || watch_ || LacksDatasets()) {
-      wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
+      wake_.wait_for(lock, stop, IsBusy() ? kBusyPeriod : kPeriod, is_due);
     } else {
-      wake_.wait(lock, is_due);
+      wake_.wait(lock, stop, is_due);
     }
-    if (stop_ || hooks_.stop.stop_requested()) return;
+    if (stop.stop_requested() || hooks_.stop.stop_requested()) return;
     const bool reload = std::exchange(reload_, false), check_now = std::exchange(check_now_, false) || reload;
     lock.unlock();
     const Clock::time_point now = Clock::now();
