@@ -170,7 +170,7 @@ Result<std::vector<std::shared_ptr<const Archive>>> Archive::OpenAll(const std::
   Result<std::shared_ptr<const Archive>> only = Open(place);
   if (only) return std::vector{*std::move(only)};
   if (only.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(only.error()));
-  for (const auto& [format, name] : kFormatNames) {
+  for (const auto& [name, format] : kFormatNames) {
     const std::string folder = fmt::format("{}/{}", place, name);
     if (!IsPlace(folder)) continue;
     Result<std::shared_ptr<const Archive>> archive = Open(folder);

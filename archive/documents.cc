@@ -22,10 +22,7 @@ std::string LayerJson(const Manifest& manifest) {
   layer.attribution = dataset.attribution;
   layer.version = tiler::VersionText(dataset.generation);
   layer.available = manifest.available;
-  layer.west = dataset.bounds.west;
-  layer.south = dataset.bounds.south;
-  layer.east = dataset.bounds.east;
-  layer.north = dataset.bounds.north;
+  layer.bounds = dataset.bounds;
   layer.normals = manifest.kind.normals;
   layer.water_mask = manifest.kind.water_mask;
   if (manifest.kind.metadata) layer.metadata_levels = dataset.metadata_levels;
@@ -41,10 +38,7 @@ std::string TileJson(const Manifest& manifest) {
   tiles.max_zoom = manifest.max_level;
   tiles.tile_size = manifest.kind.height_size;
   tiles.encoding = manifest.kind.height_encoding;
-  tiles.west = dataset.bounds.west;
-  tiles.south = dataset.bounds.south;
-  tiles.east = dataset.bounds.east;
-  tiles.north = dataset.bounds.north;
+  tiles.bounds = dataset.bounds;
   return proto::EncodeTileJson(tiles);
 }
 

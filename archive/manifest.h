@@ -76,10 +76,9 @@ struct Manifest {
 inline constexpr int kTopLevels = 7;
 
 // The formats in the order of their folders, and the folders' names.
-inline constexpr std::array<std::pair<tiler::TileFormat, std::string_view>, 3> kFormatNames = {
-    {{tiler::TileFormat::kQuantizedMesh, "terrain"},
-     {tiler::TileFormat::kGlb, "glb"},
-     {tiler::TileFormat::kHeightPng, "png"}}};
+inline constexpr Names<tiler::TileFormat, 3> kFormatNames = {{{"terrain", tiler::TileFormat::kQuantizedMesh},
+                                                              {"glb", tiler::TileFormat::kGlb},
+                                                              {"png", tiler::TileFormat::kHeightPng}}};
 
 // The name of a format in kFormatNames.
 std::string FolderOf(tiler::TileFormat format);

@@ -4,13 +4,13 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
+#include "engine/core/parse_number.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::archive {
@@ -20,42 +20,20 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormatMember = "terrace_archive";
 
-// Values and their names in the manifest. The first is what reading an absent member gives.
-template <typename T>
-using Names = std::vector<std::pair<T, std::string_view>>;
-
-const Names<tiler::TileFormat> kFormats(kFormatNames.begin(), kFormatNames.end());
-const Names<tiler::Coding> kCodings = {{tiler::Coding::kIdentity, "identity"}, {tiler::Coding::kGzip, "gzip"}};
-const Names<proto::GlbCompression> kCompressions = {{proto::GlbCompression::kDraco, "draco"},
-                                                    {proto::GlbCompression::kNone, "none"},
-                                                    {proto::GlbCompression::kQuantized, "quantized"},
-                                                    {proto::GlbCompression::kMeshopt, "meshopt"}};
-const Names<proto::TextureFormat> kTextures = {{proto::TextureFormat::kNone, "none"},
-                                               {proto::TextureFormat::kJpeg, "jpeg"},
-                                               {proto::TextureFormat::kWebp, "webp"}};
-const Names<proto::HeightEncoding> kEncodings = {{proto::HeightEncoding::kMapbox, "mapbox"},
-                                                 {proto::HeightEncoding::kTerrarium, "terrarium"}};
+constexpr Names<tiler::Coding, 2> kCodingNames = {
+    {{"identity", tiler::Coding::kIdentity}, {"gzip", tiler::Coding::kGzip}}};
 
 // Thrown only inside ParseManifest.
 struct Wrong : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-template <typename T>
-std::string_view NameOf(const Names<T>& names, T value) {
-  for (const auto& [known, name] : names) {
-    if (known == value) return name;
-  }
-  return names.front().second;
-}
-
-template <typename T>
-T ValueOf(const Names<T>& names, const Json& json) {
+template <typename Table>
+auto ValueOf(const Table& names, const Json& json) {
   const auto& text = json.get_ref<const std::string&>();
-  for (const auto& [value, name] : names) {
-    if (name == text) return value;
-  }
-  throw Wrong(fmt::format("'{}' is unknown", text));
+  const auto value = ValueNamed(names, text);
+  if (!value) throw Wrong(fmt::format("'{}' is unknown", text));
+  return *value;
 }
 
 std::uint64_t HexOf(const Json& json) {
@@ -97,7 +75,7 @@ Json DatasetJson(const BakedDataset& dataset) {
   json["version"] = tiler::VersionText(generation);
   json["generation"] = fmt::format("{:016x}", generation);
   json["error_fraction"] = error_fraction;
-  json["glb_compression"] = NameOf(kCompressions, glb_compression);
+  json["glb_compression"] = NameIn(proto::kGlbCompressionNames, glb_compression);
   json["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
   json["heights"] = {heights.min, heights.max};
   json["floor"] = floor_m;
@@ -116,7 +94,7 @@ BakedDataset ReadDataset(const Json& json) {
   dataset.generation = HexOf(json.at("generation"));
   dataset.error_fraction = NumberOf(json.at("error_fraction"));
   if (dataset.error_fraction <= 0) throw Wrong("error_fraction must be above 0");
-  dataset.glb_compression = ValueOf(kCompressions, json.at("glb_compression"));
+  dataset.glb_compression = ValueOf(proto::kGlbCompressionNames, json.at("glb_compression"));
   const Json& bounds = json.at("bounds");
   dataset.bounds = {NumberOf(bounds.at(0)), NumberOf(bounds.at(1)), NumberOf(bounds.at(2)), NumberOf(bounds.at(3))};
   dataset.heights = {NumberOf(json.at("heights").at(0)), NumberOf(json.at("heights").at(1))};
@@ -137,14 +115,14 @@ Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_step
   static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
   static_cast<void>(map);  // archives have no tiles for maps
   Json json;
-  json["format"] = NameOf(kFormats, format);
-  json["coding"] = NameOf(kCodings, coding);
+  json["format"] = NameIn(kFormatNames, format);
+  json["coding"] = NameIn(kCodingNames, coding);
   json["octvertexnormals"] = normals;
   json["watermask"] = water_mask;
   json["metadata"] = metadata;
-  json["compression"] = NameOf(kCompressions, compression);
-  json["texture"] = NameOf(kTextures, texture);
-  json["encoding"] = NameOf(kEncodings, height_encoding);
+  json["compression"] = NameIn(proto::kGlbCompressionNames, compression);
+  json["texture"] = NameIn(proto::kTextureFormatNames, texture);
+  json["encoding"] = NameIn(proto::kHeightEncodingNames, height_encoding);
   json["size"] = height_size;
   json["error_steps"] = error_steps;
   return json;
@@ -152,14 +130,14 @@ Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_step
 
 void ReadKind(const Json& json, Manifest& manifest) {
   tiler::TileRequest& kind = manifest.kind;
-  kind.format = ValueOf(kFormats, json.at("format"));
-  kind.coding = ValueOf(kCodings, json.at("coding"));
+  kind.format = ValueOf(kFormatNames, json.at("format"));
+  kind.coding = ValueOf(kCodingNames, json.at("coding"));
   kind.normals = json.at("octvertexnormals").get<bool>();
   kind.water_mask = json.at("watermask").get<bool>();
   kind.metadata = json.at("metadata").get<bool>();
-  kind.compression = ValueOf(kCompressions, json.at("compression"));
-  kind.texture = ValueOf(kTextures, json.at("texture"));
-  kind.height_encoding = ValueOf(kEncodings, json.at("encoding"));
+  kind.compression = ValueOf(proto::kGlbCompressionNames, json.at("compression"));
+  kind.texture = ValueOf(proto::kTextureFormatNames, json.at("texture"));
+  kind.height_encoding = ValueOf(proto::kHeightEncodingNames, json.at("encoding"));
   kind.height_size = WholeOf<int>(json.at("size"), 1, 1 << 16);
   if (std::ranges::find(tiler::kHeightSizes, kind.height_size) == tiler::kHeightSizes.end()) {
     throw Wrong("size must be 256 or 512");
@@ -242,10 +220,7 @@ Manifest Read(const Json& json) {
 
 std::optional<std::uint64_t> ParseHex16(std::string_view text) {
   constexpr std::size_t kDigits = 16;
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, 16);
-  if (text.size() != kDigits || error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
+  return text.size() == kDigits ? ParseNumber<std::uint64_t>(text, 16) : std::nullopt;
 }
 
 std::string ToJson(const Manifest& manifest) {

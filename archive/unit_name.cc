@@ -26,10 +26,7 @@ bool TakeHyphen(std::string_view& text) {
 
 }  // namespace
 
-std::string FolderOf(tiler::TileFormat format) {
-  const auto* const row = std::ranges::find(kFormatNames, format, [](const auto& known) { return known.first; });
-  return std::string(row->second);
-}
+std::string FolderOf(tiler::TileFormat format) { return std::string(NameIn(kFormatNames, format)); }
 
 std::string UnitNameOf(const geo::TileKey& key) {
   if (key.level < kTopLevels) return std::string(kTop);

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -18,6 +17,7 @@
 #include "archive/files/bucket.h"
 #include "bake/place_files.h"
 #include "engine/core/errno_text.h"
+#include "engine/core/parse_number.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::bake {
@@ -68,9 +68,8 @@ struct Owner {
     if (host != HostName()) return false;
     if (boot != BootOf()) return true;
     if (space != NumberSpace()) return false;
-    long number = 0;
-    const auto [end, error] = std::from_chars(pid.data(), pid.data() + pid.size(), number);
-    if (error != std::errc() || number <= 0) return false;
+    const long number = ParseNumber<long>(pid).value_or(0);
+    if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
     const std::string now = StartOf(number);
     return !start.empty() && !now.empty() && now != start;
@@ -130,8 +129,7 @@ Result<std::string> OtherLock(const std::string& place, const std::string& own) 
 
 // Whether it is a file or folder of tiles.
 bool IsContent(const std::string& name) {
-  return name == archive::UnitPath("top") || name == "units" ||
-         std::ranges::any_of(archive::kFormatNames, [&](const auto& format) { return format.second == name; });
+  return name == archive::UnitPath("top") || name == "units" || ValueNamed(archive::kFormatNames, name).has_value();
 }
 
 bool IsOurs(const std::string& name) {
@@ -241,7 +239,7 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
     if (auto same = CheckSame(place, ReadText(file), identity, file.string()); !same) return same;
   }
   std::vector<std::string> archives = {place};
-  for (const auto& [format, name] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
+  for (const auto& [name, format] : archive::kFormatNames) archives.push_back(fmt::format("{}/{}", place, name));
   for (const std::string& archive : archives) {
     if (!Exists(fs::path(archive) / archive::kManifestFile)) continue;
     is_known = true;

@@ -53,7 +53,7 @@ install(EXPORT terrace_targets NAMESPACE terrace:: FILE terraceTargets.cmake
 
 file(GLOB terrace_interface RELATIVE "${PROJECT_SOURCE_DIR}"
   "${PROJECT_SOURCE_DIR}/tiler/*.h" "${PROJECT_SOURCE_DIR}/engine/dem/*.h" "${PROJECT_SOURCE_DIR}/engine/geo/*.h")
-terrace_reached_headers(terrace_headers ${terrace_interface})
+terrace_reached_headers(terrace_headers ${terrace_interface} tiler/store/tile_tiers.h)
 foreach(header IN LISTS terrace_headers)
   cmake_path(GET header PARENT_PATH folder)
   install(FILES "${PROJECT_SOURCE_DIR}/${header}" DESTINATION "include/terrace/${folder}"

@@ -210,6 +210,7 @@ struct ConfigError {
   std::string path;     // JSON Pointer (RFC 6901) such as "/datasets/0/sources/1", or a flag such as "--listen"
   std::string message;  // what is wrong and how to correct it
 
+  std::string Text() const { return path.empty() ? message : path + ": " + message; }
   friend bool operator==(const ConfigError&, const ConfigError&) = default;
 };
 

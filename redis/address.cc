@@ -1,20 +1,13 @@
 #include "redis/address.h"
 
-#include <charconv>
 #include <optional>
+
+#include "engine/core/parse_number.h"
 
 namespace terrace::redis {
 namespace {
 
 constexpr const char* kForm = "redis://[user[:password]@]HOST:PORT/DATABASE, or rediss:// for TLS";
-
-template <typename Number>
-std::optional<Number> NumberOf(std::string_view text, Number max) {
-  Number number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size() || number > max) return std::nullopt;
-  return number;
-}
 
 // Nothing: a percent sign without two hexadecimal digits.
 std::optional<std::string> Decoded(std::string_view text) {
@@ -24,11 +17,10 @@ std::optional<std::string> Decoded(std::string_view text) {
       decoded += text[i];
       continue;
     }
-    unsigned code = 0;
     const std::string_view digits = text.substr(i + 1, 2);
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), code, 16);
-    if (digits.size() != 2 || error != std::errc() || end != digits.data() + 2) return std::nullopt;
-    decoded += static_cast<char>(code);
+    const auto code = ParseNumber<unsigned>(digits, 16);
+    if (digits.size() != 2 || !code) return std::nullopt;
+    decoded += static_cast<char>(*code);
     i += 2;
   }
   return decoded;
@@ -86,14 +78,14 @@ Result<Address> ParseAddress(std::string_view url) {
   if (host.empty()) return wrong("has no host");
   address.host = host;
   if (has_port) {
-    const auto number = NumberOf<std::uint16_t>(port, 65535);
+    const auto number = ParseNumber<std::uint16_t>(port);
     if (!number || *number == 0) return wrong("has a port that is no number from 1 to 65535");
     address.port = *number;
   }
   if (!path.empty()) {
     constexpr int kMaxDatabase = 1'000'000;
-    const auto number = NumberOf<int>(path, kMaxDatabase);
-    if (!number || *number < 0) return wrong("has a database that is no number");
+    const auto number = ParseNumber<int>(path);
+    if (!number || *number < 0 || *number > kMaxDatabase) return wrong("has a database that is no number");
     address.database = *number;
   }
   return address;

@@ -32,7 +32,7 @@ Result<void> SetLevels(tiler::TileSelection& selection, std::string_view text) {
 }
 
 struct Purged {
-  TileService::Erased tiles;
+  tiler::TileTiers::Erased tiles;
   tiler::RefinementCache::Erased refinements;
 };
 
@@ -40,7 +40,7 @@ struct Purged {
 Result<Purged> EraseAll(const AdminParts& parts, const tiler::TileSelection& selection, const std::stop_token& stop) {
   Result<tiler::RefinementCache::Erased> refinements;
   if (parts.refinements != nullptr) refinements = parts.refinements->Erase(selection, stop);
-  Result<TileService::Erased> tiles = parts.tiles.Erase(selection, stop);
+  Result<tiler::TileTiers::Erased> tiles = parts.tiles.Erase(selection, stop);
   if (!refinements) return tl::unexpected(std::move(refinements.error()));
   if (!tiles) return tl::unexpected(std::move(tiles.error()));
   return Purged{*std::move(tiles), *refinements};
@@ -59,19 +59,13 @@ std::string PurgedJson(const Purge& purge, const Purged& purged) {
 }  // namespace
 
 Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
-  std::array<std::optional<std::string>, 3> values;
-  constexpr std::array<std::string_view, 3> kKnown = {"dataset", "bbox", "levels"};
-  for (const auto& [name, value] : *sent) {
-    const auto known = std::ranges::find(kKnown, name);
-    if (known == kKnown.end()) {
-      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are dataset, bbox, levels");
-    }
-    std::optional<std::string>& place = values[static_cast<std::size_t>(known - kKnown.begin())];
-    if (place) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", *known);
-    place = value;
-  }
+  constexpr std::array<const char*, 3> kNames = {"dataset", "bbox", "levels"};
+  std::array<std::optional<std::string>, kNames.size()> values;
+  const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) -> Result<void> {
+    values[i] = value;
+    return {};
+  });
+  if (!read) return tl::unexpected(read.error());
   const auto& [dataset, box, levels] = values;
   if (!dataset) return MakeError(ErrorCode::kInvalidArgument, "dataset is missing: name the one to purge");
   const Result<std::uint32_t> index = FindDataset(*dataset, catalog.datasets);

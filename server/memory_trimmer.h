@@ -8,8 +8,6 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
 namespace terrace::server {
@@ -19,17 +17,9 @@ class MemoryTrimmer {
   // Trims at most once per period, if the process has done enough computing in it. Does nothing if the C library has no
   // function for it.
   explicit MemoryTrimmer(std::chrono::milliseconds period = std::chrono::seconds(3));
-  ~MemoryTrimmer();
-  MemoryTrimmer(const MemoryTrimmer&) = delete;
-  MemoryTrimmer& operator=(const MemoryTrimmer&) = delete;
 
  private:
-  void Run(std::chrono::milliseconds period);
-
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopped_ = false;
-  std::thread thread_;
+  std::jthread thread_;
 };
 
 }  // namespace terrace::server

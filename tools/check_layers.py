@@ -36,8 +36,8 @@ DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/st
        "engine/bound", "engine/edits", "engine/image", "engine/export"]
 # Headers of other modules that count as the own of the first: every module that may include it may include these.
 PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
-    ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/dem_types.h", "crs/geodesic_path.h", "export/contour_lines.h",
-                              "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
+    ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/dem_types.h", "common/parallel_for.h", "crs/geodesic_path.h",
+                              "export/contour_lines.h", "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",
                               "gdal/source_policy.h", "image/imagery.h", "image/raster_colors.h", "image/water_raster.h", "sight/sight_ray.h",
                               "sources/read_raster.h", "statistics/averages_budget.h", "statistics/cache_folder.h")),
     ("config", "config", ("config.h", "common/cache_place.h", "common/listen_address.h", "common/token_hash.h",
@@ -126,7 +126,7 @@ LIBRARIES = [
     Library("OpenSSL", r"openssl/.*|boost/asio/ssl.*", r"(config/common/token_hash|archive/files/zip_writer|fly/http/http_client|redis/socket|server/net/.*)\.cc"),
     Library("Boost.Geometry", r"boost/geometry/.*", r"engine/(common|edits)/.*\.cc"),
     Library("Boost.JSON", r"boost/json.*", r"server/query/json_parameters\.cc"),
-    Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc)"),
+    Library("Boost", r"boost/.*", r"(server/|fly/http/http_client\.cc|fly/flight/)"),
     Library("CLI11", r"CLI/.*", r"server/cli/"),
     Library("systemd", r"systemd/.*", r"server/cli/.*\.cc"),
     Library("prometheus-cpp", r"prometheus/.*", r"server/.*\.cc"),

@@ -1,12 +1,12 @@
 #include "bake/queue/redis_queue.h"
 
 #include <algorithm>
-#include <charconv>
 #include <condition_variable>
 #include <random>
 #include <utility>
 
 #include "bake/queue/job_scripts.h"
+#include "engine/core/parse_number.h"
 
 namespace terrace::bake {
 namespace {
@@ -83,9 +83,7 @@ Result<void> RedisQueue::Enter(bool is_emptied) {
     if (FieldOf(*job, "state") == "baking") {
       if (auto same = CheckIdentity(*job); !same) return same;
       if (!is_emptied || incarnation != Incarnation()) {
-        const std::string lease = FieldOf(*job, "lease_ms");
-        milliseconds::rep number = 0;
-        std::from_chars(lease.data(), lease.data() + lease.size(), number);
+        const auto number = ParseNumber<milliseconds::rep>(FieldOf(*job, "lease_ms")).value_or(0);
         SetJob(incarnation, milliseconds(number > 0 ? number : options_.lease.count()));
         return {};
       }

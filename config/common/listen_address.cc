@@ -4,8 +4,9 @@
 #include <sys/un.h>
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
+
+#include "engine/core/parse_number.h"
 
 namespace terrace::config {
 namespace {
@@ -31,13 +32,6 @@ bool IsHostName(std::string_view host) {
          std::all_of(host.begin(), host.end(), is_allowed);
 }
 
-std::optional<std::uint16_t> ParsePort(std::string_view text) {
-  std::uint16_t port = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return port;
-}
-
 }  // namespace
 
 Result<ListenAddress> ParseListenAddress(std::string_view text) {
@@ -49,7 +43,7 @@ Result<ListenAddress> ParseListenAddress(std::string_view text) {
   if (colon == std::string_view::npos || text.ends_with(']')) {
     return MakeError(ErrorCode::kInvalidArgument, "has no port; write {}", kExamples);
   }
-  const std::optional<std::uint16_t> port = ParsePort(text.substr(colon + 1));
+  const std::optional<std::uint16_t> port = ParseNumber<std::uint16_t>(text.substr(colon + 1));
   std::string host(text.substr(0, colon));
   const bool bracketed = host.size() >= 2 && host.front() == '[' && host.back() == ']';
   if (bracketed) host = host.substr(1, host.size() - 2);

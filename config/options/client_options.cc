@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <filesystem>
 #include <string_view>
 
 #include "config/common/token_hash.h"
 #include "config/options/option_table.h"
+#include "engine/core/parse_number.h"
 
 namespace terrace::config {
 namespace {
@@ -62,11 +62,8 @@ std::string CheckRange(const std::string& text) {
   bool fits = is_v4 || is_v6;
   if (slash < text.size()) {
     const std::string_view digits = std::string_view(text).substr(slash + 1);
-    unsigned bits = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), bits);
-    const bool is_plain =
-        error == std::errc() && end == digits.data() + digits.size() && digits == std::to_string(bits);
-    fits = fits && is_plain && bits <= (is_v4 ? 32u : 128u);
+    const auto bits = ParseNumber<unsigned>(digits);
+    fits = fits && bits && digits == std::to_string(*bits) && *bits <= (is_v4 ? 32u : 128u);
   }
   return fits ? ""
               : "must be an address or a range of addresses, such as \"127.0.0.1\", \"10.0.0.0/8\" or \"fd00::/8\"";

@@ -45,18 +45,8 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
 }
 
 Codec<Config> DiskCacheOption() {
-  return {[](const Json& value, const ConfigLocation& place, Config& config) {
-            if (!value.is_object()) return place.Expected(R"({"directory": "/var/cache/terrace"})");
-            ReadObject(value, place, DiskCacheOptionTable(), config.disk_cache);
-          },
-          [](const Config& config) {
-            return config.disk_cache.directory.empty() ? Json()
-                                                       : WriteObject(config.disk_cache, DiskCacheOptionTable());
-          },
-          [](const std::string& text) {
-            return Json{{"directory", text}};
-          },
-          ObjectSchema(DiskCacheOptionTable())};
+  return ObjectOf(&Config::disk_cache, &DiskCacheConfig::directory, DiskCacheOptionTable(),
+                  R"({"directory": "/var/cache/terrace"})");
 }
 
 }  // namespace terrace::config

@@ -16,6 +16,7 @@
 
 #include "config/input/config_location.h"
 #include "config/input/json_text.h"
+#include "engine/core/names.h"
 
 namespace terrace::config {
 
@@ -23,7 +24,7 @@ template <typename Target>
 struct Codec {
   std::function<void(const Json&, const ConfigLocation&, Target&)> read;
   std::function<Json(const Target&)> write;
-  Json (*from_text)(const std::string&) = nullptr;  // null: the option has no flag
+  std::function<Json(const std::string&)> from_text = nullptr;  // null: the option has no flag
   Json schema = {};
 };
 
@@ -147,6 +148,11 @@ Codec<Target> Choice(Member Target::*member, std::vector<std::pair<Json, Member>
             return Json();
           },
           TextToJson, std::move(schema)};
+}
+
+template <typename Target, typename Member, std::size_t kCount>
+Codec<Target> Choice(Member Target::*member, const Names<Member, kCount>& names) {
+  return Choice(member, std::vector<std::pair<Json, Member>>(names.begin(), names.end()));
 }
 
 // Text that passes `check`, which returns "must be ..." or an empty string.

@@ -62,6 +62,25 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template <typename Target>
 Json ObjectSchema(const std::vector<Option<Target>>& table);
 
+// An object with the options of `table`, which outlives the codec; as a flag the text of its first option alone. That
+// option is the object's member `first`; the object has no value while it is empty. `example`: for the error that the
+// value is no object.
+template <typename Target, typename Object>
+Codec<Target> ObjectOf(Object Target::*member, std::string Object::*first, const std::vector<Option<Object>>& table,
+                       const char* example) {
+  return {[=, &table](const Json& value, const ConfigLocation& place, Target& target) {
+            if (!value.is_object()) return place.Expected(example);
+            ReadObject(value, place, table, target.*member);
+          },
+          [=, &table](const Target& target) {
+            return (target.*member.*first).empty() ? Json() : WriteObject(target.*member, table);
+          },
+          [&table](const std::string& text) {
+            return Json{{std::string(table.front().key), text}};
+          },
+          ObjectSchema(table)};
+}
+
 // dataset_name.cc
 // First path segments of the server's own URLs.
 std::span<const std::string_view> ReservedDatasetNames();

@@ -71,18 +71,8 @@ const std::vector<Option<SharedCacheConfig>>& SharedCacheOptionTable() {
 }
 
 Codec<Config> SharedCacheOption() {
-  return {[](const Json& value, const ConfigLocation& place, Config& config) {
-            if (!value.is_object()) return place.Expected(R"({"url": "redis://HOST:6379/0"})");
-            ReadObject(value, place, SharedCacheOptionTable(), config.shared_cache);
-          },
-          [](const Config& config) {
-            return config.shared_cache.url.empty() ? Json()
-                                                   : WriteObject(config.shared_cache, SharedCacheOptionTable());
-          },
-          [](const std::string& text) {
-            return Json{{"url", text}};
-          },
-          ObjectSchema(SharedCacheOptionTable())};
+  return ObjectOf(&Config::shared_cache, &SharedCacheConfig::url, SharedCacheOptionTable(),
+                  R"({"url": "redis://HOST:6379/0"})");
 }
 
 }  // namespace terrace::config

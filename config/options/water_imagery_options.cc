@@ -68,9 +68,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
        .value = "FORMAT",
        .help = "Format of textures whose requests do not name one: jpeg, webp or none",
        .details = "`webp` is smaller; not every client reads it",
-       .codec = Choice(&ImageryConfig::texture, {{"jpeg", proto::TextureFormat::kJpeg},
-                                                 {"webp", proto::TextureFormat::kWebp},
-                                                 {"none", proto::TextureFormat::kNone}})},
+       .codec = Choice(&ImageryConfig::texture, proto::kTextureFormatNames)},
       {.key = "size",
        .value = "PIXELS",
        .help = "Largest number of pixels along the edge of a tile",
@@ -88,17 +86,7 @@ const std::vector<Option<ImageryConfig>>& ImageryOptionTable() {
 Codec<DatasetConfig> WaterCodec() { return {ReadWater, WriteWater, WaterToJson, WaterSchema()}; }
 
 Codec<DatasetConfig> ImageryCodec() {
-  return {[](const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
-            if (!value.is_object()) return place.Expected(R"({"image": "photo.tif"})");
-            ReadObject(value, place, ImageryOptionTable(), dataset.imagery);
-          },
-          [](const DatasetConfig& dataset) {
-            return dataset.imagery.image.empty() ? Json() : WriteObject(dataset.imagery, ImageryOptionTable());
-          },
-          [](const std::string& text) {
-            return Json{{"image", text}};
-          },
-          ObjectSchema(ImageryOptionTable())};
+  return ObjectOf(&DatasetConfig::imagery, &ImageryConfig::image, ImageryOptionTable(), R"({"image": "photo.tif"})");
 }
 
 }  // namespace terrace::config

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
+#include "engine/geo/geo_bounds.h"
 #include "engine/geo/lattice.h"
 
 namespace terrace::dem {
@@ -86,10 +87,7 @@ struct HeightRange {
   double max = 0;
 };
 
-// Degrees. west > east: the box crosses the antimeridian.
-struct GeoBounds {
-  double west = -180, south = -90, east = 180, north = 90;
-};
+using geo::GeoBounds;
 
 // Degrees.
 struct GeoPosition {

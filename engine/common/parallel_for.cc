@@ -9,7 +9,7 @@
 
 namespace terrace::dem {
 
-void ParallelFor(std::size_t count, const std::function<bool(std::size_t)>& work) {
+void ParallelFor(std::size_t count, const std::function<bool(std::size_t)>& work, std::size_t threads) {
   std::mutex mutex;  // guards what follows
   std::size_t next = 0, thrower = 0;
   std::exception_ptr thrown;  // what work(thrower) threw
@@ -30,16 +30,16 @@ void ParallelFor(std::size_t count, const std::function<bool(std::size_t)>& work
       i = take(goes_on);
     }
   };
-  std::vector<std::jthread> threads;
-  const std::size_t cores = std::max(1U, std::thread::hardware_concurrency());
+  std::vector<std::jthread> others;
+  if (threads == 0) threads = std::max(1U, std::thread::hardware_concurrency());
   try {
-    threads.reserve(cores);
-    while (threads.size() + 1 < std::min(cores, count)) threads.emplace_back(run);
+    others.reserve(std::min(threads, count));
+    while (others.size() + 1 < std::min(threads, count)) others.emplace_back(run);
   } catch (const std::system_error&) {
     // If a thread cannot be created, the existing ones do the work.
   }
   run();
-  threads.clear();
+  others.clear();
   if (thrown != nullptr) std::rethrow_exception(thrown);
 }
 

@@ -6,9 +6,9 @@
 
 namespace terrace::dem {
 
-// Calls work(0), work(1) .. work(count - 1) on as many threads as there are cores, including this one. Calls begin in
-// this order; after one returns false, no other begins. Returns when all calls that began have ended, and rethrows the
-// first exception. If threads cannot be created, uses fewer.
-void ParallelFor(std::size_t count, const std::function<bool(std::size_t)>& work);
+// Calls work(0), work(1) .. work(count - 1) on `threads` threads, including this one; 0: as many as there are cores.
+// Calls begin in this order; after one returns false, no other begins. Returns when all calls that began have ended,
+// and rethrows the first exception. If threads cannot be created, uses fewer.
+void ParallelFor(std::size_t count, const std::function<bool(std::size_t)>& work, std::size_t threads = 0);
 
 }  // namespace terrace::dem

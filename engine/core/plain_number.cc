@@ -35,4 +35,12 @@ std::string PlainNumberUp(double value, int digits) {
   return printed < value ? WithDecimals(printed + std::pow(10.0, -decimals), decimals) : text;
 }
 
+std::string Grouped(std::uint64_t number) {
+  std::string digits = std::to_string(number);
+  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3) {
+    digits.insert(static_cast<std::size_t>(at), 1, ',');
+  }
+  return digits;
+}
+
 }  // namespace terrace

@@ -1,6 +1,7 @@
 // Numbers in messages: only digits, no exponent.
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 namespace terrace {
@@ -11,5 +12,8 @@ std::string PlainNumber(double value, int digits = 6);
 
 // Like PlainNumber, but rounds up: a printed bound still holds.
 std::string PlainNumberUp(double value, int digits);
+
+// "1,234,567"
+std::string Grouped(std::uint64_t number);
 
 }  // namespace terrace

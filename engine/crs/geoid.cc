@@ -65,8 +65,8 @@ ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
 // The longitude in -180 .. 180, as areas of use and PROJ require.
 double WithinOneTurn(double longitude) { return longitude - 360 * std::floor((longitude + 180) / 360); }
 
-AreaOfUse AreaOf(PJ_CONTEXT* context, const PJ* operation) {
-  AreaOfUse area, told;
+geo::GeoBounds AreaOf(PJ_CONTEXT* context, const PJ* operation) {
+  geo::GeoBounds area, told;
   if (proj_get_area_of_use(context, operation, &told.west, &told.south, &told.east, &told.north, nullptr) == 0 ||
       told.west < -180) {  // it is not known
     return area;
@@ -146,7 +146,8 @@ double CellOf(const std::string& file) {
 
 }  // namespace
 
-bool AreaOfUse::Covers(Position degrees) const {
+bool Covers(const geo::GeoBounds& area, Position degrees) {
+  const auto& [west, south, east, north] = area;
   const double longitude = WithinOneTurn(degrees.x);
   const bool between = west <= east ? longitude >= west && longitude <= east : longitude >= west || longitude <= east;
   return between && degrees.y >= south && degrees.y <= north;
@@ -179,7 +180,7 @@ std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, 
 }
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
-  if (auto known = FindShared(vertical_crs, nullptr); known && known->area_.Covers(centre)) {
+  if (auto known = FindShared(vertical_crs, nullptr); known && Covers(known->area_, centre)) {
     return Checked(std::move(known), centre);
   }
   const ProjContextPtr context = MakeProjContext();
@@ -198,7 +199,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
   for (int i = 0; i < count; ++i) {
     const ProjObjectPtr operation(proj_list_get(context.get(), operations.get(), i));
     geoid->area_ = AreaOf(context.get(), operation.get());
-    if (!geoid->area_.Covers(centre)) continue;
+    if (!Covers(geoid->area_, centre)) continue;
     const std::vector<ProjGrid> grids = GridsOf(context.get(), operation.get());
     const auto absent = std::ranges::find_if(grids, [](const ProjGrid& grid) { return grid.file.empty(); });
     if (absent != grids.end()) {

@@ -14,16 +14,12 @@
 #include "engine/crs/undulation_grid.h"
 #include "engine/gdal/file_content.h"
 #include "engine/gdal/operation_pool.h"
+#include "engine/geo/geo_bounds.h"
 
 namespace terrace::dem {
 
-// Degrees. west > east: the area crosses the antimeridian. The default is the whole Earth.
-struct AreaOfUse {
-  double west = -180, south = -90, east = 180, north = 90;
-
-  // Longitudes count modulo 360 degrees.
-  bool Covers(Position degrees) const;
-};
+// Whether an area contains a position. Longitudes count modulo 360 degrees.
+bool Covers(const geo::GeoBounds& area, Position degrees);
 
 // Thread-safe: every call borrows a PROJ context of its own.
 class Geoid {
@@ -69,7 +65,7 @@ class Geoid {
   void FindGrid();
   static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
 
-  AreaOfUse area_;
+  geo::GeoBounds area_;  // of use
   std::string name_, unit_, description_;
   bool is_of_file_ = false;  // made by OfGrid: the pipeline contains a path
   StampedFiles files_;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <boost/asio/post.hpp>
 #include <charconv>
 #include <cmath>
 #include <utility>
@@ -49,7 +50,8 @@ std::string Describe(const HttpReply& reply, Outcome outcome) {
 
 }  // namespace
 
-Client::Client(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics)
+Client::Client(const FlightOptions& options, int number, HttpClient& http, boost::asio::thread_pool& workers,
+               Statistics& statistics)
     : options_(options), number_(number), http_(http), workers_(workers), statistics_(statistics) {}
 
 Outcome Client::OutcomeOf(const HttpReply& reply) {
@@ -122,7 +124,7 @@ void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) 
               decoded->tile = tile;
               decoded->version = version;
               decoded->reply = std::move(reply);
-              workers.Post([inbox, format, decoded] {
+              boost::asio::post(workers, [inbox, format, decoded] {
                 Decode(format, *decoded);
                 const std::lock_guard lock(inbox->mutex);
                 inbox->replies.push_back(std::move(*decoded));

@@ -1,13 +1,13 @@
 // One client: its tree of tiles, what it loads, and what it sees in each frame.
 #pragma once
 
+#include <boost/asio/thread_pool.hpp>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
 #include "fly/flight/flight.h"
-#include "fly/flight/worker_pool.h"
 
 namespace terrace::fly {
 
@@ -15,7 +15,8 @@ class Client {
  public:
   // `number` counts from 0. The references must outlive the client. Requests may end after it: their callbacks share
   // ownership of what they use.
-  Client(const FlightOptions& options, int number, HttpClient& http, WorkerPool& workers, Statistics& statistics);
+  Client(const FlightOptions& options, int number, HttpClient& http, boost::asio::thread_pool& workers,
+         Statistics& statistics);
 
   // Draws a frame at `now_s` seconds since the start of all clients. One thread at a time.
   void Frame(double now_s, bool is_late);
@@ -69,7 +70,7 @@ class Client {
   const FlightOptions& options_;
   const int number_;
   HttpClient& http_;
-  WorkerPool& workers_;
+  boost::asio::thread_pool& workers_;
   Statistics& statistics_;
   const std::shared_ptr<Inbox> inbox_ = std::make_shared<Inbox>();
 

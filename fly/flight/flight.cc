@@ -6,7 +6,6 @@
 
 #include "engine/core/elapsed_time.h"
 #include "fly/flight/client.h"
-#include "fly/flight/worker_pool.h"
 
 namespace terrace::fly {
 namespace {
@@ -42,7 +41,7 @@ void Fly(const FlightOptions& options, const std::atomic<bool>& stop,
   http_options.threads = std::min(cores, 4);
   http_options.clients = options.clients;
   // In this order: replies that arrive at the end still find the workers.
-  WorkerPool workers(cores);
+  boost::asio::thread_pool workers(static_cast<std::size_t>(cores));
   HttpClient http(http_options);
   std::vector<std::unique_ptr<Client>> clients;
   for (int i = 0; i < options.clients; ++i) {

@@ -5,21 +5,14 @@
 #include <algorithm>
 #include <iterator>
 
+#include "engine/core/plain_number.h"
+
 namespace terrace::fly {
 namespace {
 
 // The share of refined frames from which on the server keeps up. Below 1: a moving view waits for its next tiles in
 // some frames even if the server is fast.
 constexpr double kMinRefinedShare = 0.75;
-
-// "1,234,567"
-std::string Group(std::uint64_t number) {
-  std::string digits = std::to_string(number);
-  for (auto at = static_cast<std::ptrdiff_t>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), 1, ',');
-  }
-  return digits;
-}
 
 double Share(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(part) / static_cast<double>(whole);
@@ -74,15 +67,15 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
   }
   for (std::size_t i = 1; i < kOutcomes; ++i) {
     if (totals.outcomes[i] == 0) continue;
-    findings.push_back(fmt::format("{} requests: {}.", Group(totals.outcomes[i]), NameOf(static_cast<Outcome>(i))));
+    findings.push_back(fmt::format("{} requests: {}.", Grouped(totals.outcomes[i]), NameOf(static_cast<Outcome>(i))));
   }
   if (totals.version_changes > 0) {
     findings.push_back(fmt::format("The dataset changed its version {} times; {} frames showed tiles of two versions.",
-                                   totals.version_changes, Group(totals.mixed_frames)));
+                                   totals.version_changes, Grouped(totals.mixed_frames)));
   }
   if (totals.incomplete_tiles > 0) {
     findings.push_back(fmt::format("{} tiles do not cover their rectangle (edits with holes, or damage).",
-                                   Group(totals.incomplete_tiles)));
+                                   Grouped(totals.incomplete_tiles)));
   }
   if (Share(totals.late_frames, totals.frames) > 0.05) {
     findings.push_back(
@@ -161,29 +154,29 @@ std::string TextOf(const Summary& summary) {
                              : fmt::format("{} median, {} worst of {} clients", seconds_or_never(summary.first_view_s),
                                            seconds_or_never(summary.worst_first_view_s), summary.clients.size()));
   add("refined", fmt::format("{:.1f} % of {} frames of the flight; full {} after its end", 100 * summary.refined_share,
-                             Group(totals.flying_frames), seconds_or_never(summary.arrival_s)));
+                             Grouped(totals.flying_frames), seconds_or_never(summary.arrival_s)));
   add("error on screen",
       fmt::format("{:.1f} px in half of the frames, {:.1f} px in 99 %, {:.1f} px at most; stated by the "
                   "server {:.1f} px at most",
                   summary.frame_p50_px, summary.frame_p99_px, totals.worst_px, totals.worst_stated_px));
   add("holes", fmt::format("{} of {} examined frames, at most {:.2f} % of the screen", totals.hole_frames,
                            totals.measured_frames, 100 * totals.worst_hole));
-  add("tiles", fmt::format("{}, {:.1f} a second, {:.0f} in the best second; {} other requests", Group(totals.tiles),
-                           summary.tiles_per_second, summary.best_tiles_per_second, Group(totals.other_requests)));
-  add("received", fmt::format("{} bytes, {} triangles, {} connections", Group(totals.bytes), Group(totals.triangles),
-                              Group(totals.connections)));
+  add("tiles", fmt::format("{}, {:.1f} a second, {:.0f} in the best second; {} other requests", Grouped(totals.tiles),
+                           summary.tiles_per_second, summary.best_tiles_per_second, Grouped(totals.other_requests)));
+  add("received", fmt::format("{} bytes, {} triangles, {} connections", Grouped(totals.bytes),
+                              Grouped(totals.triangles), Grouped(totals.connections)));
   add("latency of tiles", fmt::format("p50 {}, p99 {}, at most {}", Milliseconds(summary.p50_s),
                                       Milliseconds(summary.p99_s), Milliseconds(summary.max_s)));
-  add("server had them",
-      fmt::format("in memory {}, lower tier {}, joined a build {}, built {}, not stated {}", Group(totals.tiers[0]),
-                  Group(totals.tiers[1]), Group(totals.tiers[2]), Group(totals.tiers[3]), Group(totals.tiers[4])));
+  add("server had them", fmt::format("in memory {}, lower tier {}, joined a build {}, built {}, not stated {}",
+                                     Grouped(totals.tiers[0]), Grouped(totals.tiers[1]), Grouped(totals.tiers[2]),
+                                     Grouped(totals.tiers[3]), Grouped(totals.tiers[4])));
   std::string failures;
   for (std::size_t i = 1; i < kOutcomes; ++i) {
     if (totals.outcomes[i] == 0) continue;
-    failures += fmt::format("{}{} {}", failures.empty() ? "" : ", ", Group(totals.outcomes[i]),
+    failures += fmt::format("{}{} {}", failures.empty() ? "" : ", ", Grouped(totals.outcomes[i]),
                             NameOf(static_cast<Outcome>(i)));
   }
-  add("failures", fmt::format("{}; {} retries", failures.empty() ? "none" : failures, Group(totals.retries)));
+  add("failures", fmt::format("{}; {} retries", failures.empty() ? "none" : failures, Grouped(totals.retries)));
   for (const std::string& finding : summary.findings) text += "! " + finding + "\n";
   return text;
 }

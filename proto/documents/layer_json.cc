@@ -37,10 +37,10 @@ bool AppendAvailable(const std::vector<std::vector<geo::TileRange>>& levels, con
   return true;
 }
 
-Json Bounds(const LayerDescription& layer) {
-  const bool crosses_antimeridian = layer.west > layer.east || layer.east > 180 || layer.west < -180;
-  if (crosses_antimeridian) return Json::array({-180, layer.south, 180, layer.north});
-  return Json::array({layer.west, layer.south, layer.east, layer.north});
+Json Bounds(const geo::GeoBounds& box) {
+  const bool crosses_antimeridian = box.west > box.east || box.east > 180 || box.west < -180;
+  if (crosses_antimeridian) return Json::array({-180, box.south, 180, box.north});
+  return Json::array({box.west, box.south, box.east, box.north});
 }
 
 }  // namespace
@@ -62,7 +62,7 @@ std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token
   json["tiles"] = Json::array({tile_template});
   json["minzoom"] = 0;
   json["maxzoom"] = layer.available.size() - 1;
-  json["bounds"] = Bounds(layer);
+  json["bounds"] = Bounds(layer.bounds);
   json["attribution"] = layer.attribution;
   json["extensions"] = Json::array();
   if (layer.normals) json["extensions"].push_back("octvertexnormals");

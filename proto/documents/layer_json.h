@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "engine/geo/geo_bounds.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::proto {
@@ -16,7 +17,7 @@ struct LayerDescription {
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
-  double west = -180, south = -90, east = 180, north = 90;
+  geo::GeoBounds bounds;
   bool normals = true;      // tiles have them on request
   bool water_mask = false;  // tiles have it on request
   int metadata_levels = 0;  // tiles at multiples of this level have metadata on request; 0: none

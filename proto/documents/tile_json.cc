@@ -8,11 +8,9 @@
 
 namespace terrace::proto {
 
-const char* ToString(HeightEncoding encoding) { return encoding == HeightEncoding::kMapbox ? "mapbox" : "terrarium"; }
-
 std::string EncodeTileJson(const TileJsonDescription& tiles) {
   using Json = nlohmann::ordered_json;
-  const bool crosses_antimeridian = tiles.west > tiles.east;
+  const bool crosses_antimeridian = tiles.bounds.west > tiles.bounds.east;
   const auto clipped = [](double latitude) {
     return std::clamp(latitude, -geo::kMercatorLatitude, geo::kMercatorLatitude);
   };
@@ -23,14 +21,14 @@ std::string EncodeTileJson(const TileJsonDescription& tiles) {
   json["tiles"] = Json::array({tiles.tile_template});
   json["minzoom"] = tiles.min_zoom;
   json["maxzoom"] = tiles.max_zoom;
-  json["bounds"] = Json::array({crosses_antimeridian ? -180 : tiles.west, clipped(tiles.south),
-                                crosses_antimeridian ? 180 : tiles.east, clipped(tiles.north)});
+  json["bounds"] = Json::array({crosses_antimeridian ? -180 : tiles.bounds.west, clipped(tiles.bounds.south),
+                                crosses_antimeridian ? 180 : tiles.bounds.east, clipped(tiles.bounds.north)});
   json["attribution"] = tiles.attribution;
   json["type"] = tiles.kind == TileJsonKind::kHeights    ? "raster-dem"
                  : tiles.kind == TileJsonKind::kPictures ? "raster"
                                                          : "vector";
   json["format"] = tiles.format;
-  if (tiles.kind == TileJsonKind::kHeights) json["encoding"] = ToString(tiles.encoding);
+  if (tiles.kind == TileJsonKind::kHeights) json["encoding"] = NameIn(kHeightEncodingNames, tiles.encoding);
   if (tiles.kind == TileJsonKind::kContours) {
     json["vector_layers"] = Json::array({{{"id", kContourLayer},
                                           {"description", "lines of equal height"},

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "engine/geo/geo_bounds.h"
 #include "proto/documents/height_png.h"
 
 namespace terrace::proto {
@@ -20,14 +21,10 @@ struct TileJsonDescription {
   int min_zoom = 0, max_zoom = 0;
   int tile_size = 256;
   HeightEncoding encoding = HeightEncoding::kMapbox;
-  // Degrees. west > east is a box across the antimeridian. TileJSON forbids such boxes: it then spans all longitudes.
-  double west = -180, south = -90, east = 180, north = 90;
+  geo::GeoBounds bounds;  // TileJSON forbids boxes across the antimeridian: its box then spans all longitudes
 };
 
 // UTF-8 JSON. Latitudes are clipped to Web Mercator's.
 std::string EncodeTileJson(const TileJsonDescription& tiles);
-
-// "mapbox", "terrarium": as in URLs and in TileJSON.
-const char* ToString(HeightEncoding encoding);
 
 }  // namespace terrace::proto

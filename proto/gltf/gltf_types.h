@@ -1,11 +1,9 @@
 // Enumerations that describe GLB tiles.
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <iterator>
-#include <optional>
-#include <string_view>
+
+#include "engine/core/names.h"
 
 namespace terrace::proto {
 
@@ -18,14 +16,10 @@ enum class GlbCompression : std::uint8_t {
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
 
-// The form with this name in URLs: draco, none, quantized or meshopt.
-inline std::optional<GlbCompression> GlbCompressionNamed(std::string_view name) {
-  constexpr std::string_view kNames[] = {"draco", "none", "quantized", "meshopt"};  // by value
-  for (std::size_t i = 0; i < std::size(kNames); ++i) {
-    if (name == kNames[i]) return static_cast<GlbCompression>(i);
-  }
-  return std::nullopt;
-}
+inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", GlbCompression::kDraco},
+                                                                   {"none", GlbCompression::kNone},
+                                                                   {"quantized", GlbCompression::kQuantized},
+                                                                   {"meshopt", GlbCompression::kMeshopt}}};
 
 // How the texture of a GLB tile is stored.
 enum class TextureFormat : std::uint8_t {
@@ -33,5 +27,8 @@ enum class TextureFormat : std::uint8_t {
   kJpeg,  // baseline, which every glTF client reads
   kWebp,  // lossy; smaller at the same quality number, for readers of EXT_texture_webp
 };
+
+inline constexpr Names<TextureFormat, 3> kTextureFormatNames = {
+    {{"jpeg", TextureFormat::kJpeg}, {"webp", TextureFormat::kWebp}, {"none", TextureFormat::kNone}}};
 
 }  // namespace terrace::proto

@@ -22,10 +22,7 @@ bool IsImagery(tiler::TileFormat format) {
 using SetParameter = Result<void> (*)(std::string_view text, MapTileParameters& parameters);
 
 Result<void> SetSize(std::string_view text, MapTileParameters& parameters) {
-  const Result<int> size = ParseTileSize(text);
-  if (!size) return tl::unexpected(size.error());
-  parameters.size = *size;
-  return {};
+  return SetTileSize(parameters.size, text);
 }
 
 Result<void> SetAzimuth(std::string_view text, MapTileParameters& parameters) {
@@ -63,11 +60,8 @@ Result<void> SetZFactor(std::string_view text, MapTileParameters& parameters) {
 }
 
 Result<void> SetStyle(std::string_view text, MapTileParameters& parameters) {
-  if (text != "colors" && text != "degrees") {
-    return MakeError(ErrorCode::kInvalidArgument, "style must be colors or degrees");
-  }
-  parameters.map.slope_style = text == "degrees" ? tiler::SlopeStyle::kDegrees : tiler::SlopeStyle::kColors;
-  return {};
+  return SetOneOf(parameters.map.slope_style, "style", text,
+                  {{"colors", tiler::SlopeStyle::kColors}, {"degrees", tiler::SlopeStyle::kDegrees}});
 }
 
 Result<void> SetInterval(std::string_view text, MapTileParameters& parameters) {
@@ -78,16 +72,13 @@ Result<void> SetInterval(std::string_view text, MapTileParameters& parameters) {
 }
 
 Result<void> SetPicture(std::string_view text, MapTileParameters& parameters) {
-  for (const auto format : {proto::PictureFormat::kPng, proto::PictureFormat::kWebp, proto::PictureFormat::kJpeg}) {
-    if (text != proto::ToString(format)) continue;
-    parameters.picture = format;
-    return {};
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "format must be png, webp or jpg");
+  using proto::PictureFormat;
+  return SetOneOf(parameters.picture, "format", text,
+                  {{"png", PictureFormat::kPng}, {"webp", PictureFormat::kWebp}, {"jpg", PictureFormat::kJpeg}});
 }
 
 struct MapParameterRow {
-  std::string_view name;
+  const char* name;
   bool (*is_of)(tiler::TileFormat format);
   SetParameter set;
   bool in_tile_json_only = false;
@@ -104,41 +95,24 @@ constexpr MapParameterRow kRows[] = {
      /*in_tile_json_only=*/true},
 };
 
-Error UnknownParameter(tiler::TileFormat format, bool in_tile_json) {
-  std::string known;
-  for (const MapParameterRow& row : kRows) {
-    if (!row.is_of(format) || (row.in_tile_json_only && !in_tile_json)) continue;
-    known += known.empty() ? "" : ", ";
-    known += row.name;
-  }
-  return {ErrorCode::kInvalidArgument, "unknown parameter; known are " + known};
-}
-
 }  // namespace
 
-Result<int> ParseTileSize(std::string_view text) {
-  for (const int size : tiler::kHeightSizes) {
-    if (text == fmt::format("{}", size)) return size;
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "size must be 256 or 512");
+Result<void> SetTileSize(int& size, std::string_view text) {
+  return SetOneOf(size, "size", text, {{"256", 256}, {"512", 512}});
 }
 
 Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format, bool in_tile_json) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
-  MapTileParameters parameters;
-  unsigned seen = 0;
-  for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
-    const auto* const row = std::ranges::find(kRows, std::string_view(name), &MapParameterRow::name);
-    if (row == std::end(kRows) || !row->is_of(format) || (row->in_tile_json_only && !in_tile_json)) {
-      return tl::unexpected(UnknownParameter(format, in_tile_json));
-    }
-    const unsigned bit = 1u << (row - std::begin(kRows));
-    if ((seen & bit) != 0) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", row->name);
-    seen |= bit;
-    if (Result<void> set = row->set(value, parameters); !set) return tl::unexpected(std::move(set.error()));
+  std::vector<const char*> names;
+  std::vector<SetParameter> set;
+  for (const MapParameterRow& row : kRows) {
+    if (!row.is_of(format) || (row.in_tile_json_only && !in_tile_json)) continue;
+    names.push_back(row.name);
+    set.push_back(row.set);
   }
+  MapTileParameters parameters;
+  const Result<void> read =
+      ReadParameters(query, names, [&](std::size_t i, const std::string& value) { return set[i](value, parameters); });
+  if (!read) return tl::unexpected(read.error());
   return parameters;
 }
 
@@ -178,8 +152,7 @@ int MinMapLevel(const MapTileParameters& parameters) {
 }
 
 dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
-  if (IsImagery(format)) return dataset.imagery->bounds;
-  return {dataset.west, dataset.south, dataset.east, dataset.north};
+  return IsImagery(format) ? dataset.imagery->bounds : dataset.bounds;
 }
 
 Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format) {

@@ -20,7 +20,7 @@ struct MapTileParameters {
 };
 
 // The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kHeightSizes.
-Result<int> ParseTileSize(std::string_view text);
+Result<void> SetTileSize(int& size, std::string_view text);
 
 // Parses the parameters of a format: `azimuth`, `altitude`, `zfactor` and `size` of hillshades; `style` and `size` of
 // slopes; `interval` of contours; `size` of imagery. `in_tile_json`: also `format` of pictures. `v` may be repeated.

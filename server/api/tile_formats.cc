@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
 #include "proto/error_text.h"
 #include "proto/mesh/tile_metadata.h"
@@ -141,21 +142,11 @@ Result<void> SetPositive(std::optional<double>& to, const char* name, std::strin
   return SetOnce(to, *value, name, repeatable);
 }
 
-Result<void> SetCompression(std::optional<proto::GlbCompression>& to, std::string_view text) {
-  if (const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(text)) {
-    return SetOnce(to, *compression, "compression", /*repeatable=*/true);
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
-}
-
-Result<void> SetTexture(std::optional<proto::TextureFormat>& to, std::string_view text) {
-  constexpr std::pair<std::string_view, proto::TextureFormat> kNames[] = {{"none", proto::TextureFormat::kNone},
-                                                                          {"jpeg", proto::TextureFormat::kJpeg},
-                                                                          {"webp", proto::TextureFormat::kWebp}};
-  for (const auto& [name, texture] : kNames) {
-    if (text == name) return SetOnce(to, texture, "texture", /*repeatable=*/true);
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "texture must be jpeg, webp or none");
+template <typename T, std::size_t kCount>
+Result<void> SetNamed(std::optional<T>& to, const char* name, std::string_view text, const Names<T, kCount>& names) {
+  T value{};
+  Result<void> set = SetOneOf(value, name, text, names);
+  return set ? SetOnce(to, value, name, /*repeatable=*/true) : set;
 }
 
 Result<void> CheckTogether(const RequestedError& requested) {
@@ -183,10 +174,8 @@ double Quality(std::string_view parameters) {
   while (!parameters.empty()) {
     const std::string_view parameter = NextPiece(parameters, ';', kBlanksAndQuotes);
     if (!parameter.starts_with("q=") && !parameter.starts_with("Q=")) continue;
-    double quality = 0;
-    const char* const last = parameter.data() + parameter.size();
-    const auto [end, error] = std::from_chars(parameter.data() + 2, last, quality, std::chars_format::fixed);
-    return error == std::errc() && end == last && quality >= 0 && quality <= 1 ? quality : 0;
+    const double quality = ParseNumber<double>(parameter.substr(2), std::chars_format::fixed).value_or(0);
+    return quality >= 0 && quality <= 1 ? quality : 0;
   }
   return 1;
 }
@@ -211,13 +200,12 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
       set = SetPositive(requested.fraction, "fraction", value, repeatable);
     } else if (name == "atleast" && allow_at_least) {
       if (at_least_given) return MakeError(ErrorCode::kInvalidArgument, "atleast is given more than once");
-      if (value != "0" && value != "1") return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
       at_least_given = true;
-      requested.at_least = value == "1";
+      set = SetOneOf(requested.at_least, "atleast", value, {{"0", false}, {"1", true}});
     } else if (name == "compression" && allow_compression) {
-      set = SetCompression(parameters.compression, value);
+      set = SetNamed(parameters.compression, "compression", value, proto::kGlbCompressionNames);
     } else if (name == "texture" && allow_compression) {
-      set = SetTexture(parameters.texture, value);
+      set = SetNamed(parameters.texture, "texture", value, proto::kTextureFormatNames);
     } else {
       set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
                       allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression, texture" : "");
@@ -229,29 +217,13 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
 }
 
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
-  std::optional<proto::HeightEncoding> encoding;
-  std::optional<int> size;
-  for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
-    if (name == "encoding") {
-      if (encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding is given more than once");
-      if (value == "mapbox") encoding = proto::HeightEncoding::kMapbox;
-      if (value == "terrarium") encoding = proto::HeightEncoding::kTerrarium;
-      if (!encoding) return MakeError(ErrorCode::kInvalidArgument, "encoding must be mapbox or terrarium");
-    } else if (name == "size") {
-      if (size) return MakeError(ErrorCode::kInvalidArgument, "size is given more than once");
-      const Result<int> known = ParseTileSize(value);
-      if (!known) return tl::unexpected(known.error());
-      size = *known;
-    } else {
-      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are encoding, size");
-    }
-  }
+  constexpr std::array<const char*, 2> kNames = {"encoding", "size"};
   HeightTileParameters parameters;
-  parameters.encoding = encoding.value_or(parameters.encoding);
-  parameters.size = size.value_or(parameters.size);
+  const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) {
+    return i == 0 ? SetOneOf(parameters.encoding, kNames[i], value, proto::kHeightEncodingNames)
+                  : SetTileSize(parameters.size, value);
+  });
+  if (!read) return tl::unexpected(read.error());
   return parameters;
 }
 

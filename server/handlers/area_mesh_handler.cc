@@ -38,24 +38,15 @@ Result<void> SetError(tiler::AreaRequest& area, std::string_view text) {
 
 Result<void> SetFormat(tiler::AreaRequest& area, std::string_view text) {
   using proto::MeshFileFormat;
-  for (const auto& [name, format] : {std::pair("glb", MeshFileFormat::kGlb), std::pair("obj", MeshFileFormat::kObj),
-                                     std::pair("ply", MeshFileFormat::kPly)}) {
-    if (text != name) continue;
-    area.format = format;
-    return {};
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "format must be glb, obj or ply");
+  return SetOneOf(area.format, "format", text,
+                  {{"glb", MeshFileFormat::kGlb}, {"obj", MeshFileFormat::kObj}, {"ply", MeshFileFormat::kPly}});
 }
 
 Result<void> SetCoordinates(tiler::AreaRequest& area, std::string_view text) {
-  for (const auto& [name, coordinates] :
-       {std::pair("enu", tiler::AreaCoordinates::kEnu), std::pair("ecef", tiler::AreaCoordinates::kEcef),
-        std::pair("geographic", tiler::AreaCoordinates::kGeographic)}) {
-    if (text != name) continue;
-    area.coordinates = coordinates;
-    return {};
-  }
-  return MakeError(ErrorCode::kInvalidArgument, "coordinates must be enu, ecef or geographic");
+  using tiler::AreaCoordinates;
+  return SetOneOf(
+      area.coordinates, "coordinates", text,
+      {{"enu", AreaCoordinates::kEnu}, {"ecef", AreaCoordinates::kEcef}, {"geographic", AreaCoordinates::kGeographic}});
 }
 
 std::string_view ContentTypeOf(proto::MeshFileFormat format) {
@@ -133,25 +124,15 @@ Result<dem::GeoBounds> ParseBox(std::string_view text) {
 }
 
 Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
-  using Set = Result<void> (*)(tiler::AreaRequest&, std::string_view);
-  constexpr std::array<std::pair<const char*, Set>, 4> kKnown = {
-      {{"bbox", SetBox}, {"error", SetError}, {"format", SetFormat}, {"coordinates", SetCoordinates}}};
+  constexpr std::array<const char*, 4> kNames = {"bbox", "error", "format", "coordinates"};
+  constexpr std::array kSet = {SetBox, SetError, SetFormat, SetCoordinates};
   tiler::AreaRequest area;
-  std::array<bool, kKnown.size()> given{};
-  for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
-    std::size_t i = 0;
-    while (i < kKnown.size() && name != kKnown[i].first) ++i;
-    if (i == kKnown.size()) {
-      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are bbox, error, format, coordinates");
-    }
-    if (std::exchange(given[i], true)) {
-      return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", kKnown[i].first);
-    }
-    if (const Result<void> set = kKnown[i].second(area, value); !set) return tl::unexpected(set.error());
-  }
+  std::array<bool, kNames.size()> given{};
+  const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) {
+    given[i] = true;
+    return kSet[i](area, value);
+  });
+  if (!read) return tl::unexpected(read.error());
   if (!given[0] || !given[1]) {
     return MakeError(ErrorCode::kInvalidArgument, "bbox=west,south,east,north and error=METRES are needed");
   }

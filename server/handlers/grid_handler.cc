@@ -76,9 +76,8 @@ Result<std::vector<float>> ReadNodes(const tiler::TilePipeline& pipeline, std::u
 
 // Where the data is, in words for `bbox`.
 std::string DataBox(const dem::OutputGrid& grid, const DatasetView& view) {
-  const dem::GeoBounds degrees{view.west, view.south, view.east, view.north};
-  const std::optional<dem::GeoBounds> there = dem::BoundsInCrs(grid, degrees);
-  const dem::GeoBounds& box = there ? *there : degrees;
+  const std::optional<dem::GeoBounds> there = dem::BoundsInCrs(grid, view.bounds);
+  const dem::GeoBounds& box = there ? *there : view.bounds;
   return fmt::format("{},{},{},{}{}", PlainNumber(box.west, kBoxDigits), PlainNumber(box.south, kBoxDigits),
                      PlainNumber(box.east, kBoxDigits), PlainNumber(box.north, kBoxDigits),
                      there ? "" : " in degrees of EPSG:4326");

@@ -24,10 +24,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
   layer.version = dataset.version();
   layer.attribution = dataset.attribution;
   layer.available = dataset.available;
-  layer.west = dataset.west;
-  layer.east = dataset.east;
-  layer.south = dataset.south;
-  layer.north = dataset.north;
+  layer.bounds = dataset.bounds;
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
   if (dataset.baked_alone) layer.normals = dataset.baked_alone->extent().normals;

@@ -20,7 +20,8 @@ std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParamete
   std::string query = "v=" + dataset.version();
   const auto add = [&query](const std::string& text) { query += "&" + text; };
   const HeightTileParameters defaults;
-  if (parameters.encoding != defaults.encoding) add(fmt::format("encoding={}", proto::ToString(parameters.encoding)));
+  if (parameters.encoding != defaults.encoding)
+    add(fmt::format("encoding={}", NameIn(proto::kHeightEncodingNames, parameters.encoding)));
   if (parameters.size != defaults.size) add(fmt::format("size={}", parameters.size));
   return query;
 }
@@ -30,13 +31,6 @@ std::string HeightTileQuery(const DatasetView& dataset, const HeightTileParamete
 std::string OriginOf(const Request& request) {
   if (request.fields->host.empty()) return {};
   return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
-}
-
-void SetBounds(const dem::GeoBounds& bounds, proto::TileJsonDescription& tiles) {
-  tiles.west = bounds.west;
-  tiles.south = bounds.south;
-  tiles.east = bounds.east;
-  tiles.north = bounds.north;
 }
 
 Response ServeTileJson(const Handlers& handlers, const RequestContext& context,
@@ -67,7 +61,7 @@ Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
   tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
-  SetBounds({dataset.west, dataset.south, dataset.east, dataset.north}, tiles);
+  tiles.bounds = dataset.bounds;
   return ServeTileJson(handlers, context, tiles);
 }
 
@@ -103,7 +97,7 @@ Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context
                                                   tiler::MinIntervalCm(tiles.max_zoom) / 100.0, tiles.max_zoom)});
   }
   tiles.tile_size = parameters->size;
-  SetBounds(MapBounds(dataset, row->format), tiles);
+  tiles.bounds = MapBounds(dataset, row->format);
   return ServeTileJson(handlers, context, tiles);
 }
 

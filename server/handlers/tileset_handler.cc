@@ -18,7 +18,7 @@ namespace {
 
 dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key) {
   if (dataset.range_bound) return dataset.range_bound(key);
-  return {std::min(dataset.min_height_m, dataset.floor_m), std::max(dataset.max_height_m, dataset.floor_m)};
+  return {std::min(dataset.heights.min, dataset.floor_m), std::max(dataset.heights.max, dataset.floor_m)};
 }
 
 // The query of the content templates for a request. The values of `compression` and `texture` have been checked.
@@ -37,7 +37,7 @@ tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested) {
   return {dataset.version(),
           dataset.attribution,
           dataset.available,
-          {dataset.west, dataset.south, dataset.east, dataset.north},
+          dataset.bounds,
           dataset.error_fraction,
           dataset.finest_level(),
           [&dataset](const geo::TileKey& key) { return RangeOf(dataset, key); },

@@ -48,6 +48,9 @@ DocumentPlan PlanOfSeen(const Handlers& handlers, const Document& all, const Req
 std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is_seen, const std::stop_token& stop,
                          std::span<const PendingDataset> pending) {
   using Json = nlohmann::ordered_json;
+  const auto json_of = [](const dem::GeoBounds& box) {
+    return Json::array({box.west, box.south, box.east, box.north});
+  };
   Json list = Json::array();
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
@@ -57,14 +60,13 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["name"] = dataset.name;
     entry["version"] = dataset.version();
     entry["attribution"] = dataset.attribution;
-    entry["bounds"] = {dataset.west, dataset.south, dataset.east, dataset.north};
-    const dem::GeoBounds finest = FinestBounds(dataset);
-    entry["finest_bounds"] = {finest.west, finest.south, finest.east, finest.north};
+    entry["bounds"] = json_of(dataset.bounds);
+    entry["finest_bounds"] = json_of(FinestBounds(dataset));
     entry["sources"] = dataset.sources;
     entry["min_level"] = 0;
     entry["max_level"] = dataset.max_level();
-    entry["heights"]["min"] = dataset.min_height_m;
-    entry["heights"]["max"] = dataset.max_height_m;
+    entry["heights"]["min"] = dataset.heights.min;
+    entry["heights"]["max"] = dataset.heights.max;
     entry["urls"]["layer"] = base + "/layer.json";
     entry["urls"]["tileset"] = base + "/tileset.json";
     entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
@@ -83,9 +85,8 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
       entry["urls"]["imagery"] = base + "/imagery/tiles.json";
       entry["urls"]["imagery_geodetic"] = base + "/imagery/geodetic/{z}/{x}/{y}.webp?v=" + dataset.version();
       Json& imagery = entry["imagery"];
-      const dem::GeoBounds& bounds = dataset.imagery->bounds;
       imagery["attribution"] = dataset.imagery_attribution;
-      imagery["bounds"] = {bounds.west, bounds.south, bounds.east, bounds.north};
+      imagery["bounds"] = json_of(dataset.imagery->bounds);
       imagery["max_level"] = dataset.imagery->max_mercator_depth;
       imagery["geodetic_max_level"] = dataset.imagery->max_geodetic_level;
     }

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <iterator>
+
+#include "engine/core/parse_number.h"
 
 namespace terrace::server {
 namespace {
@@ -52,11 +53,8 @@ int HexDigit(char c) {
 }
 
 std::optional<double> FiniteNumber(std::string_view text) {
-  double value = 0;
-  const char* const last = text.data() + text.size();
-  const auto [end, error] = std::from_chars(text.data(), last, value);
-  if (error != std::errc() || end != last || !std::isfinite(value)) return std::nullopt;
-  return value;
+  const auto value = ParseNumber<double>(text);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 std::optional<double> PositiveNumber(std::string_view text) {
@@ -121,6 +119,26 @@ Result<QueryParameters> ParseQuery(std::string_view query) {
     parameters.emplace_back(name, *std::move(value));
   }
   return parameters;
+}
+
+Result<void> ReadParameters(std::string_view query, std::span<const char* const> names,
+                            const std::function<Result<void>(std::size_t, const std::string&)>& set,
+                            std::string_view known) {
+  const Result<QueryParameters> sent = ParseQuery(query);
+  if (!sent) return tl::unexpected(sent.error());
+  std::vector<bool> given(names.size());
+  for (const auto& [name, value] : *sent) {
+    if (name == "v") continue;
+    const auto i = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+    if (i == names.size()) {
+      return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are {}",
+                       known.empty() ? fmt::format("{}", fmt::join(names, ", ")) : known);
+    }
+    if (given[i]) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
+    given[i] = true;
+    if (Result<void> done = set(i, value); !done) return done;
+  }
+  return {};
 }
 
 Result<void> RefuseParameters(std::string_view query) {

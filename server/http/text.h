@@ -1,13 +1,18 @@
 // Small parsers for the text in requests. ASCII only, independent of the locale.
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "engine/core/names.h"
 #include "engine/core/result.h"
 
 namespace terrace::server {
@@ -31,6 +36,20 @@ int HexDigit(char c);
 std::optional<double> FiniteNumber(std::string_view text);
 std::optional<double> PositiveNumber(std::string_view text);
 
+// Finite numbers with commas between them, each trimmed of `blanks`; nothing if the text is anything else.
+template <std::size_t kCount>
+std::optional<std::array<double, kCount>> NumbersOf(std::string_view text, std::string_view blanks = "") {
+  std::array<double, kCount> numbers{};
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const bool is_last = i + 1 == kCount;
+    if (!is_last && text.find(',') == std::string_view::npos) return std::nullopt;
+    const auto number = FiniteNumber(is_last ? Trim(text, blanks) : NextPiece(text, ',', blanks));
+    if (!number) return std::nullopt;
+    numbers[i] = *number;
+  }
+  return numbers;
+}
+
 // A plain decimal number without sign and leading zeros, of 1 to `max_digits` (at most 18) digits. Every number has
 // exactly one text.
 std::optional<std::int64_t> PlainDecimal(std::string_view text, std::size_t max_digits);
@@ -48,6 +67,34 @@ using QueryParameters = std::vector<std::pair<std::string, std::string>>;
 // Parses the query of a URL. kInvalidArgument: percent-encoding in a value is malformed or encodes a control character,
 // or a name contains '%': no name here needs it, and proxies would not recognize the parameter.
 Result<QueryParameters> ParseQuery(std::string_view query);
+
+// Reads a query whose parameters have one of `names`, each at most once, besides `v`, which is ignored. Calls `set`
+// with the index of each name and the value, in the order sent. kInvalidArgument: as ParseQuery; a name that is given
+// twice, or another one, with `known` as the list of names in the message, by default all `names`. Errors of `set` are
+// returned.
+Result<void> ReadParameters(std::string_view query, std::span<const char* const> names,
+                            const std::function<Result<void>(std::size_t, const std::string&)>& set,
+                            std::string_view known = {});
+
+// Sets what one of a few words stands for. kInvalidArgument: another text; the message is "size must be 256 or 512" for
+// the parameter `name` "size".
+template <typename T, std::size_t kCount>
+Result<void> SetOneOf(T& to, std::string_view name, std::string_view text, const Names<T, kCount>& words) {
+  if (const std::optional<T> meaning = ValueNamed(words, text)) {
+    to = *meaning;
+    return {};
+  }
+  std::string allowed;
+  for (const auto& [word, meaning] : words) {
+    allowed.append(allowed.empty() ? "" : word == words.back().first ? " or " : ", ").append(word);
+  }
+  return MakeError(ErrorCode::kInvalidArgument, "{} must be {}", name, allowed);
+}
+template <typename T, std::size_t kCount>
+Result<void> SetOneOf(T& to, std::string_view name, std::string_view text,
+                      const std::pair<std::string_view, std::type_identity_t<T>> (&words)[kCount]) {
+  return SetOneOf(to, name, text, std::to_array(words));
+}
 
 // For URLs that have no parameters except `v`.
 Result<void> RefuseParameters(std::string_view query);

@@ -1,6 +1,9 @@
 // Parameters and headers that several operations have.
 #pragma once
 
+#include <string_view>
+#include <vector>
+
 #include "server/openapi/operation.h"
 
 namespace terrace::server {
@@ -48,6 +51,6 @@ inline constexpr ParameterNote kDatumNote{
     "geoid, or EGM96 if the source refers to the ellipsoid. 400 if the source's datum is unknown.",
     R"({"type":"string","enum":["ellipsoid","orthometric"]})"};
 
-inline constexpr std::string_view kDocumentHeaders[] = {"ETag", "Cache-Control", "Vary"};
+inline std::vector<std::string_view> DocumentHeaders() { return {"ETag", "Cache-Control", "Vary"}; }
 
 }  // namespace terrace::server

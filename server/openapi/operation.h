@@ -1,10 +1,10 @@
 // What /openapi.json says about one kind of URL. Each row of the table of URLs (server/routes.cc) and each tile format
-// (server/api/tile_formats.cc) names its operation. Plain constants; views of literals.
+// (server/api/tile_formats.cc) names its operation. Views of literals.
 #pragma once
 
 #include <cstdint>
-#include <span>
 #include <string_view>
+#include <vector>
 
 namespace terrace::server {
 
@@ -34,11 +34,11 @@ struct Operation {
   std::string_view tag;
   std::string_view summary;      // one sentence without a full stop
   std::string_view description;  // Markdown
-  std::span<const ParameterNote> parameters = {};
-  std::span<const MediaNote> replies = {};      // of 200
-  std::span<const MediaNote> unavailable = {};  // of 503, besides problems
-  std::span<const std::string_view> headers = {};
-  std::span<const ExampleRequest> examples = {};
+  std::vector<ParameterNote> parameters = {};
+  std::vector<MediaNote> replies = {};      // of 200
+  std::vector<MediaNote> unavailable = {};  // of 503, besides problems
+  std::vector<std::string_view> headers = {};
+  std::vector<ExampleRequest> examples = {};
 };
 
 }  // namespace terrace::server

@@ -3,14 +3,8 @@
 namespace terrace::server {
 namespace {
 
-constexpr std::string_view kStateHeaders[] = {"Cache-Control"};
-constexpr MediaNote kPlainText[] = {{"text/plain; charset=utf-8"}};
-constexpr MediaNote kPrometheusText[] = {{"text/plain; version=0.0.4; charset=utf-8"}};
-constexpr MediaNote kVersionReplies[] = {{"application/json", "Version"}};
-constexpr ExampleRequest kLiveExamples[] = {{"/livez"}};
-constexpr ExampleRequest kReadyExamples[] = {{"/readyz"}};
-constexpr ExampleRequest kMetricsExamples[] = {{"/metrics"}};
-constexpr ExampleRequest kVersionExamples[] = {{"/version"}};
+const std::vector<std::string_view> kStateHeaders = {"Cache-Control"};
+const std::vector<MediaNote> kPlainText = {{"text/plain; charset=utf-8"}};
 
 }  // namespace
 
@@ -20,36 +14,34 @@ const Operation kLiveOperation{.id = "getLive",
                                .description = "`ok` as long as the process answers.",
                                .replies = kPlainText,
                                .headers = kStateHeaders,
-                               .examples = kLiveExamples};
+                               .examples = {{"/livez"}}};
 
-const Operation kReadyOperation{
-    .id = "getReady",
-    .tag = "monitoring",
-    .summary = "Readiness",
-    .description =
-        "`ready`, or `degraded` if a changed source or configuration cannot be loaded, or while a dataset is being "
-        "prepared and others are served. 503: `opening` while the server starts or prepares all that it has, "
-        "`draining` "
-        "while it stops.",
-    .replies = kPlainText,
-    .unavailable = kPlainText,
-    .headers = kStateHeaders,
-    .examples = kReadyExamples};
+const Operation kReadyOperation{.id = "getReady",
+                                .tag = "monitoring",
+                                .summary = "Readiness",
+                                .description =
+                                    "`ready`, or `degraded` if a changed source or configuration cannot be loaded, or "
+                                    "while a dataset is being prepared and others are served. 503: `opening` while the "
+                                    "server starts or prepares all that it has, `draining` while it stops.",
+                                .replies = kPlainText,
+                                .unavailable = kPlainText,
+                                .headers = kStateHeaders,
+                                .examples = {{"/readyz"}}};
 
 const Operation kMetricsOperation{.id = "getMetrics",
                                   .tag = "monitoring",
                                   .summary = "Metrics in Prometheus text format",
                                   .description = "With tokens only for those that see all datasets.",
-                                  .replies = kPrometheusText,
+                                  .replies = {{"text/plain; version=0.0.4; charset=utf-8"}},
                                   .headers = kStateHeaders,
-                                  .examples = kMetricsExamples};
+                                  .examples = {{"/metrics"}}};
 
 const Operation kVersionOperation{.id = "getVersion",
                                   .tag = "monitoring",
                                   .summary = "Versions of the program, of its libraries and of the datasets",
                                   .description = "With tokens only for those that see all datasets.",
-                                  .replies = kVersionReplies,
+                                  .replies = {{"application/json", "Version"}},
                                   .headers = kStateHeaders,
-                                  .examples = kVersionExamples};
+                                  .examples = {{"/version"}}};
 
 }  // namespace terrace::server

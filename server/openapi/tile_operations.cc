@@ -4,52 +4,17 @@
 namespace terrace::server {
 namespace {
 
-constexpr ParameterNote kExtensionsNote{
-    "extensions",
-    "Names separated by `-`: `octvertexnormals`, `watermask`, `metadata`. Other names are ignored, and `.glb` tiles "
-    "ignore all of them. May be repeated.",
-    R"({"type":"string"})"};
+constexpr ParameterNote kExtensionsNote{"extensions",
+                                        "Names separated by `-`: `octvertexnormals`, `watermask`, `metadata`. Other "
+                                        "names are ignored, and `.glb` tiles ignore all of them. May be repeated.",
+                                        R"({"type":"string"})"};
 
-constexpr std::string_view kTileHeaders[] = {"ETag", "Cache-Control", "Vary", "Terrain-Max-Error",
-                                             "Terrain-Certified-Error"};
-constexpr std::string_view kImageHeaders[] = {"ETag", "Cache-Control", "Terrain-Max-Error"};
+const std::vector<std::string_view> kTileHeaders = {"ETag", "Cache-Control", "Vary", "Terrain-Max-Error",
+                                                    "Terrain-Certified-Error"};
 
-constexpr ParameterNote kTerrainParameters[] = {kErrorNote, kFractionNote, kAtLeastNote, kExtensionsNote};
-constexpr MediaNote kTerrainReplies[] = {{"application/vnd.quantized-mesh"}};
-constexpr ExampleRequest kTerrainExamples[] = {
-    {"/jacksboro/9/272/359.terrain"},
-    {"/jacksboro/9/272/359.terrain?error=20&atleast=0"},
-    {"/jacksboro/9/272/359.terrain?fraction=0.1&extensions=octvertexnormals"},
-};
-
-constexpr ParameterNote kGlbParameters[] = {kErrorNote,       kFractionNote, kAtLeastNote,
-                                            kCompressionNote, kTextureNote,  kExtensionsNote};
-constexpr MediaNote kGlbReplies[] = {{"model/gltf-binary"}};
-constexpr ExampleRequest kGlbExamples[] = {
-    {"/jacksboro/9/272/359.glb"},
-    {"/jacksboro/9/272/359.glb?error=20&atleast=1&compression=meshopt&texture=none"},
-    {"/jacksboro/9/272/359.glb?fraction=0.25&extensions=octvertexnormals"},
-};
-
-constexpr ParameterNote kImageParameters[] = {kEncodingNote, kSizeNote};
-constexpr MediaNote kImageReplies[] = {{"image/png"}};
-constexpr ExampleRequest kImageExamples[] = {
-    {"/jacksboro/9/135/200.png"},
-    {"/jacksboro/9/135/200.png?encoding=terrarium&size=512"},
-};
-
-constexpr ExampleRequest kImplicitExamples[] = {
-    {"/jacksboro/3dtiles/9-272-359/1/0/1.glb"},
-    {"/jacksboro/3dtiles/9-272-359/1/0/1.glb?error=20&atleast=1&compression=none&texture=none"},
-    {"/jacksboro/3dtiles/9-272-359/1/0/1.glb?fraction=0.25&extensions=octvertexnormals"},
-};
-
-constexpr MediaNote kSubtreeReplies[] = {{"application/octet-stream"}};
-constexpr ExampleRequest kSubtreeExamples[] = {
-    {"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree"},
-    {"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree?error=20&atleast=1&compression=draco&texture=none"},
-    {"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree?fraction=0.25&extensions=octvertexnormals"},
-};
+const std::vector<ParameterNote> kGlbParameters = {kErrorNote,       kFractionNote, kAtLeastNote,
+                                                   kCompressionNote, kTextureNote,  kExtensionsNote};
+const std::vector<MediaNote> kGlbReplies = {{"model/gltf-binary"}};
 
 }  // namespace
 
@@ -58,12 +23,14 @@ const Operation kTerrainTileOperation{
     .tag = "tiles",
     .summary = "A tile as quantized-mesh 1.0",
     .description =
-        "EPSG:4326 in the TMS scheme: two tiles at level 0, y from the south. The parameter `extensions` "
-        "of a media type in `Accept` requests the same extensions as the query.",
-    .parameters = kTerrainParameters,
-    .replies = kTerrainReplies,
+        "EPSG:4326 in the TMS scheme: two tiles at level 0, y from the south. The parameter `extensions` of a media "
+        "type in `Accept` requests the same extensions as the query.",
+    .parameters = {kErrorNote, kFractionNote, kAtLeastNote, kExtensionsNote},
+    .replies = {{"application/vnd.quantized-mesh"}},
     .headers = kTileHeaders,
-    .examples = kTerrainExamples};
+    .examples = {{"/jacksboro/9/272/359.terrain"},
+                 {"/jacksboro/9/272/359.terrain?error=20&atleast=0"},
+                 {"/jacksboro/9/272/359.terrain?fraction=0.1&extensions=octvertexnormals"}}};
 
 const Operation kGlbTileOperation{
     .id = "getGlbTile",
@@ -73,17 +40,19 @@ const Operation kGlbTileOperation{
     .parameters = kGlbParameters,
     .replies = kGlbReplies,
     .headers = kTileHeaders,
-    .examples = kGlbExamples};
+    .examples = {{"/jacksboro/9/272/359.glb"},
+                 {"/jacksboro/9/272/359.glb?error=20&atleast=1&compression=meshopt&texture=none"},
+                 {"/jacksboro/9/272/359.glb?fraction=0.25&extensions=octvertexnormals"}}};
 
 const Operation kHeightTileOperation{
     .id = "getHeightTile",
     .tag = "tiles",
     .summary = "Heights as colours of a PNG",
     .description = "EPSG:3857 in the XYZ scheme of web maps: one tile at level 0, y from the north.",
-    .parameters = kImageParameters,
-    .replies = kImageReplies,
-    .headers = kImageHeaders,
-    .examples = kImageExamples};
+    .parameters = {kEncodingNote, kSizeNote},
+    .replies = {{"image/png"}},
+    .headers = {"ETag", "Cache-Control", "Terrain-Max-Error"},
+    .examples = {{"/jacksboro/9/135/200.png"}, {"/jacksboro/9/135/200.png?encoding=terrarium&size=512"}}};
 
 const Operation kImplicitTileOperation{
     .id = "getImplicitTile",
@@ -93,7 +62,9 @@ const Operation kImplicitTileOperation{
     .parameters = kGlbParameters,
     .replies = kGlbReplies,
     .headers = kTileHeaders,
-    .examples = kImplicitExamples};
+    .examples = {{"/jacksboro/3dtiles/9-272-359/1/0/1.glb"},
+                 {"/jacksboro/3dtiles/9-272-359/1/0/1.glb?error=20&atleast=1&compression=none&texture=none"},
+                 {"/jacksboro/3dtiles/9-272-359/1/0/1.glb?fraction=0.25&extensions=octvertexnormals"}}};
 
 const Operation kSubtreeOperation{
     .id = "getSubtree",
@@ -101,8 +72,10 @@ const Operation kSubtreeOperation{
     .summary = "The tiles of an implicit tree that exist, and their ranges of heights",
     .description = "The binary form of 3D Tiles 1.1. `tileset.json` states the number of levels.",
     .parameters = kGlbParameters,
-    .replies = kSubtreeReplies,
-    .headers = kDocumentHeaders,
-    .examples = kSubtreeExamples};
+    .replies = {{"application/octet-stream"}},
+    .headers = DocumentHeaders(),
+    .examples = {{"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree"},
+                 {"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree?error=20&atleast=1&compression=draco&texture=none"},
+                 {"/jacksboro/3dtiles/9-272-359/0/0/0.5.subtree?fraction=0.25&extensions=octvertexnormals"}}};
 
 }  // namespace terrace::server

@@ -29,39 +29,40 @@ Result<void> SetRequested(const DrawnTexts& texts, tiler::RequestedError& reques
     return MakeError(ErrorCode::kInvalidArgument, "error and fraction exclude each other");
   }
   if (!texts.at_least) return {};
-  if (*texts.at_least != "0" && *texts.at_least != "1") {
-    return MakeError(ErrorCode::kInvalidArgument, "atleast must be 0 or 1");
-  }
-  requested.at_least = *texts.at_least == "1";
+  const Result<void> set = SetOneOf(requested.at_least, "atleast", *texts.at_least, {{"0", false}, {"1", true}});
+  if (!set) return set;
   if (!requested.error_m) return MakeError(ErrorCode::kInvalidArgument, "atleast needs error");
   return {};
 }
 
 Result<void> SetFormat(const DrawnTexts& texts, tiler::DrawnSurface& drawn) {
-  if (texts.format && *texts.format != "terrain" && *texts.format != "glb") {
-    return MakeError(ErrorCode::kInvalidArgument, "format must be terrain or glb");
+  if (texts.format) {
+    using tiler::TileFormat;
+    const Result<void> set = SetOneOf(drawn.format, "format", *texts.format,
+                                      {{"terrain", TileFormat::kQuantizedMesh}, {"glb", TileFormat::kGlb}});
+    if (!set) return set;
   }
-  if (texts.format && *texts.format == "glb") drawn.format = tiler::TileFormat::kGlb;
   if (!texts.compression) return {};
   if (drawn.format != tiler::TileFormat::kGlb) {
     return MakeError(ErrorCode::kInvalidArgument, "compression needs format=glb");
   }
-  const std::optional<proto::GlbCompression> compression = proto::GlbCompressionNamed(*texts.compression);
-  if (!compression) {
-    return MakeError(ErrorCode::kInvalidArgument, "compression must be draco, none, quantized or meshopt");
-  }
-  drawn.compression = *compression;
-  return {};
+  return SetOneOf(drawn.compression, "compression", *texts.compression, proto::kGlbCompressionNames);
 }
 
 }  // namespace
 
+Result<void> SetDatum(dem::HeightDatum& datum, std::string_view text) {
+  using dem::HeightDatum;
+  return SetOneOf(datum, "datum", text,
+                  {{"ellipsoid", HeightDatum::kEllipsoid}, {"orthometric", HeightDatum::kOrthometric}});
+}
+
 Result<std::optional<tiler::DrawnSurface>> ParseDrawn(const DrawnTexts& texts) {
-  const std::string surface = texts.surface.value_or("source");
-  if (surface != "source" && surface != "served") {
-    return MakeError(ErrorCode::kInvalidArgument, "surface must be source or served");
-  }
-  if (surface == "source") {
+  bool is_served = false;
+  const Result<void> surface =
+      SetOneOf(is_served, "surface", texts.surface.value_or("source"), {{"source", false}, {"served", true}});
+  if (!surface) return tl::unexpected(surface.error());
+  if (!is_served) {
     for (const auto& [name, text] :
          {std::pair("level", &texts.level), std::pair("error", &texts.error), std::pair("fraction", &texts.fraction),
           std::pair("atleast", &texts.at_least), std::pair("format", &texts.format),

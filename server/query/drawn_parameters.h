@@ -1,9 +1,12 @@
-// The parameters that name a surface: that of the sources, or that of the meshes that clients decode. Pure.
+// The parameters that name a surface: that of the sources, or that of the meshes that clients decode; and the datum of
+// heights. Pure.
 #pragma once
 
 #include <optional>
 #include <string>
+#include <string_view>
 
+#include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "tiler/surface/drawn_points.h"
 
@@ -13,6 +16,9 @@ namespace terrace::server {
 struct DrawnTexts {
   std::optional<std::string> surface, level, error, fraction, at_least, format, compression;
 };
+
+// `datum`. kInvalidArgument: another word; the message is for the client.
+Result<void> SetDatum(dem::HeightDatum& datum, std::string_view text);
 
 // Nothing: the surface of the sources. kInvalidArgument, with a message for the client: a wrong value, a parameter of
 // surface=served without it, or two that exclude each other.

@@ -37,36 +37,17 @@ tl::unexpected<Error> InvalidGrid(std::string message) {
   return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
 }
 
-// Finite numbers with commas between them; nothing if the text is anything else.
-template <std::size_t kCount>
-std::optional<std::array<double, kCount>> GridNumbersOf(std::string_view text) {
-  std::array<double, kCount> numbers{};
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const std::size_t comma = i + 1 == kCount ? text.size() : text.find(',');
-    const auto number = comma == std::string_view::npos ? std::nullopt : FiniteNumber(text.substr(0, comma));
-    if (!number) return std::nullopt;
-    numbers[i] = *number;
-    text.remove_prefix(std::min(comma + 1, text.size()));
-  }
-  return numbers;
-}
-
 Result<GridTexts> GridTextsOf(std::string_view query) {
-  const Result<QueryParameters> sent = ParseQuery(query);
-  if (!sent) return tl::unexpected(sent.error());
   GridTexts texts;
-  for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
-    const auto known = std::find(std::begin(kGridNames), std::end(kGridNames), name);
-    if (known == std::end(kGridNames)) {
-      return InvalidGrid(
-          "unknown parameter; known are bbox, width, height, spacing, crs, format, datum, range, surface, and with "
-          "surface=served level, error, fraction, atleast");
-    }
-    auto& text = texts[static_cast<std::size_t>(known - std::begin(kGridNames))];
-    if (text) return InvalidGrid(fmt::format("{} is given more than once", *known));
-    text = value;
-  }
+  const Result<void> read = ReadParameters(
+      query, kGridNames,
+      [&](std::size_t i, const std::string& value) -> Result<void> {
+        texts[i] = value;
+        return {};
+      },
+      "bbox, width, height, spacing, crs, format, datum, range, surface, and with surface=served level, error, "
+      "fraction, atleast");
+  if (!read) return tl::unexpected(read.error());
   return texts;
 }
 
@@ -95,23 +76,18 @@ Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& gr
 }
 
 Result<void> SetGridFormat(const std::optional<std::string>& text, GridFormat& format) {
-  constexpr std::pair<std::string_view, GridFormat> kFormats[] = {{"f32", GridFormat::kF32},
-                                                                  {"r16", GridFormat::kR16},
-                                                                  {"geotiff", GridFormat::kGeoTiff},
-                                                                  {"png16", GridFormat::kPng16},
-                                                                  {"json", GridFormat::kJson}};
   if (!text) return {};
-  for (const auto& [name, value] : kFormats) {
-    if (*text != name) continue;
-    format = value;
-    return {};
-  }
-  return InvalidGrid("format must be f32, r16, geotiff, png16 or json");
+  return SetOneOf(format, "format", *text,
+                  {{"f32", GridFormat::kF32},
+                   {"r16", GridFormat::kR16},
+                   {"geotiff", GridFormat::kGeoTiff},
+                   {"png16", GridFormat::kPng16},
+                   {"json", GridFormat::kJson}});
 }
 
 Result<void> SetRange(const std::optional<std::string>& text, GridQuery& query) {
   if (!text) return {};
-  const auto numbers = GridNumbersOf<2>(*text);
+  const auto numbers = NumbersOf<2>(*text);
   constexpr double kMaxScale = 1e6;  // the scale of larger ones may overflow
   if (!numbers || (*numbers)[0] >= (*numbers)[1] || (*numbers)[0] < -kMaxScale || (*numbers)[1] > kMaxScale) {
     return InvalidGrid("range must be two numbers of metres from -1000000 to 1000000, the lower first");
@@ -128,7 +104,7 @@ Result<GridQuery> ParseGrid(std::string_view text) {
   if (!parsed) return tl::unexpected(parsed.error());
   const GridTexts& texts = *parsed;
   GridQuery query;
-  const auto box = texts[kGridBbox] ? GridNumbersOf<4>(*texts[kGridBbox]) : std::nullopt;
+  const auto box = texts[kGridBbox] ? NumbersOf<4>(*texts[kGridBbox]) : std::nullopt;
   if (!box) return InvalidGrid("bbox=west,south,east,north is needed: four numbers in units of the crs");
   query.grid.west = (*box)[0], query.grid.south = (*box)[1], query.grid.east = (*box)[2], query.grid.north = (*box)[3];
   for (const Result<void>& set :
@@ -136,10 +112,9 @@ Result<GridQuery> ParseGrid(std::string_view text) {
         SetGridFormat(texts[kGridFormat], query.format), SetRange(texts[kGridRange], query)}) {
     if (!set) return tl::unexpected(set.error());
   }
-  if (texts[kGridDatum] && *texts[kGridDatum] != "ellipsoid" && *texts[kGridDatum] != "orthometric") {
-    return InvalidGrid("datum must be ellipsoid or orthometric");
+  if (texts[kGridDatum]) {
+    if (const Result<void> set = SetDatum(query.datum, *texts[kGridDatum]); !set) return tl::unexpected(set.error());
   }
-  if (texts[kGridDatum] && *texts[kGridDatum] == "orthometric") query.datum = dem::HeightDatum::kOrthometric;
   Result<std::optional<tiler::DrawnSurface>> drawn =
       ParseDrawn({texts[kGridSurface], texts[kGridLevel], texts[kGridError], texts[kGridFraction], texts[kGridAtLeast],
                   std::nullopt, std::nullopt});

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "engine/core/bytes.h"
+#include "engine/core/parse_number.h"
 #include "engine/core/plain_number.h"
 #include "engine/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
@@ -130,21 +131,11 @@ Result<HeightsQuery> ParsePoints(HeightsParameters& parameters, std::size_t max_
 
 Result<int> ParseCertifyLevel(std::string_view text) {
   if (text == "deepest") return geo::kMaxLevel;
-  int level = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), level);
-  if (text.empty() || end != text.data() + text.size() || error != std::errc() || level < 0 || level > geo::kMaxLevel) {
+  const auto level = ParseNumber<int>(text);
+  if (!level || *level < 0 || *level > geo::kMaxLevel) {
     return MakeError(ErrorCode::kInvalidArgument, "certify must be deepest, or a level from 0 to {}", geo::kMaxLevel);
   }
-  return level;
-}
-
-Result<void> SetDatum(std::string_view text, HeightsQuery& query) {
-  if (text == "ellipsoid") return {};
-  if (text != "orthometric") {
-    return MakeError(ErrorCode::kInvalidArgument, "datum must be ellipsoid or orthometric");
-  }
-  query.datum = dem::HeightDatum::kOrthometric;
-  return {};
+  return *level;
 }
 
 }  // namespace
@@ -185,11 +176,11 @@ Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_loc
     query->certify_level = *level;
   }
   if (const auto& datum = parameters.text(HeightsParameters::kDatum)) {
-    if (const Result<void> set = SetDatum(*datum, *query); !set) return tl::unexpected(set.error());
+    if (const Result<void> set = SetDatum(query->datum, *datum); !set) return tl::unexpected(set.error());
   }
   if (const auto& normals = parameters.text(HeightsParameters::kNormals)) {
-    if (*normals != "0" && *normals != "1") return MakeError(ErrorCode::kInvalidArgument, "normals must be 0 or 1");
-    query->wants_normals = *normals == "1";
+    const Result<void> set = SetOneOf(query->wants_normals, "normals", *normals, {{"0", false}, {"1", true}});
+    if (!set) return tl::unexpected(set.error());
   }
   DrawnTexts texts;
   for (const auto& [text, of] :

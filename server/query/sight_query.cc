@@ -44,21 +44,6 @@ tl::unexpected<Error> UnknownOfSight() {
                    "level, error, fraction, atleast, format, compression");
 }
 
-// The numbers of a text with commas between them; nothing if it is anything else.
-template <std::size_t kCount>
-std::optional<std::array<double, kCount>> SightNumbersOf(std::string_view text) {
-  std::array<double, kCount> numbers{};
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const std::size_t comma = i + 1 == kCount ? text.size() : text.find(',');
-    const std::optional<double> number =
-        comma == std::string_view::npos ? std::nullopt : NumberOf(text.substr(0, comma));
-    if (!number) return std::nullopt;
-    numbers[i] = *number;
-    text.remove_prefix(std::min(comma + 1, text.size()));
-  }
-  return numbers;
-}
-
 // Also refuses NaN. `what`: names the end in messages.
 Result<void> CheckPoint(const dem::SightPoint& point, const std::string& what) {
   const auto is_within = [](double value, double most) { return std::abs(value) <= most; };
@@ -140,7 +125,7 @@ class SightParameters final : public ParameterSink {
   Result<void> EndRay() {
     if (rays_.size() == max_rays_) return TooManyRays();
     const std::string item = fmt::format("rays: item {}", rays_.size() + 1);
-    const auto numbers = SightNumbersOf<kRayNumbers>(*texts_[kRays]);
+    const auto numbers = NumbersOf<kRayNumbers>(*texts_[kRays], " ");
     if (!numbers) {
       return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height,latitude,longitude,height\"",
                        item);
@@ -198,7 +183,7 @@ Result<std::vector<dem::SightRay>> ParseBinaryRays(std::string_view body, std::s
 Result<std::vector<dem::SightRay>> ParseEnds(const SightParameters& parameters) {
   std::array<dem::SightPoint, 2> ends{};
   for (const Name name : {kFrom, kTo}) {
-    const auto numbers = SightNumbersOf<kPointNumbers>(*parameters.text(name));
+    const auto numbers = NumbersOf<kPointNumbers>(*parameters.text(name), " ");
     if (!numbers) {
       return MakeError(ErrorCode::kInvalidArgument, "{} is not \"latitude,longitude,height\"", kSightNames[name]);
     }
@@ -235,11 +220,10 @@ Result<SightQuery> ParseSight(const HeightsInput& input, std::size_t max_rays, c
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the request any more");
   query.rays = *std::move(rays);
   query.is_binary = IsBinaryBody(input.content_type);
-  const std::string heights = parameters.text(kHeights).value_or("ellipsoid");
-  if (heights != "ellipsoid" && heights != "ground") {
-    return MakeError(ErrorCode::kInvalidArgument, "heights must be ellipsoid or ground");
+  if (const auto& heights = parameters.text(kHeights)) {
+    const auto set = SetOneOf(query.from_ground, "heights", *heights, {{"ellipsoid", false}, {"ground", true}});
+    if (!set) return tl::unexpected(set.error());
   }
-  query.from_ground = heights == "ground";
   if (const auto& refraction = parameters.text(kRefraction)) {
     const std::optional<double> share = NumberOf(*refraction);
     if (!share || *share < -1 || *share > 1) {

@@ -1,6 +1,5 @@
 #include "server/reload/reloader.h"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -67,10 +66,7 @@ config::Config AsWritten(config::Config config) {
 
 std::string TextOf(const std::vector<config::ConfigError>& errors) {
   std::string text;
-  for (const config::ConfigError& error : errors) {
-    text +=
-        fmt::format("{}{}{}{}", text.empty() ? "" : "; ", error.path, error.path.empty() ? "" : ": ", error.message);
-  }
+  for (const config::ConfigError& error : errors) text += (text.empty() ? "" : "; ") + error.Text();
   return text;
 }
 
@@ -87,15 +83,11 @@ Reloader::~Reloader() { Stop(); }
 
 void Reloader::Start(bool watch) {
   watch_ = watch;
-  thread_ = std::thread([this] { Run(); });
+  thread_ = std::jthread([this](const std::stop_token& stop) { Run(stop); });
 }
 
 void Reloader::Stop() {
-  {
-    const std::lock_guard lock(mutex_);
-    stop_ = true;
-  }
-  wake_.notify_all();
+  thread_.request_stop();
   if (thread_.joinable()) thread_.join();
 }
 
@@ -111,17 +103,18 @@ void Reloader::Reload() {
   wake_.notify_all();
 }
 
-void Reloader::Run() {
+void Reloader::Run(const std::stop_token& stop) {
   Clock::time_point next_check = Clock::now() + kPeriod, next_config = next_check;
   std::unique_lock lock(mutex_);
-  while (!wake_.wait_for(lock, kMinPause, [this] { return stop_; })) {
-    const auto is_due = [this] { return check_now_ || reload_ || stop_; };
+  for (;;) {
+    wake_.wait_for(lock, stop, kMinPause, [] { return false; });
+    const auto is_due = [this] { return check_now_ || reload_; };
     if (IsBusy() || watch_ || LacksDatasets()) {
-      wake_.wait_for(lock, IsBusy() ? kBusyPeriod : kPeriod, is_due);
+      wake_.wait_for(lock, stop, IsBusy() ? kBusyPeriod : kPeriod, is_due);
     } else {
-      wake_.wait(lock, is_due);
+      wake_.wait(lock, stop, is_due);
     }
-    if (stop_ || hooks_.stop.stop_requested()) return;
+    if (stop.stop_requested() || hooks_.stop.stop_requested()) return;
     const bool reload = std::exchange(reload_, false), check_now = std::exchange(check_now_, false) || reload;
     lock.unlock();
     const Clock::time_point now = Clock::now();

@@ -54,7 +54,7 @@ class Reloader {
   void Reload();
 
  private:
-  void Run();
+  void Run(const std::stop_token& stop);
   void CheckFiles();
   config::ConfigResult Load() const;
   void CheckConfigFile(bool is_requested);
@@ -78,9 +78,9 @@ class Reloader {
   std::map<std::string, std::string> reported_;
 
   std::mutex mutex_;
-  std::condition_variable wake_;
-  bool check_now_ = false, reload_ = false, stop_ = false;  // guarded by mutex_
-  std::thread thread_;
+  std::condition_variable_any wake_;
+  bool check_now_ = false, reload_ = false;  // guarded by mutex_
+  std::jthread thread_;
 };
 
 }  // namespace terrace::server

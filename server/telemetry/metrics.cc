@@ -33,17 +33,14 @@ const Buckets& Seconds() {
   return buckets;
 }
 
+constexpr auto kCounter = prometheus::MetricType::Counter, kGauge = prometheus::MetricType::Gauge;
+
 double InSeconds(std::chrono::microseconds time) { return std::chrono::duration<double>(time).count(); }
 
-prometheus::MetricFamily Value(prometheus::MetricType type, const char* name, const char* help, double value) {
-  prometheus::ClientMetric metric;
-  (type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) = value;
-  prometheus::MetricFamily family;
-  family.name = name;
-  family.help = help;
-  family.type = type;
-  family.metric.push_back(std::move(metric));
-  return family;
+void AddMetric(prometheus::MetricFamily& family, std::vector<prometheus::ClientMetric::Label> labels, double value) {
+  prometheus::ClientMetric& metric = family.metric.emplace_back();
+  metric.label = std::move(labels);
+  (family.type == kCounter ? metric.counter.value : metric.gauge.value) = value;
 }
 
 struct CacheTier {
@@ -59,17 +56,13 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
     if (first == tiers.size()) return;
     prometheus::MetricFamily family{name, help, type, {}};
     for (std::size_t i = first; i < tiers.size(); ++i) {
-      if (type == prometheus::MetricType::Counter && !tiers[i].counts_lookups) continue;
-      prometheus::ClientMetric& metric = family.metric.emplace_back();
-      metric.label = {{"tier", tiers[i].name}, {"kind", tiers[i].kind}};
-      (type == prometheus::MetricType::Counter ? metric.counter.value : metric.gauge.value) =
-          static_cast<double>(tiers[i].stats.*member);
+      if (type == kCounter && !tiers[i].counts_lookups) continue;
+      AddMetric(family, {{"tier", tiers[i].name}, {"kind", tiers[i].kind}},
+                static_cast<double>(tiers[i].stats.*member));
     }
     all.push_back(std::move(family));
   };
   using Stats = tiler::StoreStats;
-  constexpr auto kCounter = prometheus::MetricType::Counter;
-  constexpr auto kGauge = prometheus::MetricType::Gauge;
   add(kCounter, "terrace_cache_hits_total", "Found in a cache", &Stats::hits, 0);
   add(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &Stats::misses, 0);
   add(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &Stats::entries, 0);
@@ -92,48 +85,39 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
 }
 
 prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
-  prometheus::MetricFamily family;
-  family.name = "terrace_source_samples_total";
-  family.help = "Samples read for tiles: measured, small voids filled from their edges, and voids where others show";
-  family.type = prometheus::MetricType::Counter;
+  prometheus::MetricFamily family{
+      "terrace_source_samples_total",
+      "Samples read for tiles: measured, small voids filled from their edges, and voids where others show",
+      kCounter,
+      {}};
   if (pipeline == nullptr) return family;
   for (const tiler::Dataset& dataset : pipeline->datasets()) {
     if (!dataset.source) continue;
     const dem::SampleCounts counts = dataset.source->CountSamples();
-    const auto add = [&family, &name = dataset.name](const char* kind, std::uint64_t value) {
-      prometheus::ClientMetric& metric = family.metric.emplace_back();
-      metric.label = {{"dataset", name}, {"kind", kind}};
-      metric.counter.value = static_cast<double>(value);
-    };
-    add("measured", counts.measured);
-    add("filled", counts.filled);
-    add("void", counts.voids);
+    for (const auto& [kind, count] : {std::pair("measured", counts.measured), std::pair("filled", counts.filled),
+                                      std::pair("void", counts.voids)}) {
+      AddMetric(family, {{"dataset", dataset.name}, {"kind", kind}}, static_cast<double>(count));
+    }
   }
   return family;
 }
 
 prometheus::MetricFamily StoreTimes(const TileService::Stats& tiles, const Metrics::ServerState& state) {
-  prometheus::MetricFamily family;
-  family.name = "terrace_store_read_seconds_total";
-  family.help = "Time of look-ups of tiles in the tiers below memory, found or not";
-  family.type = prometheus::MetricType::Counter;
+  prometheus::MetricFamily family{"terrace_store_read_seconds_total",
+                                  "Time of look-ups of tiles in the tiers below memory, found or not",
+                                  kCounter,
+                                  {}};
   for (std::size_t i = 0; i < std::min(tiles.store_times.size(), state.stores.size()); ++i) {
-    prometheus::ClientMetric& metric = family.metric.emplace_back();
-    metric.label = {{"tier", state.stores[i]->name()}};
-    metric.counter.value = InSeconds(tiles.store_times[i]);
+    AddMetric(family, {{"tier", state.stores[i]->name()}}, InSeconds(tiles.store_times[i]));
   }
   return family;
 }
 
 prometheus::MetricFamily Versions(const std::vector<DatasetView>& datasets) {
-  prometheus::MetricFamily family;
-  family.name = "terrace_dataset_info";
-  family.help = "1 for each dataset, with the version that it is served in";
-  family.type = prometheus::MetricType::Gauge;
+  prometheus::MetricFamily family{
+      "terrace_dataset_info", "1 for each dataset, with the version that it is served in", kGauge, {}};
   for (const DatasetView& dataset : datasets) {
-    prometheus::ClientMetric& metric = family.metric.emplace_back();
-    metric.label = {{"dataset", dataset.name}, {"version", dataset.version()}};
-    metric.gauge.value = 1;
+    AddMetric(family, {{"dataset", dataset.name}, {"version", dataset.version()}}, 1);
   }
   return family;
 }
@@ -318,11 +302,9 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
 }
 
 std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& state) const {
-  constexpr auto kCounter = prometheus::MetricType::Counter;
-  constexpr auto kGauge = prometheus::MetricType::Gauge;
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
-    all.push_back(Value(type, name, help, static_cast<double>(value)));
+    AddMetric(all.emplace_back(prometheus::MetricFamily{name, help, type, {}}), {}, static_cast<double>(value));
   };
   std::vector<CacheTier> tiers = {{"memory", "tiles", {tiles.cache}}, {"memory", "refinements", {state.refinements}}};
   if (state.catalog->pipeline) {

@@ -39,12 +39,8 @@ void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   const tiler::BakedExtent& extent = dataset.baked->extent();
   view.baked_alone = dataset.baked;
   view.available = extent.available;
-  view.west = extent.bounds.west;
-  view.south = extent.bounds.south;
-  view.east = extent.bounds.east;
-  view.north = extent.bounds.north;
-  view.min_height_m = extent.heights.min;
-  view.max_height_m = extent.heights.max;
+  view.bounds = extent.bounds;
+  view.heights = extent.heights;
   view.range_bound = [baked = dataset.baked](const geo::TileKey& key) { return baked->RangeBound(key); };
   view.has_datum = extent.has_datum;
   view.sources = extent.sources;
@@ -70,12 +66,8 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   }
   const dem::DemInfo& info = dataset.source->info();
   view.available = dataset.source->Availability();
-  view.west = info.bounds.west;
-  view.south = info.bounds.south;
-  view.east = info.bounds.east;
-  view.north = info.bounds.north;
-  view.min_height_m = info.heights.min;
-  view.max_height_m = info.heights.max;
+  view.bounds = info.bounds;
+  view.heights = info.heights;
   view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
   if (info.edits > 0) {
     view.edits_of = [pipeline, &source = *dataset.source](const tiler::TileRequest& request) {
@@ -108,7 +100,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 }
 
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
-  const dem::GeoBounds all{dataset.west, dataset.south, dataset.east, dataset.north};
+  const dem::GeoBounds& all = dataset.bounds;
   // Levels that edits add have no finer data.
   const int level = std::min(dataset.finest_level(), dataset.max_level());
   if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
@@ -156,8 +148,7 @@ bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile) {
 
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size) {
   return key.level <= MaxHeightLevel(dataset, size) && tiler::IsInScheme(key, /*is_mercator=*/true) &&
-         Intersects({dataset.west, dataset.south, dataset.east, dataset.north},
-                    tiler::TileBounds(key, /*is_mercator=*/true));
+         Intersects(dataset.bounds, tiler::TileBounds(key, /*is_mercator=*/true));
 }
 
 int MaxHeightLevel(const DatasetView& dataset, int size) { return dataset.max_mercator_depth - (size == 512 ? 1 : 0); }

@@ -34,10 +34,10 @@ struct DatasetView {
   std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
   // tiler::TileEdits. Empty: there are no edits.
   std::function<std::uint64_t(const tiler::TileRequest&)> edits_of = {};
-  std::vector<std::vector<geo::TileRange>> available;       // by level, from 0; the deepest served level is the last
-  double west = -180, south = -90, east = 180, north = 90;  // degrees; west > east: across the antimeridian
-  double min_height_m = 0, max_height_m = 0;                // of the data
-  double floor_m = 0;                                       // height where there is no data
+  std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
+  dem::GeoBounds bounds;
+  dem::HeightRange heights;  // of the data
+  double floor_m = 0;        // height where there is no data
   // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
   // above holds for all tiles.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};

@@ -1,6 +1,7 @@
 #include "server/tiles/tile_service.h"
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -35,17 +36,14 @@ tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
 
 TileService::TileService(TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
-      write_head_(options.write_head),
-      cache_(options.cache_bytes),
-      stores_(std::move(options.stores)),
+      tiers_(options.cache_bytes, std::move(options.stores), options.write_head),
       pool_(options.worker_threads, options.queue_length),
-      flights_(pool_),
-      store_times_(stores_.size()) {}
+      flights_(pool_) {}
 
 TileService::~TileService() { Shutdown(); }
 
 std::optional<ServedTile> TileService::Find(const Catalog& catalog, const tiler::TileRequest& request) {
-  tiler::TilePtr tile = cache_.Find(KeyOf(catalog, request));
+  tiler::TilePtr tile = tiers_.memory().Find(KeyOf(catalog, request));
   if (!tile) return std::nullopt;
   hits_.fetch_add(1, std::memory_order_relaxed);
   return ServedTile(std::move(tile), CacheStatus::kHit);
@@ -55,16 +53,27 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
                                                        Clock::time_point deadline, std::uint64_t client) {
   using Flights = decltype(flights_);
   const tiler::CacheKey key = KeyOf(*catalog, request);
-  Flights::Build build = [this, catalog = std::move(catalog), request, key,
-                          requested_at = Clock::now()](std::stop_token stop) {
-    return BuildAndKeep(*catalog, request, key, requested_at, std::move(stop));
+  Flights::Build find_or_build = [this, catalog = std::move(catalog), request, key,
+                                  requested_at = Clock::now()](const std::stop_token& stop) {
+    const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
+    bool is_built = false;
+    // Looks in memory again: an earlier flight may have ended between Find and the start of this one.
+    Result<tiler::TilePtr> tile = tiers_.FindOrBuild(key, [&] {
+      is_built = true;
+      const Work<tiler::EncodedTile> build = std::bind_front(&tiler::TilePipeline::Build, catalog->pipeline, request);
+      Result<tiler::EncodedTile> built = Outcome(NameOf(request), build, stop);
+      if (built) built->times.queue = queued;
+      return built;
+    });
+    if (is_built && observer_) observer_(catalog->datasets[request.dataset], tile);
+    return tile;
   };
   JobOrder order;
   order.client = client;
   order.level = request.key.level;
   order.kind = KindOfTile(key);
   order.deadline = deadline;
-  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(build), order);
+  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), order);
   if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!flight.value) {
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
@@ -72,48 +81,6 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   }
   const CacheStatus found = (*flight.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
-}
-
-// The tile as it is cached and sent.
-tiler::TilePtr TileService::Finish(const tiler::TileRequest& request, tiler::EncodedTile tile) const {
-  if (write_head_ != nullptr) tile.head = write_head_(request, tile);
-  return std::make_shared<const tiler::EncodedTile>(std::move(tile));
-}
-
-Result<tiler::TilePtr> TileService::BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
-                                                 const tiler::CacheKey& key, Clock::time_point requested_at,
-                                                 std::stop_token stop) {
-  const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
-  // An earlier flight may have ended between the look-up in the cache and the start of this one.
-  if (tiler::TilePtr tile = cache_.Find(key)) return tile;
-  for (auto store = stores_.begin(); store != stores_.end(); ++store) {
-    const auto begun = Clock::now();
-    std::optional<tiler::EncodedTile> kept = (*store)->Find(key);
-    store_times_[static_cast<std::size_t>(store - stores_.begin())].fetch_add(MicrosecondsSince(begun).count(),
-                                                                              std::memory_order_relaxed);
-    if (!kept) continue;
-    kept->store = (*store)->name();
-    tiler::TilePtr tile = Finish(request, *std::move(kept));
-    cache_.Insert(key, tile);
-    for (auto above = stores_.begin(); above != store; ++above) (*above)->Insert(key, tile);
-    return tile;
-  }
-  const Work<tiler::EncodedTile> work = [&](std::stop_token token) {
-    return catalog.pipeline->Build(request, std::move(token));
-  };
-  Result<tiler::EncodedTile> built = Outcome(NameOf(request), work, std::move(stop));
-  Result<tiler::TilePtr> tile;
-  if (built) {
-    built->times.queue = queued;
-    tile = Finish(request, *std::move(built));
-    cache_.Insert(key, *tile);
-    for (const auto& store : stores_) store->Insert(key, *tile);
-  } else {
-    for (const auto& store : stores_) store->GiveUp(key);
-    tile = tl::unexpected(std::move(built.error()));
-  }
-  if (observer_) observer_(catalog.datasets[request.dataset], tile);
-  return tile;
 }
 
 JobOrder TileService::OrderOf(Length length, Clock::time_point deadline, std::uint64_t client) {
@@ -133,10 +100,10 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
     generations.push_back(dataset.cache_generation());
     has_edits |= static_cast<bool>(dataset.edits_of) || had_edits_;
   }
-  cache_.Retain(generations);
+  tiers_.memory().Retain(generations);
   // In datasets that stay: erases the tiles whose edits have changed.
   if (has_edits) {
-    cache_.EraseIf([&](const tiler::CacheKey& key) {
+    tiers_.memory().EraseIf([&](const tiler::CacheKey& key) {
       return std::ranges::none_of(catalog.datasets, [&](const DatasetView& dataset) {
         return dataset.cache_generation() == key.generation &&
                key.edits == (dataset.edits_of ? dataset.edits_of(key.request) : 0);
@@ -147,33 +114,16 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
                                    [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_of); });
 }
 
-// The slowest tier first and memory last: a tile that is found in a tier meanwhile goes into the tiers above it.
-Result<TileService::Erased> TileService::Erase(const tiler::TileSelection& selection, const std::stop_token& stop) {
-  Erased erased;
-  Result<void> done;
-  for (auto store = stores_.rbegin(); store != stores_.rend(); ++store) {
-    Result<std::size_t> of_store = (*store)->Erase(selection, stop);
-    if (of_store) {
-      erased.stores.emplace_back((*store)->name(), *of_store);
-    } else {
-      done = tl::unexpected(std::move(of_store.error()));
-    }
-  }
-  erased.memory = cache_.EraseIf([&](const tiler::CacheKey& key) { return IsSelected(selection, key); });
-  if (!done) return tl::unexpected(std::move(done.error()));
-  return erased;
-}
-
 TileService::Stats TileService::stats() const {
   Stats stats;
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
   stats.joined = flights_.joined_total();
   stats.refused = refused_.load(std::memory_order_relaxed);
-  for (const auto& time : store_times_) stats.store_times.emplace_back(time.load(std::memory_order_relaxed));
+  stats.store_times = tiers_.store_times();
   stats.queued = pool_.queued();
   stats.in_flight = flights_.in_flight() + pool_.runs();
-  stats.cache = cache_.stats();
+  stats.cache = tiers_.memory().stats();
   stats.cache.hits = stats.hits;
   stats.cache.misses = stats.misses;
   return stats;

@@ -1,4 +1,4 @@
-// Gets tiles for requests: from memory, from a build in progress, or on the worker pool from disk or a new build.
+// Gets tiles for requests: from memory, from a build in progress, or on the worker pool from tiler::TileTiers.
 // Thread-safe. Cached tiles outlive their catalog: a new catalog finds the tiles of datasets that stay in the same
 // generation. The pool also runs work for single requests (heights, meshes of areas, documents).
 #pragma once
@@ -17,7 +17,7 @@
 #include "server/jobs/single_flight.h"
 #include "server/jobs/worker_pool.h"
 #include "server/tiles/catalog.h"
-#include "tiler/store/tile_store.h"
+#include "tiler/store/tile_tiers.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"
 
@@ -26,17 +26,12 @@ namespace terrace::server {
 // Called after every build, on the thread that ran it.
 using BuildObserver = std::function<void(const DatasetView&, const Result<tiler::TilePtr>&)>;
 
-// Writes the header lines of replies that describe the tile. Called once per tile, on a worker; the lines are cached
-// with the tile.
-using HeaderWriter = tiler::HeaderLines (*)(const tiler::TileRequest&, const tiler::EncodedTile&);
-
 struct TileServiceOptions {
-  unsigned worker_threads = 0;                       // 0: as many as the machine has processors
-  std::size_t queue_length = 10'000;                 // jobs that wait for a worker, of all clients
-  std::size_t cache_bytes = std::size_t{256} << 20;  // 0: no cache
-  // Tiers below memory, in the order of look-ups. Each gets every tile that is built or found in a tier below it.
-  std::vector<std::shared_ptr<tiler::TileStore>> stores = {};
-  HeaderWriter write_head = nullptr;  // null: heads are left empty
+  unsigned worker_threads = 0;                                 // 0: as many as the machine has processors
+  std::size_t queue_length = 10'000;                           // jobs that wait for a worker, of all clients
+  std::size_t cache_bytes = std::size_t{256} << 20;            // 0: no cache
+  std::vector<std::shared_ptr<tiler::TileStore>> stores = {};  // as of tiler::TileTiers
+  tiler::HeaderWriter write_head = nullptr;                    // as of tiler::TileTiers; called on a worker
 };
 
 enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: EncodedTile::store
@@ -76,15 +71,12 @@ class TileService {
   // Removes the tiles of datasets that are not in `catalog` from the cache, and refuses such tiles from now on.
   void RetainTilesOf(const Catalog& catalog);
 
-  // Erases these tiles from memory and the tiers below; builds that have begun keep theirs. Blocks. Errors: those of
-  // the tiers. If one fails, the others are erased nevertheless.
-  struct Erased {
-    std::size_t memory = 0;
-    std::vector<std::pair<const char*, std::size_t>> stores;  // by the tier's name
-  };
-  Result<Erased> Erase(const tiler::TileSelection& selection, const std::stop_token& stop = {});
+  // TileTiers::Erase.
+  Result<tiler::TileTiers::Erased> Erase(const tiler::TileSelection& selection, const std::stop_token& stop = {}) {
+    return tiers_.Erase(selection, stop);
+  }
 
-  void SetCacheBytes(std::size_t capacity) { cache_.SetCapacity(capacity); }
+  void SetCacheBytes(std::size_t capacity) { tiers_.memory().SetCapacity(capacity); }
 
   // Cancels waiting calls of Build and Run; later calls fail at once. Find still works.
   void CancelBuilds() { pool_.Cancel(); }
@@ -95,7 +87,7 @@ class TileService {
   struct Stats {
     std::uint64_t hits = 0, misses = 0, joined = 0;
     std::uint64_t refused = 0;                           // builds for which the queue had no room
-    std::vector<std::chrono::microseconds> store_times;  // of look-ups in each tier below memory
+    std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
     std::size_t queued = 0, in_flight = 0;
     tiler::ByteCacheStats cache;
   };
@@ -103,19 +95,13 @@ class TileService {
 
  private:
   static JobOrder OrderOf(Length length, Clock::time_point deadline, std::uint64_t client);
-  tiler::TilePtr Finish(const tiler::TileRequest& request, tiler::EncodedTile tile) const;
-  Result<tiler::TilePtr> BuildAndKeep(const Catalog& catalog, const tiler::TileRequest& request,
-                                      const tiler::CacheKey& key, Clock::time_point requested_at, std::stop_token stop);
 
   const BuildObserver observer_;
-  const HeaderWriter write_head_;
-  tiler::TileCache cache_;
+  tiler::TileTiers tiers_;
   std::atomic<bool> had_edits_{false};  // of the last catalog
-  const std::vector<std::shared_ptr<tiler::TileStore>> stores_;
   WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, refused_{0};
-  std::vector<std::atomic<std::int64_t>> store_times_;  // microseconds
 };
 
 }  // namespace terrace::server

@@ -67,6 +67,12 @@ class Install(unittest.TestCase):
         printed = subprocess.run([source / "build/embed", ROOT / "config/samples/jacksboro.tif"], capture_output=True, text=True, check=True)
         self.assertEqual(printed.stdout.splitlines()[-2:], ["375.00", "nan"])  # after a warning: the datum is not stated
 
+    def test_the_headers_that_the_page_names_are_installed(self):
+        named = re.findall(r"`([a-z/_]+\.h)`", (ROOT / "docs/embedding.md").read_text().split("\nHeaders: ")[1])
+        self.assertGreaterEqual(len(named), 3)
+        for header in named:
+            self.assertTrue((self.prefix / "include/terrace" / header).is_file(), header)
+
     def test_another_minor_version_is_refused(self):
         _, configured = self.configure("1.99")
         self.assertNotEqual(configured.returncode, 0)

@@ -15,10 +15,7 @@ LayerDescription Maui() {
   layer.attribution = "© a \"survey\"";
   layer.version = "7";
   layer.available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}, {1, 1, 2, 1}}};
-  layer.west = -156.75;
-  layer.south = 20.5;
-  layer.east = -155.9;
-  layer.north = 21.1;
+  layer.bounds = {-156.75, 20.5, -155.9, 21.1};
   return layer;
 }
 
@@ -68,8 +65,8 @@ TEST(LayerJson, OneTemplateCarriesVersionAndQuery) {
 TEST(LayerJson, BoxAcrossTheAntimeridianSpansAllLongitudes) {
   for (const auto& [west, east] : {std::pair{177.0, -178.0}, {177.0, 182.0}, {-183.0, -178.0}}) {
     LayerDescription layer = Maui();
-    layer.west = west;
-    layer.east = east;
+    layer.bounds.west = west;
+    layer.bounds.east = east;
     EXPECT_EQ(Json::parse(EncodeLayerJson(layer)).at("bounds"), Json::array({-180, 20.5, 180, 21.1}));
   }
 }

@@ -15,10 +15,7 @@ TEST(TileJson, SaysWhatARasterDemSourceReads) {
   tiles.max_zoom = 11;
   tiles.tile_size = 512;
   tiles.encoding = HeightEncoding::kTerrarium;
-  tiles.west = 8;
-  tiles.south = 46;
-  tiles.east = 9;
-  tiles.north = 47;
+  tiles.bounds = {8, 46, 9, 47};
   const auto json = nlohmann::json::parse(EncodeTileJson(tiles));
   EXPECT_EQ(json["tilejson"], "3.0.0");
   EXPECT_EQ(json["scheme"], "xyz");
@@ -35,8 +32,8 @@ TEST(TileJson, BoundsStayInsideTheSquareOfTheMap) {
   TileJsonDescription tiles;
   EXPECT_EQ(nlohmann::json::parse(EncodeTileJson(tiles))["bounds"],
             nlohmann::json::parse("[-180.0, -85.0511287798066, 180.0, 85.0511287798066]"));
-  tiles.west = 170;
-  tiles.east = -160;
+  tiles.bounds.west = 170;
+  tiles.bounds.east = -160;
   const auto bounds = nlohmann::json::parse(EncodeTileJson(tiles))["bounds"];
   EXPECT_EQ(bounds[0], -180);
   EXPECT_EQ(bounds[2], 180);

@@ -35,16 +35,15 @@ std::vector<std::string> PartsOf(const std::string& text, char separator) {
 Result<std::vector<tiler::TileFormat>> FormatsOf(const std::string& text) {
   std::vector<tiler::TileFormat> formats;
   for (const std::string& name : PartsOf(text, ',')) {
-    const auto* const found =
-        std::ranges::find(archive::kFormatNames, name, [](const auto& row) { return row.second; });
-    if (found == archive::kFormatNames.end()) {
+    const auto format = ValueNamed(archive::kFormatNames, name);
+    if (!format) {
       return MakeError(ErrorCode::kInvalidArgument, "--format {}: must be terrain, glb, png, or several with commas",
                        text);
     }
-    if (std::ranges::find(formats, found->first) != formats.end()) {
+    if (std::ranges::find(formats, *format) != formats.end()) {
       return MakeError(ErrorCode::kInvalidArgument, "--format {}: has {} twice", text, name);
     }
-    formats.push_back(found->first);
+    formats.push_back(*format);
   }
   return formats;
 }

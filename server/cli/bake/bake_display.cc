@@ -13,7 +13,6 @@
 
 #include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
-#include "server/cli/common/progress.h"
 
 namespace terrace::cli {
 namespace {

@@ -308,14 +308,6 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
 // 10^9 tiles are the planet at 30 m a few times over: more is likely a mistake.
 constexpr std::uint64_t kManyTiles = 1'000'000'000;
 
-int Report(const std::vector<config::ConfigError>& errors) {
-  for (const config::ConfigError& error : errors) {
-    std::fprintf(stderr, "terrace: %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ",
-                 error.message.c_str());
-  }
-  return kExitUsage;
-}
-
 // What cannot be a place of a bake; empty: it can.
 std::string WrongPlace(const std::string& out) {
   const std::size_t scheme_end = out.find("://");
@@ -411,7 +403,7 @@ int Bake(const BakeArguments& given) {
 
   std::vector<config::ConfigError> errors;
   const auto input = InputOf(arguments, errors);
-  if (!errors.empty()) return Report(errors);
+  if (!errors.empty()) return Fail(errors);
   if (!input) return Fail(input.error());
   auto dataset = OpenDataset(arguments, *input, signals);
   if (signals.signal() != 0) return StopCode(signals);

@@ -14,10 +14,10 @@
 #include <thread>
 
 #include "bake/queue/job_status.h"
+#include "engine/core/plain_number.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/bake/bake_queue.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/progress.h"
 
 namespace terrace::cli {
 namespace {

@@ -14,9 +14,9 @@
 
 #include "archive/tile_writer.h"
 #include "bake/bake_request.h"
+#include "engine/core/plain_number.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
-#include "server/cli/common/progress.h"
 #include "server/store/disk_cache.h"
 
 namespace terrace::cli {

@@ -3,7 +3,9 @@
 
 #include <cstdio>
 #include <string>
+#include <vector>
 
+#include "config/config.h"
 #include "engine/core/result.h"
 
 namespace CLI {
@@ -28,6 +30,12 @@ inline int Fail(const std::string& message, int code) {
 // The same; the code says whether the user can correct the command.
 inline int Fail(const Error& error) {
   return Fail(error.message, error.code == ErrorCode::kInvalidArgument ? kExitUsage : kExitFailure);
+}
+
+// The same for each error of the command or the configuration.
+inline int Fail(const std::vector<config::ConfigError>& errors) {
+  for (const config::ConfigError& error : errors) Fail(error.Text(), kExitUsage);
+  return kExitUsage;
 }
 
 // Flushes stdout. Returns `code`, or kExitFailure if stdout could not be written.

@@ -48,7 +48,7 @@ std::vector<std::string> FilesOfBaked(const std::string& place) {
     if (IsFile(manifest)) files.push_back(manifest);
   };
   add(place);
-  for (const auto& [format, name] : archive::kFormatNames) add(place + "/" + std::string(name));
+  for (const auto& [name, format] : archive::kFormatNames) add(place + "/" + std::string(name));
   return files;
 }
 

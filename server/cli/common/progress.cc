@@ -8,17 +8,11 @@
 #include <string>
 #include <utility>
 
+#include "engine/core/plain_number.h"
+
 namespace terrace::cli {
 
 using Clock = std::chrono::steady_clock;
-
-std::string Grouped(std::uint64_t number) {
-  std::string text = std::to_string(number);
-  for (auto at = static_cast<std::ptrdiff_t>(text.size()) - 3; at > 0; at -= 3) {
-    text.insert(static_cast<std::size_t>(at), ",");
-  }
-  return text;
-}
 
 Progress::Progress(std::string what, std::size_t count)
     : what_(std::move(what)),

@@ -9,9 +9,6 @@
 
 namespace terrace::cli {
 
-// "1,234,567"
-std::string Grouped(std::uint64_t number);
-
 // Prints "terrace: reading alps.tif 42 %, 3 min left", or "terrace: reading dems 1,234 of 5,000" for many items. On a
 // terminal the line is rewritten in place; otherwise a line is printed after a second, and then every ten seconds.
 // Prints nothing if the work takes less than a second.

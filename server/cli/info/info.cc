@@ -200,8 +200,7 @@ int Info(const InfoArguments& arguments) {
   const std::filesystem::path directory = std::filesystem::current_path(unnamed);
   for (const auto& [key, text] : dataset_flags) config::SetDatasetOption(key, text, directory, flags, wrong);
   for (const auto& [key, text] : cache_flags) config::SetServerOption(key, text, directory, config, wrong);
-  for (const config::ConfigError& error : wrong) Fail(error.path + ": " + error.message, kExitUsage);
-  if (!wrong.empty()) return kExitUsage;
+  if (!wrong.empty()) return Fail(wrong);
   int exit_code = dem::AllowVrts() ? kExitOk : kExitFailure;
   const dem::RasterCache cache = OpenCache(config);
   std::string problem;

@@ -6,21 +6,18 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <stop_token>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
+#include "engine/common/parallel_for.h"
 #include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
 #include "engine/dem/dem_source.h"
@@ -46,44 +43,25 @@ namespace terrace::cli {
 namespace {
 
 // Returns the joined mesh of all blocks. It does not depend on `threads`, which is at least 1. Shows the number of
-// finished blocks. If a thread throws, stops the others and rethrows.
+// finished blocks.
 tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldPartition& cut, double max_error_m,
                         const tin::GreedyOptions& options, int threads) {
-  std::atomic<std::size_t> next = 0;
-  std::stop_source failed;
-
   std::mutex mutex;  // guards everything below
   Progress progress("meshing");
   tin::BlockJoiner joiner(cut);
   std::vector<std::optional<tin::TinMesh>> waiting(cut.size());  // for an earlier block
   std::size_t done = 0;
-  std::exception_ptr failure;
-
-  const auto mesh_blocks = [&] {
-    try {
-      for (std::size_t i = next++; i < cut.size(); i = next++) {
-        std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options, failed.get_token());
-        if (!mesh) return;
-        const std::lock_guard lock(mutex);
-        waiting[i] = std::move(mesh);
-        while (joiner.added() < cut.size() && waiting[joiner.added()]) {
-          joiner.Add(*std::exchange(waiting[joiner.added()], std::nullopt));
-        }
-        progress.Update(static_cast<double>(++done) / static_cast<double>(cut.size()));
-      }
-    } catch (...) {
-      failed.request_stop();
-      const std::lock_guard lock(mutex);
-      failure = std::current_exception();
+  const auto mesh_block = [&](std::size_t i) {
+    std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options);
+    const std::lock_guard lock(mutex);
+    waiting[i] = std::move(mesh);
+    while (joiner.added() < cut.size() && waiting[joiner.added()]) {
+      joiner.Add(*std::exchange(waiting[joiner.added()], std::nullopt));
     }
+    progress.Update(static_cast<double>(++done) / static_cast<double>(cut.size()));
+    return true;
   };
-  {
-    std::vector<std::jthread> others;
-    const std::size_t most = std::min(static_cast<std::size_t>(threads), cut.size());
-    while (others.size() + 1 < most) others.emplace_back(mesh_blocks);
-    mesh_blocks();
-  }
-  if (failure) std::rethrow_exception(failure);
+  dem::ParallelFor(cut.size(), mesh_block, static_cast<std::size_t>(threads));
   return std::move(joiner).Take();
 }
 

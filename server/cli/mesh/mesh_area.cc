@@ -47,8 +47,10 @@ std::optional<config::DatasetConfig> DatasetOf(const AreaMeshArguments& argument
   for (const auto& [key, text] : arguments.area.dataset) {
     config::SetDatasetOption(key, text, directory, dataset, wrong);
   }
-  for (const config::ConfigError& error : wrong) Fail(error.path + ": " + error.message, kExitUsage);
-  if (!wrong.empty()) return std::nullopt;
+  if (!wrong.empty()) {
+    Fail(wrong);
+    return std::nullopt;
+  }
   const dem::ReadOptions read = ReadOptionsOf(arguments.nodata, {});
   dataset.nodata = {read.find_voids, read.nodata};
   return dataset;

@@ -37,9 +37,7 @@ int Report(const std::vector<config::ConfigError>& errors, const std::string& fi
   const std::string place = file.empty() || in_flags ? "command" : "configuration " + file;
   std::fprintf(stderr, "terrace: %zu %s in the %s:\n", errors.size(),
                errors.size() == 1 ? "thing is wrong" : "things are wrong", place.c_str());
-  for (const config::ConfigError& error : errors) {
-    std::fprintf(stderr, "  %s%s%s\n", error.path.c_str(), error.path.empty() ? "" : ": ", error.message.c_str());
-  }
+  for (const config::ConfigError& error : errors) std::fprintf(stderr, "  %s\n", error.Text().c_str());
   return kExitUsage;
 }
 

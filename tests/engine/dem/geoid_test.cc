@@ -37,14 +37,14 @@ std::optional<double> Cs2cs(const std::string& from, Position place) {
   return found == 3 ? std::optional(height) : std::nullopt;
 }
 
-TEST(AreaOfUse, LongitudesATurnApartAreOnePlace) {
-  const AreaOfUse earth, fiji{176, -20, -178, -12}, alps{5, 43, 17, 49};
+TEST(Covers, LongitudesATurnApartAreOnePlace) {
+  const geo::GeoBounds earth, fiji{176, -20, -178, -12}, alps{5, 43, 17, 49};
   for (const double turn : {-360.0, 0.0, 360.0}) {
-    EXPECT_TRUE(earth.Covers({190 + turn, 10}));
-    EXPECT_TRUE(fiji.Covers({179 + turn, -15}) && fiji.Covers({-179 + turn, -15}));
-    EXPECT_FALSE(fiji.Covers({170 + turn, -15}) || fiji.Covers({179 + turn, -25}));
-    EXPECT_TRUE(alps.Covers({8 + turn, 46}));
-    EXPECT_FALSE(alps.Covers({18 + turn, 46}));
+    EXPECT_TRUE(Covers(earth, {190 + turn, 10}));
+    EXPECT_TRUE(Covers(fiji, {179 + turn, -15}) && Covers(fiji, {-179 + turn, -15}));
+    EXPECT_FALSE(Covers(fiji, {170 + turn, -15}) || Covers(fiji, {179 + turn, -25}));
+    EXPECT_TRUE(Covers(alps, {8 + turn, 46}));
+    EXPECT_FALSE(Covers(alps, {18 + turn, 46}));
   }
 }
 

@@ -32,6 +32,17 @@ TEST(ParallelFor, WorkIsDoneAtOnceAndOnce) {
   EXPECT_EQ(std::ranges::count(done, 1), 100);
 }
 
+TEST(ParallelFor, OneThreadIsTheCaller) {
+  std::vector<std::thread::id> threads;
+  const auto work = [&](std::size_t i) {
+    EXPECT_EQ(i, threads.size());
+    threads.push_back(std::this_thread::get_id());
+    return true;
+  };
+  ParallelFor(100, work, /*threads=*/1);
+  EXPECT_EQ(threads, std::vector(100, std::this_thread::get_id()));
+}
+
 TEST(ParallelFor, NothingBeginsAfterFalseAndWhatIsThrownComesOut) {
   std::size_t begun = 0;
   std::mutex mutex;

@@ -183,10 +183,7 @@ TEST(NegotiateTile, ComesToFortyOneErrorsAtMost) {
 TEST(NegotiateTile, HeightTilesAreThoseThatMeetTheBounds) {
   std::array<DatasetView, 1> datasets;
   datasets[0].name = "maui";
-  datasets[0].west = 170;  // across the antimeridian
-  datasets[0].east = -160;
-  datasets[0].south = 10;
-  datasets[0].north = 20;
+  datasets[0].bounds = {170, 10, -160, 20};  // across the antimeridian
   datasets[0].max_mercator_depth = 5;
   const auto find = [&](const char* target) {
     Request request;

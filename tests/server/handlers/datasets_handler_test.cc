@@ -14,12 +14,8 @@ std::array<DatasetView, 1> Datasets() {
   datasets[0].generation = 0x0a1b2c3d4e5f6789;
   datasets[0].attribution = "\xff not UTF-8";
   datasets[0].available.resize(3);
-  datasets[0].west = 177;
-  datasets[0].south = -20;
-  datasets[0].east = -178;
-  datasets[0].north = -15;
-  datasets[0].min_height_m = -12.5;
-  datasets[0].max_height_m = 1324;
+  datasets[0].bounds = {177, -20, -178, -15};
+  datasets[0].heights = {-12.5, 1324};
   return datasets;
 }
 
@@ -51,10 +47,7 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
 
 TEST(DatasetsHandler, TellsWhereTheDeepestTilesLie) {
   std::array<DatasetView, 1> datasets = Datasets();
-  datasets[0].west = -180;
-  datasets[0].south = -90;
-  datasets[0].east = 180;
-  datasets[0].north = 90;
+  datasets[0].bounds = {-180, -90, 180, 90};
   datasets[0].available[2] = {{3, 1, 3, 2}};
   const auto list = nlohmann::json::parse(DatasetsJson(datasets));
   EXPECT_EQ(list["datasets"][0]["finest_bounds"], nlohmann::json::parse("[-45.0, -45.0, 0.0, 45.0]"));

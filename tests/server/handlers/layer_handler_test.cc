@@ -16,8 +16,8 @@ class LayerHandlerTest : public testing::Test {
     datasets_[0].generation = 0x0a1b2c3d4e5f6789;
     datasets_[0].attribution = "USGS";
     datasets_[0].available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}}};
-    datasets_[0].west = 170;
-    datasets_[0].east = -170;
+    datasets_[0].bounds.west = 170;
+    datasets_[0].bounds.east = -170;
     handlers_.emplace(datasets_);
   }
   Response Get(const char* target, const char* accept_encoding = "") {

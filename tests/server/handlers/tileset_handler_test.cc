@@ -23,8 +23,7 @@ class TilesetHandlerTest : public testing::Test {
     maui.name = "maui";
     maui.attribution = "USGS";
     maui.generation = 0x0a1b2c3d4e5f6789;
-    maui.min_height_m = 100;
-    maui.max_height_m = 3000;
+    maui.heights = {100, 3000};
     maui.floor_m = -20;
     maui.available.resize(13);
     for (int level = 1; level <= 12; ++level) {
@@ -65,10 +64,7 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
 TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMakeFour) {
   DatasetView& maui = datasets_[0];
   const double tile = 180.0 / 4096;
-  maui.west = -180 + 513 * tile + 1e-4;
-  maui.east = -180 + 551 * tile;
-  maui.south = -90 + 1025 * tile;
-  maui.north = -90 + 1047.5 * tile;
+  maui.bounds = {-180 + 513 * tile + 1e-4, -90 + 1025 * tile, -180 + 551 * tile, -90 + 1047.5 * tile};
   for (std::size_t level = 1; level <= 12; ++level) {
     geo::TileRange& range = maui.available[level].front();
     range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
@@ -92,8 +88,8 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMa
         {0, range.start_y, std::max<std::int64_t>(range.end_x - middle, 1), range.end_y},
         {columns - std::max<std::int64_t>(middle - range.start_x, 2), range.start_y, columns - 1, range.end_y}};
   }
-  maui.west = 180 - 31 * tile;
-  maui.east = -180 + 7 * tile;
+  maui.bounds.west = 180 - 31 * tile;
+  maui.bounds.east = -180 + 7 * tile;
   EXPECT_EQ(roots(), (std::vector<std::string>{"3dtiles/7-0-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f",
                                                "3dtiles/7-255-32/{level}/{x}/{y}.glb?v=0a1b2c3d4e5f"}));
 }

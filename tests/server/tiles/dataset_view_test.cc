@@ -39,16 +39,10 @@ TEST(FinestBounds, CrossTheAntimeridian) {
 
 TEST(FinestBounds, LieWithinTheData) {
   DatasetView dataset = Earth({{8, 4, 8, 4}});
-  dataset.west = 5;
-  dataset.south = 4;
-  dataset.east = 6;
-  dataset.north = 7;
+  dataset.bounds = {5, 4, 6, 7};
   ExpectBounds(dataset, {5, 4, 6, 7});
   dataset = Earth({{0, 4, 0, 4}, {15, 4, 15, 4}});
-  dataset.west = 179;
-  dataset.south = 4;
-  dataset.east = -178;
-  dataset.north = 7;
+  dataset.bounds = {179, 4, -178, 7};
   ExpectBounds(dataset, {179, 4, -178, 7});
 }
 

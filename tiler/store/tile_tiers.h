@@ -1,0 +1,61 @@
+// The tiers of tiles, from memory down to a build. A tile is looked up in memory, then in each store in order; the tier
+// that has it fills the tiers above. If none has it, it is built and goes into all of them.
+//
+// Thread-safe. Look-ups of one key are not joined: two threads that ask for a tile at once may both build it.
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stop_token>
+#include <utility>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "tiler/store/tile_store.h"
+#include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/tile_request.h"
+
+namespace terrace::tiler {
+
+// Writes the header lines of replies that describe the tile. The `dataset` of the request is 0.
+using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
+
+class TileTiers {
+ public:
+  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; none is null. `write_head` is
+  // called once for a tile that comes into memory, and its lines are cached with the tile; null: heads are left empty.
+  TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
+            HeaderWriter write_head = nullptr);
+
+  // The tier in memory: the only one that is asked without blocking.
+  TileCache& memory() { return memory_; }
+  const TileCache& memory() const { return memory_; }
+
+  // `build` is called if no tier has the tile, and does not throw. Its error is returned and not kept. Blocks.
+  Result<TilePtr> FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build);
+
+  // Erases these tiles from all tiers; builds that have begun keep theirs. Blocks. Errors: those of the stores. If one
+  // fails, the others are erased nevertheless.
+  struct Erased {
+    std::size_t memory = 0;
+    std::vector<std::pair<const char*, std::size_t>> stores;  // by the store's name
+  };
+  Result<Erased> Erase(const TileSelection& selection, const std::stop_token& stop = {});
+
+  // The sum of the durations of look-ups in each store.
+  std::vector<std::chrono::microseconds> store_times() const;
+
+ private:
+  TilePtr Keep(const CacheKey& key, EncodedTile tile, std::size_t stores_above);
+
+  TileCache memory_;
+  const std::vector<std::shared_ptr<TileStore>> stores_;
+  const HeaderWriter write_head_;
+  std::vector<std::atomic<std::int64_t>> store_times_;  // microseconds
+};
+
+}  // namespace terrace::tiler
