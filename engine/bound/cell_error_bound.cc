@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace terrace::dem {
 namespace {
@@ -50,7 +49,7 @@ class CellSurface {
   // An upper bound of the distance between a sample and the surface, wherever the sample lies.
   double DistanceBound(double sample) const { return std::max(highest_ - sample, sample - lowest_); }
 
-  // The same; 0 if the position is outside the cell.
+  // The same for a sample at a known position; 0 if that is outside the cell.
   double DistanceBound(const Position& at, double sample) const {
     double u = 0.5, v = 0.5, u_slack = 0, v_slack = 0;
     constexpr int kMaxSteps = 4;
@@ -322,9 +321,8 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
     return kUnknownError;
   }
   // The range of heights served in a cell, in the raster grid's vertical datum.
-  constexpr double kPosition = 4e-5;  // of averages: NodePositions is exact to a hundred-thousandth
   const Position& off = statistics_.misplacement();
-  const double slack = kPosition * trace_.factor;
+  const double slack = kMaxPositionError * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
   CellSurface surface(cell_samples.corners, is_separable, {off.x + slack, off.y + slack});
   const double geoid_error = geoid_.BoundOver(cell.box());

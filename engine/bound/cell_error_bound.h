@@ -59,9 +59,9 @@ class CellErrorBound {
   };
 
   // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
-  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. A bound not
-  // above `known` need not be tight. Sets `cell_samples` if BoundBySamples can give a tighter bound from samples that
-  // have not been read.
+  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. If the
+  // bound is at most `known`, the result is only some value up to `known`. Sets `cell_samples` if BoundBySamples can
+  // give a tighter bound from samples that have not been read.
   double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
                              std::optional<CellSamples>& cell_samples) const;
 
@@ -69,7 +69,7 @@ class CellErrorBound {
   // sea. Precondition: nothing is blended. False does not mean the contrary.
   bool HasNoSamples(const CellBox& box) const;
 
-  // Returns a bound from the samples in the cell that could have one above `known`; at most `known` if there are none.
+  // Returns a bound from the samples in the cell; only some value up to `known` if the bound is at most `known`.
   // Infinite if some samples lie outside the window. `turn`: offset of the window's columns against the cell's, in
   // columns.
   double BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,

@@ -9,8 +9,7 @@ namespace terrace::dem {
 
 // By column: the largest |difference| of a sample from the next one to the east (x) and to the south (y), of two
 // differences that follow each other (xx, yy), and of the eastern differences of two rows (xy). Differences that are
-// NaN do not count, nor do those that a sample at the end of a row or a column does not have. And the sums of the
-// samples, NaN if one is.
+// NaN do not count. Samples without the neighbour have no such difference. And the sums of the samples, NaN if one is.
 struct ColumnBends {
   std::vector<float> x, y, xx, yy, xy, sum;
 

@@ -164,10 +164,10 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
     if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
   }
   // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
-  // directions. Positions are exact to a hundred-thousandth, those of samples to their misplacement.
-  constexpr double kOffChord = 1.5 * 2 / 8, kPosition = 4e-5;
-  steps.bend_x = steps.bend_x * kOffChord + kPosition + misplacement_.x;
-  steps.bend_y = steps.bend_y * kOffChord + kPosition + misplacement_.y;
+  // directions.
+  constexpr double kOffChord = 1.5 * 2 / 8;
+  steps.bend_x = steps.bend_x * kOffChord + kMaxPositionError + misplacement_.x;
+  steps.bend_y = steps.bend_y * kOffChord + kMaxPositionError + misplacement_.y;
   at.Grow(misplacement_.x, misplacement_.y);
   return true;
 }

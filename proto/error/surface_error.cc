@@ -340,10 +340,9 @@ double ChordDeviation(const Ground& ground, double steps) {
   return kCurvatureMargin * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
 }
 
-// The largest difference along edges from the lattice surface, in metres, with ChordDeviation, if it is larger than
-// `known`; else `known`. `heights`: by vertex, of
-// the surface that is linear in longitude and latitude; empty: it is not measured. `ecef`: by vertex, of the flat
-// triangles, which lie `beside_m` beside their places at most.
+// The larger of `known_m` and the largest difference along edges from the lattice surface, with ChordDeviation.
+// `heights`: by vertex, of the surface that is linear in longitude and latitude; empty: it is not measured. `ecef`: by
+// vertex, of the flat triangles, which lie `beside_m` beside their places at most. In metres.
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
 // shift. Most chords are therefore known to stay below the largest difference found so far, and are not measured.
@@ -388,7 +387,8 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
     }
     if (linear <= known && may_stay) return;
     if (!heights.empty() && linear > known) largest = std::max(largest, linear);
-    largest = LargestOfHalves(meter, bound, ground, ends[a], ends[b], 0, largest - deviation) + deviation;
+    const double halves = LargestOfHalves(meter, bound, ground, ends[a], ends[b], 0, largest - deviation);
+    largest = std::max(largest, halves + deviation);
   });
   return largest;
 }

@@ -15,8 +15,9 @@
 namespace terrace::proto {
 
 // Returns a bound on the distance between the two surfaces in metres, everywhere in the tile, both for the height
-// interpolated in longitude and latitude and for the flat triangles in ECEF. It is `at_samples_m` (TileError::max_m) if
-// the distance along the edges of all triangles is not larger; docs/decisions/0011-certified-error.md has the proof.
+// interpolated in longitude and latitude and for the flat triangles in ECEF. It is the larger of `at_samples_m`
+// (TileError::max_m) and a bound along the edges of all triangles; docs/decisions/0011-certified-error.md has the
+// proof.
 //
 // `positions`: of the tile's vertices, DecodePositions.
 double MeasureSurfaceError(const LatticeView& lattice, const QuantizedTile& tile,

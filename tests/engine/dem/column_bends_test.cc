@@ -1,4 +1,6 @@
 // Differences of samples are measured in vectors; what comes out is what each sample gives on its own.
+#include "engine/bound/column_bends.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,7 +9,6 @@
 #include <random>
 #include <vector>
 
-#include "engine/bound/column_bends.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {
