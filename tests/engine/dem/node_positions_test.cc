@@ -18,7 +18,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr double kTolerance = 1e-5;
+constexpr double kPositionTolerance = 1e-5;
 
 // A raster of 4096 x 4096 pixels. `west`, `north`, `pixel`: in the CRS's units.
 Result<Georeference> MakeGeoreference(const std::string& crs, double west, double north, double pixel) {
@@ -32,18 +32,18 @@ Result<Georeference> MakeGeoreference(const std::string& crs, double west, doubl
   return Georeference::Of(*dataset, crs);
 }
 
-struct Place {
+struct ProjectedRaster {
   const char* name;
   const char* crs;
   double west, north, pixel;
   double latitude, longitude;  // near the raster's centre
 };
 
-class NodePositionsAt : public testing::TestWithParam<Place> {};
+class NodePositionsAt : public testing::TestWithParam<ProjectedRaster> {};
 
 TEST_P(NodePositionsAt, AreThoseOfProjAndTheSameInEveryWindow) {
-  const Place& place = GetParam();
-  const auto georeference = MakeGeoreference(place.crs, place.west, place.north, place.pixel);
+  const ProjectedRaster& raster = GetParam();
+  const auto georeference = MakeGeoreference(raster.crs, raster.west, raster.north, raster.pixel);
   ASSERT_TRUE(georeference) << georeference.error().message;
   const Footprint footprint = Footprint::Of(*georeference).Padded();
   std::mt19937 random(3);
@@ -54,10 +54,10 @@ TEST_P(NodePositionsAt, AreThoseOfProjAndTheSameInEveryWindow) {
       const geo::Lattice lattice{level, cells};
       // Near the raster's centre, where it is larger than the window, and anywhere around the Earth at small levels.
       const double step = lattice.StepDegrees();
-      const std::int64_t column = static_cast<std::int64_t>((place.longitude + 180) / step) + pick(400) - 330;
-      const std::int64_t row = static_cast<std::int64_t>((place.latitude + 90) / step) + pick(400) - 330;
+      const std::int64_t column = static_cast<std::int64_t>((raster.longitude + 180) / step) + pick(400) - 330;
+      const std::int64_t row = static_cast<std::int64_t>((raster.latitude + 90) / step) + pick(400) - 330;
       const NodeWindow window{column, row, 2 + pick(260), 2 + pick(260)};
-      const NodePositions all = NodePositions::Of(*georeference, footprint, lattice, window, kTolerance);
+      const NodePositions all = NodePositions::Of(*georeference, footprint, lattice, window, kPositionTolerance);
       ASSERT_FALSE(all.is_separable());
       for (std::int64_t r = 0; r < window.rows; ++r) {
         if (IsPoleRow(lattice, row + r)) continue;
@@ -71,14 +71,14 @@ TEST_P(NodePositionsAt, AreThoseOfProjAndTheSameInEveryWindow) {
           const bool is_near = exact[c].x > -1 && exact[c].x < 4097 && exact[c].y > -1 && exact[c].y < 4097;
           if (!is_near) continue;
           ++compared;
-          ASSERT_NEAR(found.x, exact[c].x, 2 * kTolerance)
+          ASSERT_NEAR(found.x, exact[c].x, 2 * kPositionTolerance)
               << level << ' ' << column + static_cast<int>(c) << ' ' << row + r;
-          ASSERT_NEAR(found.y, exact[c].y, 2 * kTolerance)
+          ASSERT_NEAR(found.y, exact[c].y, 2 * kPositionTolerance)
               << level << ' ' << column + static_cast<int>(c) << ' ' << row + r;
         }
       }
       const NodeWindow part{column + pick(window.columns), row + pick(window.rows), 1 + pick(300), 1 + pick(300)};
-      const NodePositions other = NodePositions::Of(*georeference, footprint, lattice, part, kTolerance);
+      const NodePositions other = NodePositions::Of(*georeference, footprint, lattice, part, kPositionTolerance);
       for (std::int64_t r = part.row; r < std::min(part.row + part.rows, row + window.rows); ++r) {
         for (std::int64_t c = part.column; c < std::min(part.column + part.columns, column + window.columns); ++c) {
           const Position a = all.OfNode(c, r), b = other.OfNode(c, r);
@@ -94,15 +94,15 @@ TEST_P(NodePositionsAt, AreThoseOfProjAndTheSameInEveryWindow) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ReferenceSystems, NodePositionsAt,
-                         testing::Values(Place{"Utm", "EPSG:32611", 340000, 3860000, 30, 34.3, -118.1},
-                                         Place{"UtmMetre", "EPSG:32612", 560000, 4310000, 1, 38.93, -110.28},
-                                         Place{"Mercator", "EPSG:3857", 1e6, 6e6, 30, 46.9, 9.5},
-                                         Place{"EqualArea", "EPSG:3035", 4.2e6, 2.7e6, 90, 46.2, 10.2},
-                                         Place{"Antarctica", "EPSG:3031", -2e5, 2e5, 100, -88.5, 30},
-                                         Place{"Arctic", "EPSG:3413", -1e6, -1e6, 250, 75.6, -62.9},
-                                         Place{"Mollweide", "ESRI:54009", 5e5, 5.4e6, 100, 43.5, 11},
-                                         Place{"Conic", "EPSG:2154", 8e5, 6.6e6, 25, 46, 5},
-                                         Place{"Datum", "EPSG:4277", -3, 54, 0.0002, 53.6, -2.6}),
+                         testing::Values(ProjectedRaster{"Utm", "EPSG:32611", 340000, 3860000, 30, 34.3, -118.1},
+                                         ProjectedRaster{"UtmMetre", "EPSG:32612", 560000, 4310000, 1, 38.93, -110.28},
+                                         ProjectedRaster{"Mercator", "EPSG:3857", 1e6, 6e6, 30, 46.9, 9.5},
+                                         ProjectedRaster{"EqualArea", "EPSG:3035", 4.2e6, 2.7e6, 90, 46.2, 10.2},
+                                         ProjectedRaster{"Antarctica", "EPSG:3031", -2e5, 2e5, 100, -88.5, 30},
+                                         ProjectedRaster{"Arctic", "EPSG:3413", -1e6, -1e6, 250, 75.6, -62.9},
+                                         ProjectedRaster{"Mollweide", "ESRI:54009", 5e5, 5.4e6, 100, 43.5, 11},
+                                         ProjectedRaster{"Conic", "EPSG:2154", 8e5, 6.6e6, 25, 46, 5},
+                                         ProjectedRaster{"Datum", "EPSG:4277", -3, 54, 0.0002, 53.6, -2.6}),
                          [](const auto& info) { return info.param.name; });
 
 }  // namespace
