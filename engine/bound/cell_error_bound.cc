@@ -322,7 +322,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
   }
   // The range of heights served in a cell, in the raster grid's vertical datum.
   const Position& off = statistics_.misplacement();
-  const double slack = kMaxPositionError * trace_.factor;
+  const double slack = MaxPositionError(grid_.georeference()) * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
   CellSurface surface(cell_samples.corners, is_separable, {off.x + slack, off.y + slack});
   const double geoid_error = geoid_.BoundOver(cell.box());

@@ -50,6 +50,7 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
       statistics_(statistics),
       geoid_(geoid),
       blends_(blends),
+      position_error_(MaxPositionError(grid.georeference())),
       misplacement_{statistics.misplacement().x / trace.factor, statistics.misplacement().y / trace.factor} {
   PlaceNodes(grid);
 }
@@ -166,8 +167,8 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
   // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
   // directions.
   constexpr double kOffChord = 1.5 * 2 / 8;
-  steps.bend_x = steps.bend_x * kOffChord + kMaxPositionError + misplacement_.x;
-  steps.bend_y = steps.bend_y * kOffChord + kMaxPositionError + misplacement_.y;
+  steps.bend_x = steps.bend_x * kOffChord + position_error_ + misplacement_.x;
+  steps.bend_y = steps.bend_y * kOffChord + position_error_ + misplacement_.y;
   at.Grow(misplacement_.x, misplacement_.y);
   return true;
 }

@@ -60,6 +60,7 @@ class SmoothErrorBound {
   const GridStatistics& statistics_;
   const GeoidErrorBound& geoid_;
   const bool blends_;
+  const double position_error_;  // in averages
   const Position misplacement_;  // of samples, in averages
   // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
   std::unique_ptr<double[]> x_, y_;

@@ -28,9 +28,10 @@ bool IsPoleRow(const Grid&, std::int64_t) {
   return false;
 }
 
-// The largest error of positions that are interpolated with the tolerance of raster grids, 1e-5 averages. Only a few
-// nodes of a cell are checked: datums with grids of shifts gave up to 5e-5.
-inline constexpr double kMaxPositionError = 1e-4;
+// The largest error of a node's position, in averages. Affine positions are exact but for rounding. Others are
+// interpolated with the tolerance of raster grids, 1e-5, and only a few nodes of a cell are checked: datums with grids
+// of shifts gave up to 5e-5.
+inline double MaxPositionError(const Georeference& georeference) { return georeference.is_affine() ? 1e-9 : 1e-4; }
 
 // The window of a tile's samples with a halo of one.
 NodeWindow WindowOfTile(const geo::Lattice& lattice, const geo::TileKey& key);
