@@ -20,6 +20,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormatMember = "terrace_archive";
 
+// Archives have no tiles in other codings.
 constexpr Names<tiler::Coding, 2> kCodingNames = {
     {{"identity", tiler::Coding::kIdentity}, {"gzip", tiler::Coding::kGzip}}};
 

@@ -1,7 +1,6 @@
 // Names and paths of the files of an archive.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
 
 #include "archive/manifest.h"

@@ -61,10 +61,11 @@ std::string PurgedJson(const Purge& purge, const Purged& purged) {
 Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
   constexpr std::array<const char*, 3> kNames = {"dataset", "bbox", "levels"};
   std::array<std::optional<std::string>, kNames.size()> values;
-  const Result<void> read = ReadParameters(query, kNames, [&](std::size_t i, const std::string& value) -> Result<void> {
+  const auto set = [&](std::size_t i, const std::string& value) -> Result<void> {
     values[i] = value;
     return {};
-  });
+  };
+  const Result<void> read = ReadParameters(query, kNames, set, {}, /*takes_version=*/false);
   if (!read) return tl::unexpected(read.error());
   const auto& [dataset, box, levels] = values;
   if (!dataset) return MakeError(ErrorCode::kInvalidArgument, "dataset is missing: name the one to purge");

@@ -9,7 +9,8 @@
 namespace terrace {
 
 // The number that the whole text is. Nothing: the text is empty, has other characters, such as blanks or '+', or the
-// number does not fit into the type. `format`: the base of an integer, or a std::chars_format.
+// number does not fit into the type. `format`: the base of an integer, or a std::chars_format. "inf" and
+// "nan" are numbers of a floating-point type.
 template <typename Number, typename... Format>
 std::optional<Number> ParseNumber(std::string_view text, Format... format) {
   Number number{};

@@ -3,9 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <iterator>
 #include <utility>
+#include <vector>
 
 #include "server/http/text.h"
 #include "tiler/map/contour_tile.h"
@@ -98,6 +99,7 @@ constexpr MapParameterRow kRows[] = {
 }  // namespace
 
 Result<void> SetTileSize(int& size, std::string_view text) {
+  static_assert(tiler::kHeightSizes == std::array{256, 512});
   return SetOneOf(size, "size", text, {{"256", 256}, {"512", 512}});
 }
 

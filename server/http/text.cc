@@ -123,16 +123,16 @@ Result<QueryParameters> ParseQuery(std::string_view query) {
 
 Result<void> ReadParameters(std::string_view query, std::span<const char* const> names,
                             const std::function<Result<void>(std::size_t, const std::string&)>& set,
-                            std::string_view known) {
+                            std::string_view known, bool takes_version) {
   const Result<QueryParameters> sent = ParseQuery(query);
   if (!sent) return tl::unexpected(sent.error());
   std::vector<bool> given(names.size());
   for (const auto& [name, value] : *sent) {
-    if (name == "v") continue;
+    if (takes_version && name == "v") continue;
     const auto i = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
     if (i == names.size()) {
       return MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are {}",
-                       known.empty() ? fmt::format("{}", fmt::join(names, ", ")) : known);
+                       known.empty() ? fmt::format("{}", fmt::join(names, ", ")) : std::string(known));
     }
     if (given[i]) return MakeError(ErrorCode::kInvalidArgument, "{} is given more than once", name);
     given[i] = true;

@@ -68,16 +68,15 @@ using QueryParameters = std::vector<std::pair<std::string, std::string>>;
 // or a name contains '%': no name here needs it, and proxies would not recognize the parameter.
 Result<QueryParameters> ParseQuery(std::string_view query);
 
-// Reads a query whose parameters have one of `names`, each at most once, besides `v`, which is ignored. Calls `set`
-// with the index of each name and the value, in the order sent. kInvalidArgument: as ParseQuery; a name that is given
-// twice, or another one, with `known` as the list of names in the message, by default all `names`. Errors of `set` are
-// returned.
+// Reads a query. Calls `set` with the index of each name in `names` and the value, in the order sent. `takes_version`:
+// the URL may have `v`, which is ignored. kInvalidArgument: as ParseQuery; a name is given twice; a name is not one of
+// `names`. `known`: the names that the message of the last one lists; empty: all `names`. Errors of `set` are returned.
 Result<void> ReadParameters(std::string_view query, std::span<const char* const> names,
                             const std::function<Result<void>(std::size_t, const std::string&)>& set,
-                            std::string_view known = {});
+                            std::string_view known = {}, bool takes_version = true);
 
-// Sets what one of a few words stands for. kInvalidArgument: another text; the message is "size must be 256 or 512" for
-// the parameter `name` "size".
+// Sets `to` to the value that the word `text` has in `words`. kInvalidArgument: another text; the message is "size must
+// be 256 or 512" for the parameter `name` "size".
 template <typename T, std::size_t kCount>
 Result<void> SetOneOf(T& to, std::string_view name, std::string_view text, const Names<T, kCount>& words) {
   if (const std::optional<T> meaning = ValueNamed(words, text)) {

@@ -1,6 +1,5 @@
 #include "server/query/grid_query.h"
 
-#include <algorithm>
 #include <array>
 #include <iterator>
 #include <string>

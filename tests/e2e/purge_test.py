@@ -177,6 +177,7 @@ class Purge(unittest.TestCase):
             for query, status, why in (
                     ("", 400, "dataset is missing"), ("dataset=mars", 404, "no such dataset"),
                     ("dataset=alps&dataset=alps", 400, "more than once"), ("dataset=alps&box=1", 400, "unknown parameter"),
+                    ("dataset=alps&v=1", 400, "unknown parameter"),
                     ("dataset=alps&levels=9-8", 400, "levels must"), ("dataset=alps&levels=25", 400, "levels must"),
                     ("dataset=alps&levels=a", 400, "levels must"), ("dataset=alps&bbox=1,2,3", 400, "bbox must"),
                     ("dataset=alps&bbox=7,46,7,47", 400, "bbox is empty"), ("dataset=alps&bbox=7,47,8,46", 400, "south must")):

@@ -27,7 +27,8 @@ using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 class TileTiers {
  public:
   // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; none is null. `write_head` is
-  // called once for a tile that comes into memory, and its lines are cached with the tile; null: heads are left empty.
+  // called once for each tile that is built or found in a store, and its lines are cached with the tile; null: heads
+  // are left empty.
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
             HeaderWriter write_head = nullptr);
 

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,8 +52,10 @@ tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldPartition
   tin::BlockJoiner joiner(cut);
   std::vector<std::optional<tin::TinMesh>> waiting(cut.size());  // for an earlier block
   std::size_t done = 0;
+  std::stop_source failed;  // stops the other threads in the middle of their blocks
   const auto mesh_block = [&](std::size_t i) {
-    std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options);
+    std::optional<tin::TinMesh> mesh = MeshBlock(field, cut.block(i), max_error_m, options, failed.get_token());
+    if (!mesh) return false;
     const std::lock_guard lock(mutex);
     waiting[i] = std::move(mesh);
     while (joiner.added() < cut.size() && waiting[joiner.added()]) {
@@ -61,7 +64,15 @@ tin::TinMesh MeshBlocks(const tin::HeightField& field, const tin::FieldPartition
     progress.Update(static_cast<double>(++done) / static_cast<double>(cut.size()));
     return true;
   };
-  dem::ParallelFor(cut.size(), mesh_block, static_cast<std::size_t>(threads));
+  const auto mesh_or_stop = [&](std::size_t i) {
+    try {
+      return mesh_block(i);
+    } catch (...) {
+      failed.request_stop();
+      throw;
+    }
+  };
+  dem::ParallelFor(cut.size(), mesh_or_stop, static_cast<std::size_t>(threads));
   return std::move(joiner).Take();
 }
 
