@@ -320,7 +320,6 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
       in.south >= window.row + window.rows) {
     return kUnknownError;
   }
-  // The range of heights served in a cell, in the raster grid's vertical datum.
   const Position& off = statistics_.misplacement();
   const double slack = MaxPositionError(grid_.georeference()) * trace_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
@@ -328,7 +327,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
   const double geoid_error = geoid_.BoundOver(cell.box());
   const bool is_known = std::isfinite(geoid_error);
   const HeightRange range = is_known ? HeightRange{0, 0} : geoid_.RangeOf(cell.box());
-  std::array<double, 4> heights{};
+  std::array<double, 4> heights{};  // served at the nodes, in the raster grid's vertical datum
   for (std::size_t k = 0; k < 4; ++k) {
     const bool is_added = is_known && geoid_.is_added();
     const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;

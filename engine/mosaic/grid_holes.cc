@@ -23,21 +23,15 @@ std::vector<T> Cut(const VoidGrid& grid, const std::vector<T>& all, const GridWi
 }
 
 // The smallest window with all marked samples of a window; without columns if there are none.
-GridWindow HullOf(const std::vector<std::uint8_t>& marks, const GridWindow& window) {
-  std::int64_t west = window.columns, east = -1, north = window.rows, south = -1;
-  const auto columns = static_cast<std::size_t>(window.columns);
-  for (std::int64_t row = 0; row < window.rows; ++row) {
+GridWindow HullOfMarks(const std::vector<std::uint8_t>& marks, const GridWindow& window) {
+  using Ends = std::optional<std::pair<std::int64_t, std::int64_t>>;
+  return HullOf(window, [&](std::int64_t row) -> Ends {
+    const auto columns = static_cast<std::size_t>(window.columns);
     const std::uint8_t* const of_row = marks.data() + row * window.columns;
-    const void* const first = std::memchr(of_row, 1, columns);
-    if (first == nullptr) continue;
-    const void* const last = memrchr(of_row, 1, columns);
-    north = std::min(north, row);
-    south = row;
-    west = std::min<std::int64_t>(west, static_cast<const std::uint8_t*>(first) - of_row);
-    east = std::max<std::int64_t>(east, static_cast<const std::uint8_t*>(last) - of_row);
-  }
-  if (east < west) return {window.column, window.row, 0, 0};
-  return {window.column + west, window.row + north, east - west + 1, south - north + 1};
+    const auto* const first = static_cast<const std::uint8_t*>(std::memchr(of_row, 1, columns));
+    if (first == nullptr) return std::nullopt;
+    return std::pair(first - of_row, static_cast<const std::uint8_t*>(memrchr(of_row, 1, columns)) - of_row);
+  });
 }
 
 // Averages beside a hole may cover only a part of their block, and so not its centre. The initial guess does not use
@@ -148,7 +142,7 @@ Result<std::vector<float>> RasterGrid::FillHoles(int factor, const GridWindow& w
                                                  const std::stop_token& stop) const {
   if (options_.voids != HoleFill::kSmooth || bridged.voids == 0) return std::vector<float>();
   const auto holes = voids_.HolesIn(members_, member_index_, factor, window, Columns(factor).count(), bridged.heights);
-  const GridWindow hull = HullOf(holes, window);
+  const GridWindow hull = HullOfMarks(holes, window);
   if (hull.columns == 0) return std::vector<float>();
   const auto smooth = ReadSmooth(factor, hull, false, stop);
   if (!smooth) return smooth;

@@ -52,22 +52,18 @@ void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> w
   }
 }
 
-// The smallest window with all voids of a window. Precondition: it has one.
+// The smallest window with all voids of a window.
 GridWindow HullOfVoids(const std::vector<float>& heights, const GridWindow& window) {
-  std::int64_t west = window.columns, east = -1, north = window.rows, south = -1;
-  for (std::int64_t row = 0; row < window.rows; ++row) {
+  using Ends = std::optional<std::pair<std::int64_t, std::int64_t>>;
+  return HullOf(window, [&](std::int64_t row) -> Ends {
     const std::span<const float> of_row = std::span(heights).subspan(static_cast<std::size_t>(row * window.columns),
                                                                      static_cast<std::size_t>(window.columns));
-    if (!HasVoids(of_row)) continue;
-    north = std::min(north, row);
-    south = row;
+    if (!HasVoids(of_row)) return std::nullopt;
     const auto first = std::ranges::find_if(of_row, IsVoid) - of_row.begin();
     std::int64_t last = window.columns - 1;
     while (!IsVoid(of_row[static_cast<std::size_t>(last)])) --last;
-    west = std::min<std::int64_t>(west, first);
-    east = std::max(east, last);
-  }
-  return {window.column + west, window.row + north, east - west + 1, south - north + 1};
+    return std::pair(first, last);
+  });
 }
 
 // Whether all samples are equal, as on the sea: then the heights between them are, too. Zero with a sign may lose it.

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "engine/raster/sample_grid.h"
@@ -12,6 +14,23 @@ namespace terrace::dem {
 
 inline std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::int64_t row) {
   return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
+}
+
+// The smallest window with all samples of a kind in a window; without columns if there are none. ends_in(row) returns
+// the first and the last column of such samples in a row, counted from the window's first row and column, or nothing.
+template <typename EndsIn>
+GridWindow HullOf(const GridWindow& window, const EndsIn& ends_in) {
+  std::int64_t west = window.columns, east = -1, north = window.rows, south = -1;
+  for (std::int64_t row = 0; row < window.rows; ++row) {
+    const std::optional<std::pair<std::int64_t, std::int64_t>> ends = ends_in(row);
+    if (!ends) continue;
+    north = std::min(north, row);
+    south = row;
+    west = std::min(west, ends->first);
+    east = std::max(east, ends->second);
+  }
+  if (east < west) return {window.column, window.row, 0, 0};
+  return {window.column + west, window.row + north, east - west + 1, south - north + 1};
 }
 
 // Copies the values of `part` into those of a window that contains it.
