@@ -266,6 +266,12 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   return {};
 }
 
+bool HoldsFinishedBake(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
+  const auto manifest = archive::ReadManifest(place);
+  return manifest && manifest->dataset.generation == generation &&
+         CheckSame(place, manifest->identity, identity, place).has_value();
+}
+
 namespace {
 
 // Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock

@@ -8,6 +8,7 @@ import json
 import pathlib
 import random
 import re
+import shutil
 import struct
 import subprocess
 import sys
@@ -179,13 +180,26 @@ class TilesetForms(unittest.TestCase):
                     process.wait()
                     killed += 1
             self.assertGreater(killed, 0)
-            if not out.exists():
+            if not out.exists() or out.with_name(out.name + ".bake").exists():
                 self.bake(form, name=out.name)
             if form == "3tz":
                 self.assertEqual(out.read_bytes(), reference.read_bytes())
             else:
                 self.assertEqual({path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}, self.files())
             self.assertEqual([path.name for path in self.scratch.glob(f"killed-{form}*")], [out.name])
+
+    def test_killed_between_the_file_and_the_end_it_removes_its_chunks(self):
+        chunks, other = (self.scratch / name for name in ("ended.3tz.bake", "other.3tz.bake"))
+        for place in (chunks, other):
+            shutil.copytree(self.place, place)
+            shutil.copy(self.file, place.with_suffix(""))
+        self.bake("3tz", name="ended.3tz")
+        self.assertEqual((self.scratch / "ended.3tz").read_bytes(), self.file.read_bytes())
+        self.assertFalse(chunks.exists())
+        # The chunks of other arguments stay.
+        done = subprocess.run(self.command("3tz", other.with_suffix(""), "--no-gzip"), capture_output=True, text=True)
+        self.assertEqual((done.returncode, "is there already" in done.stderr), (2, True), done.stderr)
+        self.assertTrue((other / "manifest.json").exists())
 
     def test_refusals(self):
         for form, flags, part in (("3tz", ("--format", "terrain"), "given more than once"),):

@@ -2,9 +2,11 @@
 
 #include <filesystem>
 #include <system_error>
+#include <vector>
 
 #include "archive/archive.h"
 #include "archive/export.h"
+#include "archive/manifest.h"
 
 namespace terrace::cli {
 
@@ -18,6 +20,28 @@ Result<void> CheckExportPlace(const std::string& out) {
                    out);
 }
 
+namespace {
+
+// Removes the manifest last: as long as it is there, RemoveIfExported knows the bake.
+void RemoveBake(const std::string& baked) {
+  std::error_code error;
+  std::vector<fs::path> entries;
+  for (auto entry = fs::directory_iterator(baked, error); !error && entry != fs::directory_iterator();
+       entry.increment(error)) {
+    if (entry->path().filename() != archive::kManifestFile) entries.push_back(entry->path());
+  }
+  for (const fs::path& entry : entries) fs::remove_all(entry, error);
+  fs::remove_all(baked, error);
+}
+
+}  // namespace
+
+bool RemoveIfExported(const std::string& baked, const bake::BakeIdentity& identity, std::uint64_t generation) {
+  if (!bake::HoldsFinishedBake(baked, identity, generation)) return false;
+  RemoveBake(baked);
+  return true;
+}
+
 Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop) {
   const auto archive = archive::Archive::Open(baked);
   if (!archive) return tl::unexpected(archive.error());
@@ -26,8 +50,7 @@ Result<void> Export(const BakeArguments& arguments, const std::string& baked, co
                                                  : archive::Write3tz;
   const Result<void> written = write(**archive, arguments.out, stop);
   if (!written) return written;
-  std::error_code ignored;
-  fs::remove_all(baked, ignored);
+  RemoveBake(baked);
   return {};
 }
 

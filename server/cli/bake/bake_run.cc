@@ -271,10 +271,15 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
              const bake::Shard& shard, const StopSignals& signals) {
   const tiler::Dataset& dataset = pipeline.datasets().front();
   const bool is_chunked = arguments.form == kChunks;
-  if (!is_chunked) {
-    if (const auto free = CheckExportPlace(arguments.out); !free) return Fail(free.error());
-  }
   const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
+  const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
+  if (!is_chunked) {
+    if (const auto free = CheckExportPlace(arguments.out); !free) {
+      if (!RemoveIfExported(place, identity, dataset.generation)) return Fail(free.error());
+      std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
+      return kExitOk;
+    }
+  }
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
@@ -282,7 +287,6 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const auto lock = bake::PlaceLock::Take(place, lock_name);
   if (signals.signal() != 0) return StopCode(signals);  // a store that does not answer holds it up
   if (!lock) return Fail(lock.error());
-  const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
   if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
     return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
   }
