@@ -182,13 +182,16 @@ export class Panel {
     byId("stats").classList.toggle("two", tiles3d !== undefined);
     byId("stats").replaceChildren(...rows.flatMap(([name, ...values]) => [["dt", name], ...values.map((value) => ["dd", value])]
       .map(([tag, textContent]) => Object.assign(document.createElement(tag), { textContent, className: name ? "" : "heading" }))));
-    byId("phases").replaceChildren(...kPhases.map((phase) => {
-      const bar = document.createElement("span");
-      bar.className = phase;
+    const spans = (make) => kPhases.map((phase) => {
+      const span = Object.assign(document.createElement("span"), { className: phase });
+      make(span, phase);
+      return span;
+    });
+    byId("phases").firstElementChild.replaceChildren(...spans((bar, phase) => {
       bar.style.flexGrow = total > 0 ? perTile(phase) / total : 0;
-      bar.title = `${phase} ${perTile(phase).toFixed(1)} ms`;
-      bar.textContent = phase;
-      return bar;
+    }));
+    byId("phases").lastElementChild.replaceChildren(...spans((name, phase) => {
+      name.textContent = `${phase} ${perTile(phase).toFixed(1)}`;
     }));
   }
 }

@@ -1,4 +1,4 @@
-"""Restarts of the real binary on a held socket, and few file descriptors: process_test.py BINARY SOURCE_DIR."""
+"""Restarts of the real binary on a held socket, few file descriptors, no viewer: process_test.py BINARY SOURCE_DIR."""
 import pathlib
 import resource
 import shutil
@@ -81,6 +81,22 @@ class Opening(unittest.TestCase):
             self.assertEqual(process.returncode, 1, log)  # the blocked open cannot be cancelled
             self.assertIn("look whether a source can be read", log)
             self.assertIn("stopped before any dataset was served", log)
+
+
+class WithoutItsFiles(unittest.TestCase):
+    def test_a_copied_binary_says_that_the_viewer_is_not_there(self):
+        with tempfile.TemporaryDirectory() as folder:
+            binary = shutil.copy(BINARY, pathlib.Path(folder, "a copy"))
+            process = subprocess.Popen([binary, "serve", DEM, "--listen", "127.0.0.1:0", "--cache-dir", folder], text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            try:
+                address = process.stdout.readline().split(" at ")[1].strip()
+                self.assertIn(b"<h1>terrace</h1>", urllib.request.urlopen(address, timeout=30).read())
+            finally:
+                process.terminate()
+                _, log = process.communicate(timeout=60)
+            self.assertIn("viewer: ", log)
+            self.assertIn("is not there: / lists the datasets", log)
 
 
 class Descriptors(unittest.TestCase):

@@ -1,5 +1,6 @@
 // terrace serve: datasets from a config file and from the command line, over HTTP.
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -92,6 +93,11 @@ int Serve(const ServeArguments& arguments) {
   if (const int exit_code = CheckStart(config, options.config, budget, tries_address); exit_code != kExitOk)
     return exit_code;
   WarnAboutFewDescriptors(config, *budget);
+  if (std::error_code ignored;
+      options.config.viewer.enabled && !std::filesystem::exists(options.config.viewer.directory, ignored)) {
+    spdlog::warn("viewer: {} is not there: / lists the datasets; set `viewer` to a folder with the viewer's files",
+                 options.config.viewer.directory.string());
+  }
   options.config.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);
