@@ -237,7 +237,7 @@ Result<std::vector<float>> DemSource::Impl::ReadUnedited(int level, const NodeWi
   auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
   if (!heights || !HasVoids(*heights)) return heights;
   if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
-    std::ranges::replace_if(*heights, IsVoid, floor);
+    ReplaceVoids(*heights, floor);
     return heights;
   }
   const auto undulations = floor_undulations->At(lattice, window);
@@ -305,7 +305,7 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
   auto heights = impl_->ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
                                   fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
   if (!heights) return heights;
-  std::ranges::replace_if(*heights, IsVoid, impl_->floor);
+  ReplaceVoids(*heights, impl_->floor);
   if (const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window); !which.empty()) {
     const auto edited = impl_->ApplyEdits(geo::MercatorGrid{depth}, window, which, *heights, stop);
     if (!edited) return tl::unexpected(edited.error());
@@ -332,7 +332,7 @@ Result<std::vector<float>> DemSource::ReadKnownMercator(int depth, const NodeWin
     unedited = *std::move(ellipsoidal);
   }
   std::vector<float> edited = unedited;
-  std::ranges::replace_if(edited, IsVoid, impl_->floor);
+  ReplaceVoids(edited, impl_->floor);
   if (const auto done = impl_->ApplyEdits(grid, window, which, edited, stop); !done) {
     return tl::unexpected(done.error());
   }

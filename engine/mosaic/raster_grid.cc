@@ -434,7 +434,7 @@ Result<void> RasterGrid::Fill(const NodeGrid& node_grid, const NodeWindow& windo
     const auto first = static_cast<std::size_t>(row) * positions.columns();
     std::fill_n(inside.begin() + static_cast<std::ptrdiff_t>(first), window.columns, std::uint8_t{0});
     if (const auto pole = PoleHeight(global <= 0 ? 0 : 1, datum)) {
-      std::ranges::replace_if(nodes.heights.subspan(first, positions.columns()), IsVoid, *pole);
+      ReplaceVoids(nodes.heights.subspan(first, positions.columns()), *pole);
     }
   }
   std::vector<double> undulations;

@@ -169,6 +169,17 @@ std::size_t VoidsAmong(const float* heights, std::size_t count) {
   return voids;
 }
 
+void Replace(float* heights, std::size_t count, float by) {
+  const hn::CappedTag<float, 16> d;
+  const std::size_t lanes = hn::Lanes(d);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    const auto here = hn::LoadU(d, heights + i);
+    hn::StoreU(hn::IfThenElse(hn::IsNaN(here), hn::Set(d, by), here), d, heights + i);
+  }
+  for (; i < count; ++i) heights[i] = heights[i] == heights[i] ? heights[i] : by;
+}
+
 bool MarkVoids(const std::uint8_t* inside, const float* heights, std::size_t count, std::uint8_t* wanted) {
   const hn::CappedTag<float, 16> d;
   const hn::RebindToSigned<decltype(d)> words;
@@ -243,6 +254,7 @@ HWY_EXPORT(Round);
 HWY_EXPORT(Places);
 HWY_EXPORT(AreAllKnown);
 HWY_EXPORT(VoidsAmong);
+HWY_EXPORT(Replace);
 HWY_EXPORT(MarkVoids);
 HWY_EXPORT(Extent);
 
@@ -337,6 +349,10 @@ bool HasVoids(std::span<const float> heights) {
 
 std::size_t CountVoids(std::span<const float> heights) {
   return HWY_DYNAMIC_DISPATCH(VoidsAmong)(heights.data(), heights.size());
+}
+
+void ReplaceVoids(std::span<float> heights, float by) {
+  HWY_DYNAMIC_DISPATCH(Replace)(heights.data(), heights.size(), by);
 }
 
 bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted) {

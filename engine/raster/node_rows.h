@@ -53,6 +53,9 @@ std::vector<float> VoidHeights(std::size_t count);
 // Makes all heights equal to one.
 void FillWith(float height, std::span<float> heights);
 
+// Replaces NaN.
+void ReplaceVoids(std::span<float> heights, float by);
+
 // Whether a height is NaN.
 bool HasVoids(std::span<const float> heights);
 

@@ -13,6 +13,7 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/errno_text.h"
+#include "engine/raster/node_rows.h"
 
 namespace terrace::dem {
 namespace {
@@ -103,7 +104,7 @@ Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int ind
 Result<std::vector<float>> CachedAverages::Read(int factor, const GridWindow& window) const {
   const Result<OpenFile> file = Open();
   if (!file) return tl::unexpected(file.error());
-  std::vector<float> heights(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
+  std::vector<float> heights = VoidHeights(static_cast<std::size_t>(window.columns * window.rows));
   const std::int64_t count = DivideUp(layout_.columns, factor), side = ChunkGrid::kSide / factor;
   const auto turn = [&](std::int64_t column) { return column >= 0 ? column / count : -((count - 1 - column) / count); };
   for (std::int64_t t = turn(window.column); t <= turn(window.column + window.columns - 1); ++t) {
