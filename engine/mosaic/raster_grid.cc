@@ -47,8 +47,10 @@ void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> w
     return;
   }
   trace.heights.resize(wanted.size());
+  float* const traced = trace.heights.data();
   for (std::size_t n = 0; n < wanted.size(); ++n) {
-    trace.heights[n] = wanted[n] != 0 ? heights[n] : SampleRules::kVoid;
+    const float height = heights[n];  // always, or it is no vector
+    traced[n] = wanted[n] != 0 ? height : SampleRules::kVoid;
   }
 }
 
