@@ -11,7 +11,6 @@
 #include "fly/content/glb.h"
 #include "fly/content/gunzip.h"
 #include "fly/content/quantized_mesh.h"
-#include "fly/select/coverage.h"
 
 namespace terrace::fly {
 namespace {
@@ -217,7 +216,7 @@ void Client::TakeTile(const DecodedReply& decoded, double now_s) {
   const std::string& stated = decoded.reply.max_error;
   tile.stated_error_m = -1;
   std::from_chars(stated.data(), stated.data() + stated.size(), tile.stated_error_m);
-  if (tile.key) statistics_.AddLoadedTile(now_s, *tile.key, ParseCacheTier(decoded.reply.server_timing));
+  if (tile.key) statistics_.AddLoadedTile(*tile.key);
   TakeReady(tile);
   CheckVersion(decoded, now_s);
 }
@@ -337,11 +336,7 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
     version = tile.version;
   }
   if (phase_ == Phase::kFlying && frame_ % kCoveragePeriod == 0) {
-    const Coverage coverage = MeasureCoverage(view, frame_, tree_->root());
-    record.is_measured = true;
-    record.rays = coverage.rays;
-    record.missing = coverage.missing;
-    record.uncovered = coverage.uncovered;
+    record.coverage = MeasureCoverage(view, frame_, tree_->root());
   }
   return record;
 }

@@ -53,40 +53,42 @@ double Percentile(std::vector<float> values, double share) {
   return *at;
 }
 
-Statistics::Statistics(int clients) : clients_(static_cast<std::size_t>(clients)) {}
+Statistics::Statistics(int clients) { record_.clients.resize(static_cast<std::size_t>(clients)); }
 
 Second& Statistics::At(double now_s) {
   const std::size_t i = std::min(static_cast<std::size_t>(std::max(0.0, now_s)), kMaxSeconds - 1);
-  if (seconds_.size() <= i) seconds_.resize(i + 1);
-  return seconds_[i];
+  if (record_.seconds.size() <= i) record_.seconds.resize(i + 1);
+  return record_.seconds[i];
 }
 
 void Statistics::AddRequest(double now_s, const RequestRecord& record) {
   const std::lock_guard lock(mutex_);
   Second& second = At(now_s);
+  Totals& totals = record_.totals;
   const auto outcome = static_cast<std::size_t>(record.outcome);
   ++second.outcomes[outcome];
-  ++totals_.outcomes[outcome];
+  ++totals.outcomes[outcome];
   second.bytes += record.bytes;
-  totals_.bytes += record.bytes;
-  totals_.connections += record.opened_connection ? 1 : 0;
-  if (!record.is_tile) ++totals_.other_requests;
+  totals.bytes += record.bytes;
+  totals.connections += record.opened_connection ? 1 : 0;
+  if (!record.is_tile) ++totals.other_requests;
   if (!record.is_tile || record.outcome != Outcome::kOk) return;
   const auto tier = static_cast<std::size_t>(record.tier);
   ++second.tiers[tier];
-  ++totals_.tiers[tier];
+  ++totals.tiers[tier];
   ++second.tiles;
-  ++totals_.tiles;
+  ++totals.tiles;
   second.triangles += record.triangles;
-  totals_.triangles += record.triangles;
-  totals_.incomplete_tiles += record.is_incomplete ? 1 : 0;
+  totals.triangles += record.triangles;
+  totals.incomplete_tiles += record.is_incomplete ? 1 : 0;
   second.latencies_s.push_back(static_cast<float>(record.seconds));
-  totals_.latencies_s.push_back(static_cast<float>(record.seconds));
+  totals.latencies_s.push_back(static_cast<float>(record.seconds));
 }
 
 void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   const std::lock_guard lock(mutex_);
   Second& second = At(now_s);
+  Totals& totals = record_.totals;
   ++second.frames;
   second.refined += record.is_refined ? 1 : 0;
   second.drawn = std::max(second.drawn, record.drawn);
@@ -94,101 +96,70 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   second.in_flight = std::max(second.in_flight, record.in_flight);
   second.worst_px = std::max(second.worst_px, record.worst_px);
   second.worst_stated_px = std::max(second.worst_stated_px, record.worst_stated_px);
-  const double hole = record.rays > 0 ? static_cast<double>(record.missing + record.uncovered) / record.rays : 0;
-  ++totals_.frames;
-  totals_.late_frames += record.is_late ? 1 : 0;
-  totals_.mixed_frames += record.is_mixed ? 1 : 0;
+  const Coverage coverage = record.coverage.value_or(Coverage());
+  const double hole = coverage.rays > 0 ? static_cast<double>(coverage.holes()) / coverage.rays : 0;
+  ++totals.frames;
+  totals.late_frames += record.is_late ? 1 : 0;
+  totals.mixed_frames += record.is_mixed ? 1 : 0;
   if (record.phase != Phase::kFlying) return;
   second.worst_hole = std::max(second.worst_hole, hole);
-  ++second.flying;
-  second.flying_refined += record.is_refined ? 1 : 0;
-  ++totals_.flying_frames;
-  totals_.refined_frames += record.is_refined ? 1 : 0;
-  totals_.measured_frames += record.is_measured ? 1 : 0;
-  totals_.hole_frames += hole > 0 ? 1 : 0;
-  totals_.uncovered_frames += record.uncovered > 0 ? 1 : 0;
-  totals_.worst_hole = std::max(totals_.worst_hole, hole);
-  totals_.worst_px = std::max(totals_.worst_px, record.worst_px);
-  totals_.worst_stated_px = std::max(totals_.worst_stated_px, record.worst_stated_px);
-  totals_.frame_worst_px.push_back(static_cast<float>(record.worst_px));
+  ++totals.flying_frames;
+  totals.refined_frames += record.is_refined ? 1 : 0;
+  totals.measured_frames += record.coverage ? 1 : 0;
+  totals.hole_frames += hole > 0 ? 1 : 0;
+  totals.uncovered_frames += coverage.uncovered > 0 ? 1 : 0;
+  totals.worst_hole = std::max(totals.worst_hole, hole);
+  totals.worst_px = std::max(totals.worst_px, record.worst_px);
+  totals.worst_stated_px = std::max(totals.worst_stated_px, record.worst_stated_px);
+  totals.frame_worst_px.push_back(static_cast<float>(record.worst_px));
 }
 
-void Statistics::AddLoadedTile(double now_s, const geo::TileKey& key, CacheTier tier) {
+void Statistics::AddLoadedTile(const geo::TileKey& key) {
   const std::lock_guard lock(mutex_);
-  loaded_tiles_.push_back({key, now_s, tier});
+  record_.loaded_tiles.push_back(key);
 }
 
 void Statistics::AddUrl(std::string url) {
   const std::lock_guard lock(mutex_);
-  urls_.push_back(std::move(url));
+  record_.urls.push_back(std::move(url));
 }
 
 void Statistics::AddRetry() {
   const std::lock_guard lock(mutex_);
-  ++totals_.retries;
+  ++record_.totals.retries;
 }
 
 void Statistics::AddVersionChange(double now_s, const std::string& from, const std::string& to) {
   const std::lock_guard lock(mutex_);
-  ++totals_.version_changes;
-  version_changes_.push_back(now_s);
-  ++totals_.messages["the dataset changed from version " + from + " to " + to];
+  ++record_.totals.version_changes;
+  record_.version_changes.push_back(now_s);
+  ++record_.totals.messages["the dataset changed from version " + from + " to " + to];
 }
 
 void Statistics::AddMessage(const std::string& message) {
   const std::lock_guard lock(mutex_);
-  const bool is_new = !totals_.messages.contains(message);
-  ++totals_.messages[is_new && totals_.messages.size() >= kMaxMessages ? "other messages" : message];
+  const bool is_new = !record_.totals.messages.contains(message);
+  ++record_.totals.messages[is_new && record_.totals.messages.size() >= kMaxMessages ? "other messages" : message];
 }
 
 void Statistics::SetClient(int client, const ClientRecord& record) {
   const std::lock_guard lock(mutex_);
-  clients_[static_cast<std::size_t>(client)] = record;
+  record_.clients[static_cast<std::size_t>(client)] = record;
 }
 
 void Statistics::AddCamera(const GeodeticPoint& point) {
   const std::lock_guard lock(mutex_);
-  if (track_.size() < kMaxTrack) track_.push_back(point);
+  if (record_.track.size() < kMaxTrack) record_.track.push_back(point);
 }
 
-Totals Statistics::totals() const {
+FlightRecord Statistics::record() const {
   const std::lock_guard lock(mutex_);
-  return totals_;
+  return record_;
 }
 
 Second Statistics::second(std::size_t i) const {
   const std::lock_guard lock(mutex_);
-  return i < seconds_.size() ? seconds_[i] : Second{};
-}
-
-std::vector<Second> Statistics::seconds() const {
-  const std::lock_guard lock(mutex_);
-  return seconds_;
-}
-
-std::vector<LoadedTile> Statistics::loaded_tiles() const {
-  const std::lock_guard lock(mutex_);
-  return loaded_tiles_;
-}
-
-std::vector<std::string> Statistics::urls() const {
-  const std::lock_guard lock(mutex_);
-  return urls_;
-}
-
-std::vector<ClientRecord> Statistics::clients() const {
-  const std::lock_guard lock(mutex_);
-  return clients_;
-}
-
-std::vector<GeodeticPoint> Statistics::track() const {
-  const std::lock_guard lock(mutex_);
-  return track_;
-}
-
-std::vector<double> Statistics::version_changes() const {
-  const std::lock_guard lock(mutex_);
-  return version_changes_;
+  return i < record_.seconds.size() ? record_.seconds[i] : Second{};
 }
 
 }  // namespace terrace::fly

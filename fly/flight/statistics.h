@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "engine/geo/tile_key.h"
-#include "fly/scene/view.h"
+#include "fly/scene/volume.h"
+#include "fly/select/coverage.h"
 
 namespace terrace::fly {
 
@@ -59,8 +61,7 @@ struct FrameRecord {
   double worst_stated_px = 0;  // of the errors that the server stated
   std::size_t drawn = 0, wanted = 0, in_flight = 0;
   std::uint64_t triangles = 0;
-  bool is_measured = false;  // whether this frame counted the rays of Coverage
-  int rays = 0, missing = 0, uncovered = 0;
+  std::optional<Coverage> coverage;  // of some frames
 };
 
 struct Second {
@@ -69,16 +70,10 @@ struct Second {
   std::uint32_t tiles = 0;
   std::uint64_t bytes = 0, triangles = 0;
   std::vector<float> latencies_s;  // of replies with tiles
-  std::uint32_t frames = 0, refined = 0, flying = 0, flying_refined = 0;
+  std::uint32_t frames = 0, refined = 0;
   double worst_px = 0, worst_stated_px = 0;
   std::size_t drawn = 0, wanted = 0, in_flight = 0;  // maxima over the frames
   double worst_hole = 0;                             // share of the screen
-};
-
-struct LoadedTile {
-  geo::TileKey key;
-  double seconds = 0;  // since the start
-  CacheTier tier = CacheTier::kUnknown;
 };
 
 struct ClientRecord {
@@ -102,6 +97,17 @@ struct Totals {
   std::map<std::string, std::uint64_t> messages;   // counts of failure messages, at most 50 different ones
 };
 
+// All that reports need.
+struct FlightRecord {
+  Totals totals;
+  std::vector<Second> seconds;
+  std::vector<geo::TileKey> loaded_tiles;
+  std::vector<std::string> urls;  // of the requested tiles
+  std::vector<ClientRecord> clients;
+  std::vector<GeodeticPoint> track;
+  std::vector<double> version_changes;  // seconds since the start
+};
+
 // Thread-safe.
 class Statistics {
  public:
@@ -109,7 +115,7 @@ class Statistics {
 
   void AddRequest(double now_s, const RequestRecord& record);
   void AddFrame(double now_s, const FrameRecord& record);
-  void AddLoadedTile(double now_s, const geo::TileKey& key, CacheTier tier);
+  void AddLoadedTile(const geo::TileKey& key);
   void AddUrl(std::string url);
   void AddRetry();
   void AddVersionChange(double now_s, const std::string& from, const std::string& to);
@@ -117,27 +123,15 @@ class Statistics {
   void SetClient(int client, const ClientRecord& record);
   void AddCamera(const GeodeticPoint& point);
 
-  // Copies, for reports.
-  Totals totals() const;
+  // Copies.
+  FlightRecord record() const;
   Second second(std::size_t i) const;  // an empty one after the last
-  std::vector<Second> seconds() const;
-  std::vector<LoadedTile> loaded_tiles() const;
-  std::vector<std::string> urls() const;
-  std::vector<ClientRecord> clients() const;
-  std::vector<GeodeticPoint> track() const;
-  std::vector<double> version_changes() const;  // seconds since the start
 
  private:
   Second& At(double now_s);
 
-  mutable std::mutex mutex_;  // guards everything below
-  Totals totals_;
-  std::vector<Second> seconds_;
-  std::vector<LoadedTile> loaded_tiles_;
-  std::vector<std::string> urls_;
-  std::vector<ClientRecord> clients_;
-  std::vector<GeodeticPoint> track_;
-  std::vector<double> version_changes_;
+  mutable std::mutex mutex_;  // guards record_
+  FlightRecord record_;
 };
 
 // The value with index ceil(share * (n - 1)) of the n values in ascending order, 0 <= share <= 1; 0 without values.

@@ -1,14 +1,8 @@
 #include "fly/http/url.h"
 
 #include <algorithm>
-#include <cctype>
 
 namespace terrace::fly {
-namespace {
-
-bool StartsWith(std::string_view text, std::string_view start) { return text.substr(0, start.size()) == start; }
-
-}  // namespace
 
 std::string Url::Text() const {
   const bool is_ipv6 = origin.host.find(':') != std::string::npos;
@@ -23,10 +17,10 @@ Result<Url> ParseUrl(std::string_view text) {
   };
   Url url;
   std::string_view rest = text;
-  if (StartsWith(rest, "https://")) {
+  if (rest.starts_with("https://")) {
     url.origin.is_tls = true;
     rest.remove_prefix(8);
-  } else if (StartsWith(rest, "http://")) {
+  } else if (rest.starts_with("http://")) {
     rest.remove_prefix(7);
   } else {
     return wrong("no http or https URL");
@@ -38,7 +32,7 @@ Result<Url> ParseUrl(std::string_view text) {
   if (url.target.front() == '?') url.target.insert(0, "/");
   if (authority.find('@') != std::string_view::npos) return wrong("it contains a user; use --header for credentials");
   std::size_t colon = authority.rfind(':');
-  if (StartsWith(authority, "[")) {
+  if (authority.starts_with("[")) {
     const std::size_t bracket = authority.find(']');
     if (bracket == std::string_view::npos) return wrong("the address is not closed by ]");
     url.origin.host = authority.substr(1, bracket - 1);
@@ -59,15 +53,15 @@ Result<Url> ParseUrl(std::string_view text) {
 }
 
 Result<Url> Resolve(const Url& base, std::string_view reference) {
-  if (StartsWith(reference, "http://") || StartsWith(reference, "https://")) return ParseUrl(reference);
-  if (StartsWith(reference, "//")) return ParseUrl((base.origin.is_tls ? "https:" : "http:") + std::string(reference));
+  if (reference.starts_with("http://") || reference.starts_with("https://")) return ParseUrl(reference);
+  if (reference.starts_with("//")) return ParseUrl((base.origin.is_tls ? "https:" : "http:") + std::string(reference));
   Url url = base;
-  if (StartsWith(reference, "/")) {
+  if (reference.starts_with("/")) {
     url.target = reference;
   } else {
     const std::string_view path = std::string_view(base.target).substr(0, base.target.find('?'));
     std::string folder(path.substr(0, path.rfind('/') + 1));
-    while (StartsWith(reference, "./") || StartsWith(reference, "../")) {
+    while (reference.starts_with("./") || reference.starts_with("../")) {
       const bool is_up = reference[1] == '.';
       reference.remove_prefix(is_up ? 3 : 2);
       if (is_up && folder.size() > 1) folder.erase(folder.rfind('/', folder.size() - 2) + 1);

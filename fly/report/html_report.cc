@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 #include <map>
+#include <numeric>
 
 #include "engine/core/escape_html.h"
 #include "engine/core/plain_number.h"
@@ -113,115 +114,97 @@ std::string BannerOf(const Summary& summary, const Judgements& judgements) {
   return html + "</ul></div>";
 }
 
+using Shape = Series::Shape;
+
 TimePlot TilesPlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Tiles";
-  plot.unit = "a second";
-  plot.note = "Where the server had them, by Server-Timing.";
-  using Shape = Series::Shape;
-  plot.series = {
-      {"in memory", "var(--c)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[0]); }), Shape::kBars},
-      {"lower tier", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[1]); }), Shape::kBars},
-      {"joined a build", "var(--b)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[2]); }),
-       Shape::kBars},
-      {"built", "var(--d)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[3]); }), Shape::kBars},
-      {"not stated", "var(--e)", ValuesOf(seconds, [](const Second& s) { return double(s.tiers[4]); }), Shape::kBars}};
-  return plot;
+  return {
+      .title = "Tiles",
+      .unit = "a second",
+      .note = "Where the server had them, by Server-Timing.",
+      .series = {
+          {"in memory", "var(--c)", ValuesOf(seconds, [](auto& s) { return double(s.tiers[0]); }), Shape::kBars},
+          {"lower tier", "var(--a)", ValuesOf(seconds, [](auto& s) { return double(s.tiers[1]); }), Shape::kBars},
+          {"joined a build", "var(--b)", ValuesOf(seconds, [](auto& s) { return double(s.tiers[2]); }), Shape::kBars},
+          {"built", "var(--d)", ValuesOf(seconds, [](auto& s) { return double(s.tiers[3]); }), Shape::kBars},
+          {"not stated", "var(--e)", ValuesOf(seconds, [](auto& s) { return double(s.tiers[4]); }), Shape::kBars}}};
+}
+
+double LatencyMs(const Second& second, double share) {
+  return second.latencies_s.empty() ? kNone : 1000 * Percentile(second.latencies_s, share);
 }
 
 TimePlot LatencyPlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Latency of tiles";
-  plot.unit = "ms, logarithmic";
-  plot.note = "From the request to the last byte.";
-  plot.is_logarithmic = true;
-  plot.series = {{"p99", "var(--d)",
-                  ValuesOf(seconds,
-                           [](const Second& s) {
-                             return s.latencies_s.empty() ? kNone : 1000 * Percentile(s.latencies_s, 0.99);
-                           })},
-                 {"p50", "var(--a)", ValuesOf(seconds, [](const Second& s) {
-                    return s.latencies_s.empty() ? kNone : 1000 * Percentile(s.latencies_s, 0.5);
-                  })}};
-  return plot;
+  return {.title = "Latency of tiles",
+          .unit = "ms, logarithmic",
+          .note = "From the request to the last byte.",
+          .series = {{"p99", "var(--d)", ValuesOf(seconds, [](auto& s) { return LatencyMs(s, 0.99); })},
+                     {"p50", "var(--a)", ValuesOf(seconds, [](auto& s) { return LatencyMs(s, 0.5); })}},
+          .is_logarithmic = true};
+}
+
+double RefinedPercent(const Second& second) {
+  return second.frames == 0 ? kNone : 100.0 * second.refined / second.frames;
 }
 
 TimePlot RefinedPlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Fully refined frames";
-  plot.unit = "%";
-  plot.note = "Frames that showed every tile that the view asks for.";
-  plot.min_top = 100;
-  plot.series = {
-      {"refined", "var(--c)",
-       ValuesOf(seconds, [](const Second& s) { return s.frames == 0 ? kNone : 100.0 * s.refined / s.frames; }),
-       Series::Shape::kArea}};
-  return plot;
+  return {.title = "Fully refined frames",
+          .unit = "%",
+          .note = "Frames that showed every tile that the view asks for.",
+          .series = {{"refined", "var(--c)", ValuesOf(seconds, RefinedPercent), Shape::kArea}},
+          .min_top = 100};
 }
 
+double PositiveOrNone(double value) { return value <= 0 ? kNone : value; }
+
 TimePlot ErrorPlot(const FlightOptions& options, const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Worst error on screen";
-  plot.unit = "pixels, logarithmic";
-  plot.note = "Assumed: of the levels, where a finer tile exists. Stated: of Terrain-Max-Error, on all tiles.";
-  plot.is_logarithmic = true;
-  plot.limit = options.select.max_error_px;
-  plot.limit_name = "refined above";
-  plot.series = {
-      {"assumed", "var(--b)",
-       ValuesOf(seconds, [](const Second& s) { return s.frames == 0 || s.worst_px <= 0 ? kNone : s.worst_px; })},
-      {"stated", "var(--a)",
-       ValuesOf(seconds, [](const Second& s) { return s.worst_stated_px <= 0 ? kNone : s.worst_stated_px; })}};
-  return plot;
+  return {
+      .title = "Worst error on screen",
+      .unit = "pixels, logarithmic",
+      .note = "Assumed: of the levels, where a finer tile exists. Stated: of Terrain-Max-Error, on all tiles.",
+      .series = {{"assumed", "var(--b)", ValuesOf(seconds, [](auto& s) { return PositiveOrNone(s.worst_px); })},
+                 {"stated", "var(--a)", ValuesOf(seconds, [](auto& s) { return PositiveOrNone(s.worst_stated_px); })}},
+      .is_logarithmic = true,
+      .limit = options.select.max_error_px,
+      .limit_name = "refined above"};
 }
 
 TimePlot QueuePlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Wanted and requested tiles";
-  plot.unit = "most in a second, of one client";
-  plot.note = "Wanted contains what is loaded ahead: siblings and ancestors.";
-  plot.series = {{"wanted", "var(--b)", ValuesOf(seconds, [](const Second& s) { return double(s.wanted); })},
-                 {"open requests", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.in_flight); })},
-                 {"drawn", "var(--e)", ValuesOf(seconds, [](const Second& s) { return double(s.drawn); })}};
-  return plot;
+  return {.title = "Wanted and requested tiles",
+          .unit = "most in a second, of one client",
+          .note = "Wanted contains what is loaded ahead: siblings and ancestors.",
+          .series = {{"wanted", "var(--b)", ValuesOf(seconds, [](auto& s) { return double(s.wanted); })},
+                     {"open requests", "var(--a)", ValuesOf(seconds, [](auto& s) { return double(s.in_flight); })},
+                     {"drawn", "var(--e)", ValuesOf(seconds, [](auto& s) { return double(s.drawn); })}}};
 }
 
 TimePlot BytesPlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Received";
-  plot.unit = "kB a second";
-  plot.note = "Heads and bodies as sent, compressed.";
-  plot.series = {{"kB", "var(--a)", ValuesOf(seconds, [](const Second& s) { return double(s.bytes) / 1000; }),
-                  Series::Shape::kBars}};
-  return plot;
+  return {
+      .title = "Received",
+      .unit = "kB a second",
+      .note = "Heads and bodies as sent, compressed.",
+      .series = {{"kB", "var(--a)", ValuesOf(seconds, [](auto& s) { return double(s.bytes) / 1000; }), Shape::kBars}}};
+}
+
+double FailuresOf(const Second& second) {
+  return std::accumulate(second.outcomes.begin() + 2, second.outcomes.end(), 0.0);
 }
 
 TimePlot FailurePlot(const std::vector<Second>& seconds) {
-  TimePlot plot;
-  plot.title = "Refused and failed requests";
-  plot.unit = "a second";
-  plot.note = "Refused ones are tiles again when Retry-After says.";
-  plot.series = {{"refused (429, 503)", "var(--b)",
-                  ValuesOf(seconds, [](const Second& s) { return double(s.outcomes[1]); }), Series::Shape::kBars},
-                 {"failed", "var(--d)",
-                  ValuesOf(seconds,
-                           [](const Second& s) {
-                             double sum = 0;
-                             for (std::size_t i = 2; i < kOutcomes; ++i) sum += s.outcomes[i];
-                             return sum;
-                           }),
-                  Series::Shape::kBars}};
-  return plot;
+  return {.title = "Refused and failed requests",
+          .unit = "a second",
+          .note = "Refused ones are tiles again when Retry-After says.",
+          .series = {{"refused (429, 503)", "var(--b)",
+                      ValuesOf(seconds, [](auto& s) { return double(s.outcomes[1]); }), Shape::kBars},
+                     {"failed", "var(--d)", ValuesOf(seconds, FailuresOf), Shape::kBars}}};
 }
 
-BarPlot LevelPlot(const std::vector<LoadedTile>& tiles) {
+BarPlot LevelPlot(const std::vector<geo::TileKey>& tiles) {
   std::map<int, double> counts;
-  for (const LoadedTile& tile : tiles) ++counts[tile.key.level];
-  BarPlot plot;
-  plot.title = "Tiles by level";
-  plot.unit = "count";
-  plot.note = "Each is half as wide as the one before.";
-  plot.series = {{"tiles", "var(--a)", {}, Series::Shape::kBars}};
+  for (const geo::TileKey& tile : tiles) ++counts[tile.level];
+  BarPlot plot{.title = "Tiles by level",
+               .unit = "count",
+               .note = "Each is half as wide as the one before.",
+               .series = {{"tiles", "var(--a)", {}, Shape::kBars}}};
   for (const auto& [level, count] : counts) {
     plot.labels.push_back(std::to_string(level));
     plot.series[0].values.push_back(count);
@@ -230,11 +213,10 @@ BarPlot LevelPlot(const std::vector<LoadedTile>& tiles) {
 }
 
 BarPlot LatencyHistogram(const std::vector<float>& latencies_s) {
-  BarPlot plot;
-  plot.title = "Latencies of all tiles";
-  plot.unit = "count";
-  plot.note = "Each class reaches up to its label.";
-  plot.series = {{"tiles", "var(--a)", {}, Series::Shape::kBars}};
+  BarPlot plot{.title = "Latencies of all tiles",
+               .unit = "count",
+               .note = "Each class reaches up to its label.",
+               .series = {{"tiles", "var(--a)", {}, Shape::kBars}}};
   constexpr double kBounds[] = {1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000};
   double below = 0;
   for (const double bound : kBounds) {
@@ -273,9 +255,8 @@ std::string TablesOf(const Totals& totals) {
 }  // namespace
 
 std::string HtmlOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
-                   const Statistics& statistics) {
-  const std::vector<Second> seconds = statistics.seconds();
-  const std::vector<LoadedTile> tiles = statistics.loaded_tiles();
+                   const FlightRecord& record) {
+  const std::vector<Second>& seconds = record.seconds;
   std::string html =
       R"(<!doctype html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">)";
   html += "<title>Flight over " + EscapeHtml(options.document.Text()) + "</title>" + kStyle + "</head><body><main>";
@@ -286,17 +267,17 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
       options.path.length_m() / 1000, options.duration_s, options.lens.width_px, options.lens.height_px,
       PlainNumber(options.lens.field_of_view), PlainNumber(options.select.max_error_px));
   html += BannerOf(summary, judgements) + CardsOf(summary) + "<h2>The flight</h2>";
-  html += MapOf(tiles, statistics.track()) + R"(<div class="plots">)";
+  html += MapOf(record.loaded_tiles, record.track) + R"(<div class="plots">)";
   std::vector<TimePlot> plots = {TilesPlot(seconds),          LatencyPlot(seconds), RefinedPlot(seconds),
                                  ErrorPlot(options, seconds), QueuePlot(seconds),   BytesPlot(seconds)};
   if (summary.errors + summary.totals.outcomes[static_cast<std::size_t>(Outcome::kRefused)] > 0)
     plots.push_back(FailurePlot(seconds));
   for (TimePlot& plot : plots) {
-    plot.marks = statistics.version_changes();
+    plot.marks = record.version_changes;
     plot.marks_name = "new version of the dataset";
     html += SvgOf(plot);
   }
-  html += SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(tiles)) + "</div>";
+  html += SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(record.loaded_tiles)) + "</div>";
   return html + TablesOf(summary.totals) + "</main></body></html>\n";
 }
 

@@ -10,6 +10,6 @@
 namespace terrace::fly {
 
 std::string HtmlOf(const FlightOptions& options, const Summary& summary, const Judgements& judgements,
-                   const Statistics& statistics);
+                   const FlightRecord& record);
 
 }  // namespace terrace::fly

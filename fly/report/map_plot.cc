@@ -90,12 +90,12 @@ std::string ColorOfLevel(int level, int shallowest, int deepest) {
   return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mix(0), mix(1), mix(2));
 }
 
-std::string MapOf(const std::vector<LoadedTile>& tiles, const std::vector<GeodeticPoint>& track) {
+std::string MapOf(const std::vector<geo::TileKey>& tiles, const std::vector<GeodeticPoint>& track) {
   if (tiles.empty() || track.empty()) return {};
   const Frame frame = FrameOf(track);
   std::set<std::tuple<int, std::int64_t, std::int64_t>> keys;  // shallow ones first
-  for (const LoadedTile& tile : tiles) {
-    if (keys.size() < kMaxTiles) keys.insert({tile.key.level, tile.key.x, tile.key.y});
+  for (const geo::TileKey& tile : tiles) {
+    if (keys.size() < kMaxTiles) keys.insert({tile.level, tile.x, tile.y});
   }
   const int deepest = std::get<0>(*keys.rbegin());
   const int shallowest = std::max(std::get<0>(*keys.begin()), deepest - kShownLevels + 1);

@@ -87,11 +87,11 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
 
 }  // namespace
 
-Summary Summarize(const FlightOptions& options, const Statistics& statistics) {
+Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   Summary summary;
-  summary.totals = statistics.totals();
-  summary.clients = statistics.clients();
-  const std::vector<Second> seconds = statistics.seconds();
+  summary.totals = record.totals;
+  summary.clients = record.clients;
+  const std::vector<Second>& seconds = record.seconds;
   summary.seconds = static_cast<double>(seconds.size());
   std::vector<float> views;
   for (const ClientRecord& client : summary.clients) {

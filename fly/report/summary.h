@@ -29,7 +29,7 @@ struct Summary {
 
 struct Judgements;  // requirement.h
 
-Summary Summarize(const FlightOptions& options, const Statistics& statistics);
+Summary Summarize(const FlightOptions& options, const FlightRecord& record);
 
 // Lines for a terminal.
 std::string TextOf(const Summary& summary);

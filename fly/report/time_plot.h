@@ -21,10 +21,10 @@ struct TimePlot {
   std::vector<Series> series;
   bool is_logarithmic = false;  // values below the lowest decade are drawn on it
   double limit = -1;            // a horizontal line; negative: none
-  std::string limit_name;
-  double min_top = 0;         // the scale ends at this value or above
-  std::vector<double> marks;  // seconds; vertical lines
-  std::string marks_name;
+  std::string limit_name = {};
+  double min_top = 0;              // the scale ends at this value or above
+  std::vector<double> marks = {};  // seconds; vertical lines
+  std::string marks_name = {};
 };
 
 std::string SvgOf(const TimePlot& plot);
@@ -32,8 +32,8 @@ std::string SvgOf(const TimePlot& plot);
 // Bars of equal width with a label below each.
 struct BarPlot {
   std::string title, unit, note;
-  std::vector<std::string> labels;
   std::vector<Series> series;  // stacked; a value for each label
+  std::vector<std::string> labels = {};
 };
 
 std::string SvgOf(const BarPlot& plot);

@@ -124,7 +124,6 @@ Subtree Selector::VisitIfNeeded(Tile& tile, bool ancestor_suffices) {
 
 Subtree Selector::Cull(Tile& tile, const Measures& measures) {
   Judge(tile, Verdict::kCulled);
-  ++selection_.culled;
   if (options_.forbid_holes) {
     Load(tile, LoadGroup::kNormal, measures);
     return Single(tile);
@@ -194,7 +193,6 @@ bool Selector::DrawInsteadOfDescendants(Tile& tile, const Measures& measures, st
 }
 
 Subtree Selector::VisitVisible(Tile& tile, const Measures& measures, bool suffices, bool ancestor_suffices) {
-  ++selection_.visited;
   if (tile.children.empty()) {
     Judge(tile, Verdict::kRendered);
     Draw(tile, measures);

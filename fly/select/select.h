@@ -43,9 +43,7 @@ struct DrawnTile {
 struct Selection {
   std::vector<DrawnTile> drawn;  // also tiles that are not loaded: they are holes
   std::vector<LoadTask> loads;   // most urgent first
-  std::uint32_t visited = 0;
-  std::uint32_t culled = 0;
-  std::uint32_t pending = 0;  // wanted tiles whose load has begun
+  std::uint32_t pending = 0;     // wanted tiles whose load has begun
   bool any_kicked = false;
 
   // Whether the picture is complete: nothing was kicked, and everything drawn is loaded.

@@ -100,8 +100,6 @@ class LayerTree : public TileTree {
     for (std::int64_t x = 0; x < 2; ++x) AddTile(root_, {0, x, 0}, true, {kLowestGround, kHighestGround}, kRootError);
   }
 
-  Format format() const override { return Format::kTerrain; }
-
   // Adds all four children or none. The client upsamples the parent where the server has no child.
   void AddChildren(Tile& tile) override {
     if (!std::exchange(tile.may_have_more_children, false) || !tile.key || tile.key->level >= geo::kMaxLevel) return;

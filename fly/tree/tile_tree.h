@@ -25,7 +25,6 @@ class TileTree {
  public:
   virtual ~TileTree() = default;
 
-  virtual Format format() const = 0;
   Tile& root() { return root_; }
   const std::string& version() const { return version_; }  // empty: the document states none
 

@@ -156,8 +156,6 @@ class TilesetTree : public TileTree {
     version_ = first_version_ = VersionOf(json);
   }
 
-  Format format() const override { return Format::k3dTiles; }
-
   void AddChildren(Tile& tile) override {
     if (!tile.may_have_more_children || !tile.tree) return;
     const ImplicitTree& tree = *tile.tree;

@@ -32,12 +32,10 @@ void Fill(Statistics& statistics) {
     tile.triangles = 50;
     tile.tier = i < 4 ? CacheTier::kHit : CacheTier::kMiss;
     statistics.AddRequest(i * 0.3, tile);
-    statistics.AddLoadedTile(i * 0.3, {10, 1060 + i, 770}, tile.tier);
+    statistics.AddLoadedTile({10, 1060 + i, 770});
     FrameRecord frame;
     frame.is_refined = i != 3;
-    frame.is_measured = true;
-    frame.rays = 100;
-    frame.missing = i == 5 ? 7 : 0;
+    frame.coverage = Coverage{.rays = 100, .missing = i == 5 ? 7 : 0};
     frame.worst_px = 10 + i;
     statistics.AddFrame(i * 0.3, frame);
     statistics.AddCamera({7 + i * 0.01, 46, 3000});
@@ -50,7 +48,7 @@ void Fill(Statistics& statistics) {
 TEST(Summary, CountsWhatHappened) {
   Statistics statistics(1);
   Fill(statistics);
-  const Summary summary = Summarize(SomeOptions(), statistics);
+  const Summary summary = Summarize(SomeOptions(), statistics.record());
   EXPECT_EQ(summary.totals.tiles, 10U);
   EXPECT_EQ(summary.totals.bytes, 10'000U);
   EXPECT_NEAR(summary.p50_s, 0.01, 1e-6);
@@ -68,7 +66,7 @@ TEST(Summary, CountsWhatHappened) {
 TEST(Requirements, HoldOrFail) {
   Statistics statistics(1);
   Fill(statistics);
-  const Summary summary = Summarize(SomeOptions(), statistics);
+  const Summary summary = Summarize(SomeOptions(), statistics.record());
   const auto holds = [&summary](std::string_view text) {
     const auto requirements = ParseRequirements(text);
     EXPECT_TRUE(requirements) << text;
@@ -81,7 +79,7 @@ TEST(Requirements, HoldOrFail) {
     EXPECT_FALSE(holds(text)) << text;
   }
   Statistics nothing(1);
-  const Summary empty = Summarize(SomeOptions(), nothing);
+  const Summary empty = Summarize(SomeOptions(), nothing.record());
   for (const char* text : {"full-view=99s", "p99=99s", "refined=0%", "holes=9", "hits=0%", "tiles=0"}) {
     EXPECT_FALSE(Judge(*ParseRequirements(text), empty).AllHold()) << text;  // what was not measured does not hold
   }
@@ -101,8 +99,8 @@ TEST(HtmlReport, StandsAlone) {
   Fill(statistics);
   statistics.AddMessage("<script>alert(1)</script>");
   const FlightOptions options = SomeOptions();
-  const Summary summary = Summarize(options, statistics);
-  const std::string html = HtmlOf(options, summary, Judge(*ParseRequirements("p99=1ms"), summary), statistics);
+  const Summary summary = Summarize(options, statistics.record());
+  const std::string html = HtmlOf(options, summary, Judge(*ParseRequirements("p99=1ms"), summary), statistics.record());
   EXPECT_EQ(html.find("<script"), std::string::npos);
   EXPECT_EQ(html.find("src="), std::string::npos);
   EXPECT_EQ(html.find("<link"), std::string::npos);
@@ -115,7 +113,7 @@ TEST(HtmlReport, StandsAlone) {
 TEST(HtmlReport, ShowsAFlightWithoutAnything) {
   Statistics statistics(1);
   const FlightOptions options = SomeOptions();
-  const std::string html = HtmlOf(options, Summarize(options, statistics), {}, statistics);
+  const std::string html = HtmlOf(options, Summarize(options, statistics.record()), {}, statistics.record());
   EXPECT_NE(html.find("never"), std::string::npos);
   EXPECT_EQ(html.find("inf"), std::string::npos);
 }

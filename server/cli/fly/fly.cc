@@ -52,19 +52,20 @@ int RunFly(const FlyArguments& arguments) {
       },
       statistics);
 
-  const fly::Summary summary = fly::Summarize(*options, statistics);
+  const fly::FlightRecord record = statistics.record();
+  const fly::Summary summary = fly::Summarize(*options, record);
   const fly::Judgements judgements = fly::Judge(*requirements, summary);
   bool written = true;
   if (!arguments.report.empty()) {
-    written &= WriteFile(arguments.report, fly::HtmlOf(*options, summary, judgements, statistics));
+    written &= WriteFile(arguments.report, fly::HtmlOf(*options, summary, judgements, record));
   }
   if (!arguments.urls.empty()) {
     std::string lines;
-    for (const std::string& url : statistics.urls()) lines += url + "\n";
+    for (const std::string& url : record.urls) lines += url + "\n";
     written &= WriteFile(arguments.urls, lines);
   }
   if (arguments.json) {
-    fmt::print("{}", fly::JsonOf(*options, summary, judgements, statistics.seconds()));
+    fmt::print("{}", fly::JsonOf(*options, summary, judgements, record.seconds));
   } else {
     fmt::print("\n{}", fly::TextOf(summary));
     for (const fly::Judgement& judgement : judgements.all) {

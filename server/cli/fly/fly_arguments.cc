@@ -123,93 +123,66 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
 
 namespace {
 
-// A number of which the help shows no range; an error does.
+// A number whose default the help shows, but not its range; an error does.
 template <typename T>
-CLI::Option* AddNumber(CLI::App& command, const char* name, T& value, const char* type, T low, T high,
-                       const char* text) {
-  return command.add_option(name, value, text)->type_name(type)->check(CLI::Range(low, high).description(""));
+void AddNumber(CLI::App& command, const char* name, T& value, const char* type, T low, T high, const char* text) {
+  command.add_option(name, value, text)
+      ->type_name(type)
+      ->check(CLI::Range(low, high).description(""))
+      ->capture_default_str();
 }
 
 void AddPathFlags(CLI::App& command, FlyArguments& a) {
-  const std::string group = "Flight path";
+  command.option_defaults()->group("Flight path");
   command
       .add_option("--path", a.path,
                   "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a line; or "
                   "GeoJSON with a LineString")
-      ->type_name("FILE")
-      ->group(group);
-  command.add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")
-      ->type_name("LON,LAT,H")
-      ->group(group);
-  command.add_option("--to", a.to, "End; the client flies back and forth")->type_name("LON,LAT,H")->group(group);
-  command.add_option("--circle", a.circle, "Circle around a place, metres")
-      ->type_name("LON,LAT,H,RADIUS")
-      ->group(group);
-  AddNumber(command, "--speed", a.speed, "M/S", 0.001, 1e7, "Metres per second")->capture_default_str()->group(group);
+      ->type_name("FILE");
+  command.add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")->type_name("LON,LAT,H");
+  command.add_option("--to", a.to, "End; the client flies back and forth")->type_name("LON,LAT,H");
+  command.add_option("--circle", a.circle, "Circle around a place, metres")->type_name("LON,LAT,H,RADIUS");
+  AddNumber(command, "--speed", a.speed, "M/S", 0.001, 1e7, "Metres per second");
   AddNumber(command, "--pitch", a.pitch, "DEGREES", -90.0, 90.0,
-            "Where the path states none; 0 looks at the horizon, -90 down")
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--duration", a.duration, "S", 0.0, 7 * 86400.0,
-            "Seconds of the flight; default: once along the path, at least 10")
-      ->group(group);
+            "Where the path states none; 0 looks at the horizon, -90 down");
+  command.add_option("--duration", a.duration, "Seconds of the flight; default: once along the path, at least 10")
+      ->type_name("S")
+      ->check(CLI::Range(0.0, 7 * 86400.0).description(""));
 }
 
 void AddClientFlags(CLI::App& command, FlyArguments& a) {
-  const std::string group = "Client";
+  command.option_defaults()->group("Client");
   command.add_option("--format", a.format, "What to load")
       ->type_name("terrain|3dtiles")
       ->check(CLI::IsMember({"terrain", "3dtiles"}).description(""))
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--clients", a.clients, "N", 1, 1000, "Clients that fly at a time, spread evenly over the path")
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--sse", a.sse, "PX", 0.5, 1000.0, "Screen error from which a tile is refined")
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--fps", a.fps, "N", 1.0, 240.0, "Frames per second")->capture_default_str()->group(group);
-  AddNumber(command, "--fov", a.fov, "DEGREES", 1.0, 170.0, "Field of view, across the screen")
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--width", a.width, "PX", 1, 32768, "Width of the screen")->capture_default_str()->group(group);
-  AddNumber(command, "--height", a.height, "PX", 1, 32768, "Height of the screen")->capture_default_str()->group(group);
-  AddNumber(command, "--loads", a.loads, "N", 1, 1000, "Requests of a client at a time")
-      ->capture_default_str()
-      ->group(group);
-  AddNumber(command, "--cache", a.cache_mb, "MIB", 1, 65536, "Decoded tiles that a client keeps")
-      ->capture_default_str()
-      ->group(group);
-  command.add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn")
-      ->group(group);
-  command.add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")
-      ->type_name("HEADER")
-      ->group(group);
-  command.add_flag("--insecure", a.insecure, "Accept any TLS certificate")->group(group);
-  AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0, "Until a request without a complete reply is given up")
-      ->capture_default_str()
-      ->group(group);
+      ->capture_default_str();
+  AddNumber(command, "--clients", a.clients, "N", 1, 1000, "Clients that fly at a time, spread evenly over the path");
+  AddNumber(command, "--sse", a.sse, "PX", 0.5, 1000.0, "Screen error from which a tile is refined");
+  AddNumber(command, "--fps", a.fps, "N", 1.0, 240.0, "Frames per second");
+  AddNumber(command, "--fov", a.fov, "DEGREES", 1.0, 170.0, "Field of view, across the screen");
+  AddNumber(command, "--width", a.width, "PX", 1, 32768, "Width of the screen");
+  AddNumber(command, "--height", a.height, "PX", 1, 32768, "Height of the screen");
+  AddNumber(command, "--loads", a.loads, "N", 1, 1000, "Requests of a client at a time");
+  AddNumber(command, "--cache", a.cache_mb, "MIB", 1, 65536, "Decoded tiles that a client keeps");
+  command.add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn");
+  command.add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")->type_name("HEADER");
+  command.add_flag("--insecure", a.insecure, "Accept any TLS certificate");
+  AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0, "Until a request without a complete reply is given up");
   AddNumber(command, "--first-view-limit", a.first_view_limit, "S", 0.1, 3600.0,
-            "A client takes off after this time without a full view")
-      ->capture_default_str()
-      ->group(group);
+            "A client takes off after this time without a full view");
 }
 
 void AddReportFlags(CLI::App& command, FlyArguments& a) {
-  const std::string group = "Report";
+  command.option_defaults()->group("Report");
   command.add_option("--report", a.report, "Page with plots, without references to other files")
-      ->type_name("FILE.html")
-      ->group(group);
-  command.add_flag("--json", a.json, "Report as JSON on stdout; progress goes to stderr")->group(group);
-  command.add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")
-      ->type_name("FILE")
-      ->group(group);
+      ->type_name("FILE.html");
+  command.add_flag("--json", a.json, "Report as JSON on stdout; progress goes to stderr");
+  command.add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")->type_name("FILE");
   command
       .add_option("--require", a.require,
                   "Exit status 1 unless all hold: full-view=2s, p50=10ms, p99=50ms, refined=95%, screen-error=20px, "
                   "holes=0, errors=0, refusals=0, hits=80%, tiles=30; joined by commas")
-      ->type_name("LIST")
-      ->group(group);
+      ->type_name("LIST");
 }
 
 }  // namespace
