@@ -49,7 +49,7 @@ void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> w
   trace.heights.resize(wanted.size());
   float* const traced = trace.heights.data();
   for (std::size_t n = 0; n < wanted.size(); ++n) {
-    const float height = heights[n];  // always, or it is no vector
+    const float height = heights[n];  // read for every node, or the compiler makes no vectors
     traced[n] = wanted[n] != 0 ? height : SampleRules::kVoid;
   }
 }

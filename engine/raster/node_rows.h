@@ -53,7 +53,7 @@ std::vector<float> VoidHeights(std::size_t count);
 // Makes all heights equal to one.
 void FillWith(float height, std::span<float> heights);
 
-// Replaces NaN.
+// Replaces each NaN.
 void ReplaceVoids(std::span<float> heights, float by);
 
 // Whether a height is NaN.

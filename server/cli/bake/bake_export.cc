@@ -7,6 +7,7 @@
 #include "archive/archive.h"
 #include "archive/export.h"
 #include "archive/manifest.h"
+#include "bake/place_files.h"
 
 namespace terrace::cli {
 
@@ -24,14 +25,11 @@ namespace {
 
 // Removes the manifest last: as long as it is there, RemoveIfExported knows the bake.
 void RemoveBake(const std::string& baked) {
-  std::error_code error;
-  std::vector<fs::path> entries;
-  for (auto entry = fs::directory_iterator(baked, error); !error && entry != fs::directory_iterator();
-       entry.increment(error)) {
-    if (entry->path().filename() != archive::kManifestFile) entries.push_back(entry->path());
+  std::error_code ignored;
+  for (const std::string& name : bake::NamesIn(baked).value_or(std::vector<std::string>())) {
+    if (name != archive::kManifestFile) fs::remove_all(fs::path(baked) / name, ignored);
   }
-  for (const fs::path& entry : entries) fs::remove_all(entry, error);
-  fs::remove_all(baked, error);
+  fs::remove_all(baked, ignored);
 }
 
 }  // namespace

@@ -95,7 +95,7 @@ int Serve(const ServeArguments& arguments) {
   WarnAboutFewDescriptors(config, *budget);
   if (std::error_code ignored;
       options.config.viewer.enabled && !std::filesystem::exists(options.config.viewer.directory, ignored)) {
-    spdlog::warn("viewer: {} is not there: / lists the datasets; set `viewer` to a folder with the viewer's files",
+    spdlog::warn("viewer: {} is not there: / lists the datasets; set `viewer` to a folder with its files, or to false",
                  options.config.viewer.directory.string());
   }
   options.config.max_connections = budget->connections;

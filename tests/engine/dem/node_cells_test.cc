@@ -205,7 +205,7 @@ TEST(NodeRows, RoundsAsSingleHeights) {
   });
 }
 
-TEST(NodeRows, VoidsAreCountedAndWantedWhereNodesAreInside) {
+TEST(NodeRows, VoidsAreCountedReplacedAndWantedWhereNodesAreInside) {
   std::mt19937 random(7);
   tin::ForEachInstructionSet([&] {
     for (std::size_t count = 0; count < 70; ++count) {
@@ -223,6 +223,11 @@ TEST(NodeRows, VoidsAreCountedAndWantedWhereNodesAreInside) {
       EXPECT_EQ(CountVoids(heights), counted);
       EXPECT_EQ(WantVoids(inside, heights, wanted), std::ranges::count(expected, std::uint8_t{1}) > 0) << count;
       EXPECT_EQ(wanted, expected);
+      std::vector<float> replaced = heights;
+      ReplaceVoids(replaced, -12.5f);
+      for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_EQ(replaced[i], std::isnan(heights[i]) ? -12.5f : heights[i]) << count;
+      }
     }
   });
 }
