@@ -42,11 +42,11 @@ class BlockAverages {
 
   // Adds a row of samples with weight `weight`. The last sample has `weight` * `last`: it may cover fewer pixels.
   void AddRow(const float* samples, std::int64_t count, double weight = 1, double last = 1) {
-    // All but the block of the last sample.
-    const std::int64_t whole = (count - 1) / plain_;
+    const std::int64_t whole = (last == 1 ? count : count - 1) / plain_;  // blocks of samples of equal weight
     AddRowOfBlocks(samples, plain_, weight, std::span(inner_).first(static_cast<std::size_t>(whole)));
-    BlockSum& end = inner_[static_cast<std::size_t>(whole)];
-    for (std::int64_t i = whole * plain_; i < count; ++i) end.Add(samples[i], i + 1 == count ? weight * last : weight);
+    for (std::int64_t i = whole * plain_; i < count; ++i) {
+      inner_[static_cast<std::size_t>(whole)].Add(samples[i], i + 1 == count ? weight * last : weight);
+    }
     if (parts_ > 1 && ++rows_ == kLargestPlain) Gather();
   }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <utility>
 
 #include "engine/common/dem_types.h"
@@ -29,9 +30,9 @@ void ForEachFactor(const RasterLayout& layout, int least, int most, const Visit&
 // Samples of a box of the raster.
 struct Samples {
   Chunk box;
-  std::vector<float> heights;
+  std::unique_ptr<float[]> heights;
 
-  const float* Row(int row) const { return heights.data() + Area(row - box.row, box.cols); }
+  const float* Row(int row) const { return heights.get() + Area(row - box.row, box.cols); }
 };
 
 // Returns false if the file stores nothing there and GDAL's replacement value is a void.
@@ -134,20 +135,24 @@ Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout,
     return averages;
   }
   averages.heights.resize(static_cast<std::size_t>(window.columns * window.rows));
-  Chunk box = samples.box;
-  box.cols = std::min(box.cols, layout.columns - box.col);
-  const std::vector<BlockSum> sums = SumsOf(samples, box, factor);
-  const std::int64_t first = box.col / factor, columns = DivideUp(box.cols, factor), top = box.row / factor;
+  const Chunk& box = samples.box;  // begins at a block
+  const std::int64_t end = std::min(box.col + box.cols, layout.columns), bottom = box.row + box.rows;
+  const std::int64_t west = std::max<std::int64_t>(window.column, box.col / factor);
+  const std::int64_t east =
+      std::min<std::int64_t>(window.column + window.columns, DivideUp(static_cast<int>(end), factor));
+  const std::int64_t left = west * factor, width = std::min(east * factor, end) - left;
+  BlockAverages blocks(east - west, factor);
+  for (std::int64_t r = 0; r < window.rows; ++r) {
+    const std::int64_t top = (window.row + r) * factor;
+    for (std::int64_t row = top; row < std::min(top + factor, bottom); ++row) {
+      blocks.AddRow(samples.Row(static_cast<int>(row)) + (left - box.col), width);
+    }
+    blocks.Take(averages.heights.data() + r * window.columns + (west - window.column));
+  }
+  // Around the Earth.
   for (std::int64_t c = 0; c < window.columns; ++c) {
     const std::int64_t column = window.column + c;
-    if (column >= first && column < first + columns) {
-      for (std::int64_t r = 0; r < window.rows; ++r) {
-        averages.heights[static_cast<std::size_t>(r * window.columns + c)] =
-            sums[static_cast<std::size_t>((window.row + r - top) * columns + column - first)].Mean();
-      }
-      continue;
-    }
-    // Around the Earth.
+    if (column >= west && column < east) continue;
     auto read = ReadGrid(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::int64_t r = 0; r < window.rows; ++r) {
@@ -183,15 +188,17 @@ class RowErrors {
     const GridAxis::Location place = rows_.Locate(row + 0.5);
     const float* upper = averages_.Row(place.index);
     const float* lower = place.weight > 0 ? averages_.Row(place.index + 1) : upper;
-    bool has_voids = false;
     for (std::size_t i = 0; i + 1 < line_.size(); ++i) {
       line_[i] = upper[i] * (1 - place.weight) + lower[i] * place.weight;
-      has_voids |= std::isnan(line_[i]);
     }
     line_.back() = line_[line_.size() - 2];  // has no weight
     for (const Part& part : parts_) {
-      *errors = std::max(*errors, has_voids ? WithVoids(samples, upper, lower, place.weight, part.first, part.end)
-                                            : Plain(samples, part));
+      const double* const first = line_.data() + places_[static_cast<std::size_t>(part.first)].index;
+      const double* const last = line_.data() + places_[static_cast<std::size_t>(part.end - 1)].index + 1;
+      double sum = 0;  // NaN if an average is void
+      for (const double* at = first; at <= last; ++at) sum += *at;
+      *errors = std::max(*errors, std::isnan(sum) ? WithVoids(samples, upper, lower, place.weight, part.first, part.end)
+                                                  : Plain(samples, part));
       ++errors;
     }
   }
@@ -295,13 +302,15 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
       rows.Add(samples.Row(chunk.row + r) + (chunk.col - samples.box.col), chunk.row + r,
                errors.data() + std::ptrdiff_t{r / pixels} * columns);
     }
-    statistics.averages.emplace_back();
+    std::vector<float>& of_chunk = statistics.averages.emplace_back();
     if (StartingFactor(layout, factor) > 1 && (kept & static_cast<unsigned>(factor)) == 0) return;
-    const int used = std::min(chunk.cols, layout.columns - chunk.col);
+    const int used = std::min(chunk.cols, layout.columns - chunk.col), columns_used = DivideUp(used, factor);
     const std::int64_t first = chunk.col / factor, top = chunk.row / factor;
-    for (std::int64_t r = 0; r < DivideUp(chunk.rows, factor); ++r) {
+    const int rows_used = DivideUp(chunk.rows, factor);
+    of_chunk.reserve(Area(columns_used, rows_used));
+    for (std::int64_t r = 0; r < rows_used; ++r) {
       const float* row = averages->Row(top + r) + (first - averages->window.column);
-      statistics.averages.back().insert(statistics.averages.back().end(), row, row + DivideUp(used, factor));
+      of_chunk.insert(of_chunk.end(), row, row + columns_used);
     }
   });
   return result;
@@ -377,10 +386,9 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   ChunkStatistics statistics = VoidStatistics(chunk, layout);
   if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);
   ++read;
-  Samples samples{WithHalo(chunk, layout), {}};
-  const Chunk& box = samples.box;
-  samples.heights.resize(Area(box.cols, box.rows));
-  if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.data(), stop);
+  const Chunk box = WithHalo(chunk, layout);
+  const Samples samples{box, std::make_unique_for_overwrite<float[]>(Area(box.cols, box.rows))};
+  if (auto done = ReadHeights(band, layout.rules, box.col, box.row, box.cols, box.rows, samples.heights.get(), stop);
       !done) {
     return tl::unexpected(done.error());
   }

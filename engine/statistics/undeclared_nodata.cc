@@ -150,34 +150,38 @@ void ZeroEdges::Add(const float* heights, std::ptrdiff_t stride, const Chunk& ch
                     int raster_height, double step_m) {
   const int cols = chunk.cols, rows = chunk.rows;
   const bool left = chunk.col == 0, right = chunk.col + cols == raster_width;
-  const auto pair = [this, step = static_cast<float>(step_m)](float a, float b) {
-    if ((a == 0) == (b == 0)) return;
-    const float other = std::abs(a + b);
-    if (other > step) {
-      ++high;
-    } else if (other > 0) {  // not of NaN
-      ++low;
+  const auto step = static_cast<float>(step_m);
+  // Counters of int and no branches: the compiler makes vectors of these loops.
+  const auto add_pairs = [&](const float* a, const float* b, int count) {
+    int above = 0, others = 0;
+    for (int i = 0; i < count; ++i) {
+      const float other = std::abs(a[i] + b[i]);  // where the other one is zero
+      const bool is_pair = (a[i] == 0) != (b[i] == 0);
+      above += static_cast<int>(is_pair & (other > step));
+      others += static_cast<int>(is_pair & (other <= step));  // not of NaN
     }
+    high += above;
+    low += others;
   };
   const auto zeros_in = [&](int row) {
-    return row < rows ? std::count(heights + row * stride, heights + row * stride + cols, 0.0f) : 0;
+    int count = 0;
+    for (int c = 0; row < rows && c < cols; ++c) count += static_cast<int>(heights[row * stride + c] == 0);
+    return count;
   };
-  std::ptrdiff_t zeros_below = zeros_in(0);
+  int zeros_below = zeros_in(0);
   for (int r = 0; r < rows; ++r) {
     const float* const row = heights + r * stride;
-    const std::ptrdiff_t zeros_here = zeros_below;
+    const int zeros_here = zeros_below;
     zeros_below = zeros_in(r + 1);
     if (zeros_here > 0 || zeros_below > 0) {  // else there is no pair
-      for (int c = 0; c < cols; ++c) {
-        if (c + 1 < cols) pair(row[c], row[c + 1]);
-        if (r + 1 < rows) pair(row[c], row[c + stride]);
-      }
+      add_pairs(row, row + 1, cols - 1);
+      if (r + 1 < rows) add_pairs(row, row + stride, cols);
     }
     zeros += zeros_here;
     at_border += (left && row[0] == 0) + (right && row[cols - 1] == 0);
     const int raster_row = chunk.row + r;
     if (raster_row == 0 || raster_row + 1 == raster_height) at_border += zeros_here;
-    AddGround(row, cols, chunk.col, raster_row);
+    if (zeros_here < cols) AddGround(row, cols, chunk.col, raster_row);
   }
 }
 

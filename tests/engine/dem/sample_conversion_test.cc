@@ -95,12 +95,12 @@ TEST(BlockAverages, AreSumsOfTheSamplesOfABlockInTheirOrder) {
   std::mt19937 random(3);
   std::uniform_real_distribution<float> height(-400, 8800);
   for (const int block : {1, 2, 3, 4, 5, 8, 16, 64}) {
-    for (const int columns : {1, 2, 7, 64, 97}) {
+    for (const int columns : {1, 2, 7, 20, 64, 97, 98}) {
       const int rows = 2 * block;
       std::vector<float> samples(static_cast<std::size_t>(columns * rows));
       for (float& sample : samples) sample = random() % 3 == 0 ? SampleRules::kVoid : height(random);
       const int blocks = (columns + block - 1) / block;
-      const double weight = 0.75, last = 0.5;
+      const double weight = 0.75, last = columns % 2 == 0 ? 1 : 0.5;
       BlockAverages averages(blocks, block);
       std::vector<float> taken(static_cast<std::size_t>(blocks));
       for (int top = 0; top < rows; top += block) {
