@@ -19,6 +19,8 @@ namespace {
 
 // Raw samples converted at a time. Limits the scratch memory of a read (8 MiB) and the reaction time to a stop.
 constexpr int kSamplesPerRead = 1 << 20;
+// Heights that are passed on at a time: 16 KiB.
+constexpr int kHeightsPerVisit = 1 << 12;
 
 std::optional<double> NodataOf(GDALRasterBand& band) {
   int has = 0;
@@ -172,15 +174,18 @@ void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* 
   }
 }
 
-Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
-                         float* out, const std::stop_token& stop) {
+// For rules without a rim.
+Result<void> VisitSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                          const AddRows& add, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
+  const int rows_per_visit = std::clamp(kHeightsPerVisit / cols, 1, rows);
   const std::size_t most = Area(cols, rows_at_once);
   const GDALDataType type = RawTypeOf(band, rules);
+  const auto bytes_per_sample = static_cast<std::size_t>(GDALGetDataTypeSizeBytes(type));
   // Not initialized, because it is written before it is read, and filling it with zeros takes longer than the
   // conversion.
-  const auto raw =
-      std::make_unique_for_overwrite<std::byte[]>(most * static_cast<std::size_t>(GDALGetDataTypeSizeBytes(type)));
+  const auto raw = std::make_unique_for_overwrite<std::byte[]>(most * bytes_per_sample);
+  const auto heights = std::make_unique_for_overwrite<float[]>(Area(cols, rows_per_visit));
   std::vector<std::uint8_t> mask(rules.has_mask ? most : 0);
   for (int done = 0; done < rows; done += rows_at_once) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
@@ -197,20 +202,23 @@ Result<void> ReadSamples(GDALRasterBand& band, const SampleRules& rules, int col
       return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
                        TakeGdalError());
     }
-    const std::size_t samples = Area(cols, count);
-    auto* const doubles = reinterpret_cast<double*>(raw.get());  // for this type
-    if (rules.is_signed_byte) {
-      for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
-    }
-    if (IsPlain(rules)) {
-      ConvertPlain(rules, type, raw.get(), samples, out);
-    } else {
-      for (std::size_t i = 0; i < samples; ++i) {
-        const bool is_hidden = rules.has_mask && mask[i] == 0;
-        out[i] = !is_hidden ? rules.ToHeight(doubles[i]) : rules.is_indicator ? 0.0f : SampleRules::kVoid;
+    for (int r = 0; r < count; r += rows_per_visit) {
+      const int visited = std::min(rows_per_visit, count - r);
+      const std::size_t first = Area(cols, r), samples = Area(cols, visited);
+      auto* const doubles = reinterpret_cast<double*>(raw.get()) + first;  // for this type
+      if (rules.is_signed_byte) {
+        for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
       }
+      if (IsPlain(rules)) {
+        ConvertPlain(rules, type, raw.get() + first * bytes_per_sample, samples, heights.get());
+      } else {
+        for (std::size_t i = 0; i < samples; ++i) {
+          const bool is_hidden = rules.has_mask && mask[first + i] == 0;
+          heights[i] = !is_hidden ? rules.ToHeight(doubles[i]) : rules.is_indicator ? 0.0f : SampleRules::kVoid;
+        }
+      }
+      add(heights.get(), visited);
     }
-    out += samples;
   }
   return {};
 }
@@ -231,20 +239,27 @@ void WidenVoids(float* first, int count, std::ptrdiff_t stride, int reach, std::
 
 Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop) {
-  if (rules.rim == 0) return ReadSamples(band, rules, col, row, cols, rows, out, stop);
+  const auto copy = [&](const float* heights, std::int64_t count) { out = std::copy_n(heights, count * cols, out); };
+  return VisitHeights(band, rules, col, row, cols, rows, copy, stop);
+}
+
+Result<void> VisitHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                          const AddRows& add, const std::stop_token& stop) {
+  if (rules.rim == 0) return VisitSamples(band, rules, col, row, cols, rows, add, stop);
   // Extends the window by the reach of voids, so that a void does not depend on the window.
   const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
   const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
   const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
-  std::vector<float> around(Area(wide, high));
-  if (auto read = ReadSamples(band, rules, left, top, wide, high, around.data(), stop); !read) return read;
+  std::vector<float> around;
+  around.reserve(Area(wide, high));
+  const auto keep = [&](const float* heights, std::int64_t count) {
+    around.insert(around.end(), heights, heights + count * wide);
+  };
+  if (auto read = VisitSamples(band, rules, left, top, wide, high, keep, stop); !read) return read;
   std::vector<char> near;
   for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);
   for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.rim, near);
-  for (int r = 0; r < rows; ++r) {
-    const auto first = around.begin() + std::ptrdiff_t{row - top + r} * wide + (col - left);
-    std::copy(first, first + cols, out + std::ptrdiff_t{r} * cols);
-  }
+  for (int r = 0; r < rows; ++r) add(around.data() + std::ptrdiff_t{row - top + r} * wide + (col - left), 1);
   return {};
 }
 

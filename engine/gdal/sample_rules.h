@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -60,8 +62,16 @@ struct SampleRules {
 // Returns metres per unit for a unit name; nothing if the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 
-// Reads the heights of a pixel window of a band or of one of its overviews, row by row, into `out`; voids are NaN.
-// kUnavailable: the band cannot be read. kCancelled: stopped.
+// Gets the next rows of heights.
+using AddRows = std::function<void(const float* heights, std::int64_t rows)>;
+
+// Reads the heights of a pixel window of a band or of one of its overviews; voids are NaN. Calls `add` with a few rows
+// at a time, so that they are still in the processor's cache. kUnavailable: the band cannot be read. kCancelled:
+// stopped.
+Result<void> VisitHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
+                          const AddRows& add, const std::stop_token& stop);
+
+// The same, row by row into `out`.
 Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                          float* out, const std::stop_token& stop);
 

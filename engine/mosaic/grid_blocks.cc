@@ -101,7 +101,12 @@ Result<std::vector<float>> RasterGrid::ReadBlocks(int factor, const GridWindow& 
   if (members_.size() == 1) return members_.front().raster->ReadBlocks(factor, window, stop);
   const int step = std::min(alignment_, factor);
   return AverageBlocks(Columns(step), Rows(step), step, factor / step, window,
-                       [&](const GridWindow& blocks, float* out) { return Compose(step, blocks, out, stop); });
+                       [&](const GridWindow& blocks, const AddRows& add) -> Result<void> {
+                         std::vector<float> values(static_cast<std::size_t>(blocks.columns * blocks.rows));
+                         if (auto done = Compose(step, blocks, values.data(), stop); !done) return done;
+                         add(values.data(), blocks.rows);
+                         return {};
+                       });
 }
 
 }  // namespace terrace::dem

@@ -21,9 +21,9 @@ inline double ShareOf(std::int64_t block, int step, std::int64_t size) {
 
 // Copies averages of 1 x 1 blocks: the samples, `columns` per row, with -0 replaced by 0. `stride`: of `out`, in
 // samples.
-inline void CopyRows(std::span<const float> samples, std::int64_t columns, float* out, std::int64_t stride) {
-  for (; !samples.empty(); samples = samples.subspan(static_cast<std::size_t>(columns)), out += stride) {
-    for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[static_cast<std::size_t>(i)] + 0.0f;
+inline void CopyRows(const float* samples, std::int64_t columns, std::int64_t rows, float* out, std::int64_t stride) {
+  for (std::int64_t r = 0; r < rows; ++r, samples += columns, out += stride) {
+    for (std::int64_t i = 0; i < columns; ++i) out[i] = samples[i] + 0.0f;
   }
 }
 
@@ -72,7 +72,8 @@ class BlockAverages {
 };
 
 // Computes a window of averages of block x block values. Each value covers a block of `step` samples; `columns` and
-// `rows` are the axes of the values. Calls read(window, out) for windows of values that do not wrap.
+// `rows` are the axes of the values. Calls read(window, add) for windows of values that do not wrap; it passes their
+// rows to `add` (sample_rules.h).
 template <typename Read>
 Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis& rows, int step, int block,
                                          const GridWindow& window, const Read& read) {
@@ -85,27 +86,27 @@ Result<std::vector<float>> AverageBlocks(const GridAxis& columns, const GridAxis
     const std::int64_t first = FloorMod(window.column + column, turn) * block;
     const std::int64_t blocks = std::min(window.columns - column, turn - first / block);
     const std::int64_t width = std::min(columns.count() - first, blocks * block);
+    const double last = ShareOf(first + width - 1, step, columns.samples());
+    const bool is_plain = block == 1 && width == blocks;
+    BlockAverages averages(is_plain ? 0 : blocks, block);
+    std::int64_t done = 0;  // rows of values
+    const AddRows add = [&](const float* values, std::int64_t count) {
+      if (is_plain) {
+        CopyRows(values, width, count, out + done * window.columns, window.columns);
+        done += count;
+        return;
+      }
+      for (; count > 0; --count, values += width) {
+        averages.AddRow(values, width, ShareOf(top + done, step, rows.samples()), last);
+        ++done;
+        if (done % block == 0 || done == height) averages.Take(out + (done - 1) / block * window.columns);
+      }
+    };
     // A limited number of rows at a time, because a row of blocks can be the whole raster.
     const std::int64_t strip = std::max<std::int64_t>(1, kValuesPerStrip / width);
-    const bool is_plain = block == 1 && width == blocks;
-    // Not initialized, because it is written before it is read.
-    const auto values =
-        std::make_unique_for_overwrite<float[]>(static_cast<std::size_t>(width * std::min(strip, height)));
-    BlockAverages averages(is_plain ? 0 : blocks, block);
-    for (std::int64_t done = 0; done < height; done += strip) {
-      const GridWindow here{first, top + done, width, std::min(strip, height - done)};
-      if (auto filled = read(here, values.get()); !filled) return tl::unexpected(filled.error());
-      if (is_plain) {
-        CopyRows({values.get(), static_cast<std::size_t>(width * here.rows)}, width, out + done * window.columns,
-                 window.columns);
-        continue;
-      }
-      for (std::int64_t r = 0; r < here.rows; ++r) {
-        averages.AddRow(values.get() + r * width, width, ShareOf(here.row + r, step, rows.samples()),
-                        ShareOf(first + width - 1, step, columns.samples()));
-        const std::int64_t at = done + r;
-        if ((at + 1) % block == 0 || at + 1 == height) averages.Take(out + at / block * window.columns);
-      }
+    for (std::int64_t row = 0; row < height; row += strip) {
+      const GridWindow here{first, top + row, width, std::min(strip, height - row)};
+      if (const Result<void> read_here = read(here, add); !read_here) return tl::unexpected(read_here.error());
     }
     column += blocks;
   }

@@ -41,10 +41,10 @@ Result<Level> StartingLevel(GDALDataset& dataset, const RasterLayout& layout, in
                is_whole || is_own};
 }
 
-Result<void> ReadWindow(GDALRasterBand& band, const SampleRules& rules, const GridWindow& window, float* out,
-                        const std::stop_token& stop) {
-  return ReadHeights(band, rules, static_cast<int>(window.column), static_cast<int>(window.row),
-                     static_cast<int>(window.columns), static_cast<int>(window.rows), out, stop);
+Result<void> VisitWindow(GDALRasterBand& band, const SampleRules& rules, const GridWindow& window, const AddRows& add,
+                         const std::stop_token& stop) {
+  return VisitHeights(band, rules, static_cast<int>(window.column), static_cast<int>(window.row),
+                      static_cast<int>(window.columns), static_cast<int>(window.rows), add, stop);
 }
 
 // Reads samples of an overview; the column after the last one is the first.
@@ -52,22 +52,23 @@ Result<std::vector<float>> ReadSamples(const Level& level, const SampleRules& ru
                                        const std::stop_token& stop) {
   std::vector<float> samples(static_cast<std::size_t>(window.columns * window.rows));
   const auto read = [&](std::int64_t column, std::int64_t columns, float* out) {
-    return ReadWindow(*level.band, rules, {column, window.row, columns, window.rows}, out, stop);
+    const auto copy = [&](const float* heights, std::int64_t rows) {
+      CopyRows(heights, columns, rows, out, window.columns);
+      out += rows * window.columns;
+    };
+    return VisitWindow(*level.band, rules, {column, window.row, columns, window.rows}, copy, stop);
   };
   const std::int64_t here = std::min(window.columns, level.x.samples() - window.column);
   if (auto done = read(window.column, here, samples.data()); !done) return tl::unexpected(done.error());
   if (here == window.columns) return samples;
-  std::vector<float> first(static_cast<std::size_t>(window.rows));
-  if (auto done = read(0, 1, first.data()); !done) return tl::unexpected(done.error());
-  std::vector<float> both(samples.size());
-  CopyRows(std::span(samples).first(static_cast<std::size_t>(here * window.rows)), here, both.data(), window.columns);
-  CopyRows(first, 1, both.data() + here, window.columns);
-  return both;
+  if (auto done = read(0, 1, samples.data() + here); !done) return tl::unexpected(done.error());
+  return samples;
 }
 
-// Interpolates blocks of level.start between the overview's samples. Precondition: the window does not wrap.
-Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window, float* out,
-                               const std::stop_token& stop) {
+// Interpolates blocks of level.start between the overview's samples, and passes them on row by row. Precondition: the
+// window does not wrap.
+Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, const GridWindow& window,
+                               const AddRows& add, const std::stop_token& stop) {
   std::vector<GridAxis::Location> columns;
   for (std::int64_t c = 0; c < window.columns; ++c) columns.push_back(level.x.Around(window.column + c));
   const auto end = [](const GridAxis::Location& place) { return place.index + (place.weight > 0 ? 2 : 1); };
@@ -77,7 +78,9 @@ Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, con
   const auto samples = ReadSamples(level, rules, around, stop);
   if (!samples) return tl::unexpected(samples.error());
   std::vector<double> line(static_cast<std::size_t>(around.columns));
+  std::vector<float> blocks(columns.size());
   for (std::int64_t r = 0; r < window.rows; ++r) {
+    float* out = blocks.data();
     const GridAxis::Location y = level.y.Around(window.row + r);
     const float* const upper = samples->data() + (y.index - around.row) * around.columns;
     const float* const lower = y.weight > 0 ? upper + around.columns : upper;
@@ -90,6 +93,7 @@ Result<void> InterpolateBlocks(const Level& level, const SampleRules& rules, con
       }
       *out++ = static_cast<float>(height);
     }
+    add(blocks.data(), 1);
   }
   return {};
 }
@@ -191,9 +195,9 @@ Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& la
   const auto level = StartingLevel(dataset, layout, factor);
   if (!level) return tl::unexpected(level.error());
   return AverageBlocks(level->columns, level->rows, level->start, factor / level->start, window,
-                       [&](const GridWindow& blocks, float* out) {
-                         return level->is_band ? ReadWindow(*level->band, layout.rules, blocks, out, stop)
-                                               : InterpolateBlocks(*level, layout.rules, blocks, out, stop);
+                       [&](const GridWindow& blocks, const AddRows& add) {
+                         return level->is_band ? VisitWindow(*level->band, layout.rules, blocks, add, stop)
+                                               : InterpolateBlocks(*level, layout.rules, blocks, add, stop);
                        });
 }
 
