@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "engine/common/dem_types.h"
+#include "engine/gdal/convert_samples.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
 
@@ -127,50 +128,29 @@ float FloatAtMost(double value) {
 }
 float FloatAtLeast(double value) { return -FloatAtMost(-value); }
 
-// Equivalent to ToHeight for plain rules in metres and raw types that float represents exactly, without branches and
-// doubles.
-template <typename Raw>
-void ToHeights(const SampleRules& rules, const Raw* raw, std::size_t count, float* out) {
+// For plain rules in metres and raw types that float represents exactly.
+HeightLimits LimitsOf(const SampleRules& rules) {
   float nodata = std::numeric_limits<float>::quiet_NaN();  // equal to nothing
   if (rules.nodata) {
     const auto rounded = static_cast<float>(*rules.nodata);
     // Samples of Float32 bands may equal a nodata value that is stated with more digits than they have.
     if (rules.compare_as_float || static_cast<double>(rounded) == *rules.nodata) nodata = rounded;
   }
-  const float lowest = FloatAtLeast(rules.lowest), highest = FloatAtMost(rules.highest);
-  for (std::size_t i = 0; i < count; ++i) {
-    const float height = static_cast<float>(raw[i]) + 0.0f;  // turns -0 into 0, as raw * scale + offset does
-    const bool is_valid = (height != nodata) & (height >= lowest) & (height <= highest);
-    out[i] = is_valid ? height : SampleRules::kVoid;
-  }
+  return {nodata, FloatAtLeast(rules.lowest), FloatAtMost(rules.highest)};
 }
 
-// Equivalent to ToHeight for plain rules.
-template <>
-void ToHeights(const SampleRules& rules, const double* raw, std::size_t count, float* out) {
+// Equivalent to ToHeight for plain rules. `raw`: of RawTypeOf.
+void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* raw, std::size_t count, float* out) {
+  if (type != GDT_Float64) return ConvertSamples(type, raw, count, LimitsOf(rules), out);
+  const auto* const values = reinterpret_cast<const double*>(raw);
   double nodata = rules.nodata.value_or(std::numeric_limits<double>::quiet_NaN());
   if (rules.compare_as_float) nodata = static_cast<float>(nodata);
   const double scale = rules.scale, offset = rules.offset, unit = rules.metres_per_unit;
   const double lowest = rules.lowest, highest = rules.highest;
   for (std::size_t i = 0; i < count; ++i) {
-    const double height = (raw[i] * scale + offset) * unit;
-    const bool is_valid = (raw[i] != nodata) & (height >= lowest) & (height <= highest);
+    const double height = (values[i] * scale + offset) * unit;
+    const bool is_valid = (values[i] != nodata) & (height >= lowest) & (height <= highest);
     out[i] = is_valid ? static_cast<float>(height) : SampleRules::kVoid;
-  }
-}
-
-void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* raw, std::size_t count, float* out) {
-  switch (type) {
-    case GDT_Byte:
-      return ToHeights(rules, reinterpret_cast<const std::uint8_t*>(raw), count, out);
-    case GDT_Int16:
-      return ToHeights(rules, reinterpret_cast<const std::int16_t*>(raw), count, out);
-    case GDT_UInt16:
-      return ToHeights(rules, reinterpret_cast<const std::uint16_t*>(raw), count, out);
-    case GDT_Float32:
-      return ToHeights(rules, reinterpret_cast<const float*>(raw), count, out);
-    default:
-      return ToHeights(rules, reinterpret_cast<const double*>(raw), count, out);
   }
 }
 
