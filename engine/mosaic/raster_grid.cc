@@ -209,6 +209,14 @@ Result<void> RasterGrid::CheckUnread() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
+// The same for a window of voids.
+Result<void> RasterGrid::CheckUnread(int factor, const GridWindow& window) const {
+  for (const std::size_t i : MembersAt(PixelsOf(window, factor))) {
+    if (auto unchanged = members_[i].raster->CheckUnchanged(); !unchanged) return unchanged;
+  }
+  return {};
+}
+
 GridWindow RasterGrid::Grown(const GridWindow& window, int halo, int factor) const {
   GridWindow wide{window.column - halo, window.row - halo, window.columns + std::int64_t{2} * halo,
                   window.rows + std::int64_t{2} * halo};
@@ -220,6 +228,18 @@ GridWindow RasterGrid::Grown(const GridWindow& window, int halo, int factor) con
   if (!wraps_) clip(wide.column, wide.columns, Columns(factor).count());
   clip(wide.row, wide.rows, Rows(factor).count());
   return wide;
+}
+
+bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
+  if (wraps_) return false;  // columns beyond the last one are others
+  // Small voids are filled from samples around them, and averages by overviews are interpolated between such samples.
+  const GridWindow around = Grown(window, options_.max_void_gap / factor + 2, factor);
+  const BlockRange range = Ranges(PixelsOf(around, factor));
+  if (range.min <= range.max) return false;
+  if (options_.voids != HoleFill::kSmooth) return true;
+  // All of the window is one void, so that any average tells whether it is a hole.
+  const GridWindow first{window.column, window.row, 1, 1};
+  return voids_.HolesIn(members_, member_index_, factor, first, Columns(factor).count(), VoidHeights(1)).front() == 0;
 }
 
 Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
@@ -281,13 +301,8 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
   const double feather = Feather(factor), column_step = spacing_.east * factor, row_step = spacing_.north * factor;
   const int halo = static_cast<int>(std::ceil(feather / std::min(column_step, row_step))) + 1;
   const GridWindow wide = Grown(window, halo, factor);
-  const auto pixel = [factor](std::int64_t block) { return static_cast<double>(block * factor); };
   const bool ends = wide.rows < window.rows + 2 * halo || wide.columns < window.columns + 2 * halo;
-  if (!ends &&
-      !Ranges({pixel(wide.column), pixel(wide.row), pixel(wide.column + wide.columns), pixel(wide.row + wide.rows)})
-           .has_voids) {
-    return std::vector<float>();
-  }
+  if (!ends && !Ranges(PixelsOf(wide, factor)).has_voids) return std::vector<float>();
   const auto bridged = ReadBridged(factor, wide, stop);
   if (!bridged) return tl::unexpected(bridged.error());
   return FeatherWeights(bridged->heights, wide, window, column_step, row_step, feather);
@@ -310,14 +325,19 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   const bool are_all = std::memchr(wanted.data(), 0, wanted.size()) == nullptr;
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   NodeCells cells(std::move(positions), Axes(factor));
-  if (!is_any_wanted) {
+  const auto leave_unfilled = [&](const Result<void>& unchanged) {
     if (trace != nullptr) {
       trace->heights = VoidHeights(inside.size());
       trace->cells = std::move(cells);
     }
-    return CheckUnread();
-  }
+    return unchanged;
+  };
+  if (!is_any_wanted) return leave_unfilled(CheckUnread());
   GridWindow window = cells.MoveIntoWindow(wanted, are_all);
+  if (IsUnfilledVoid(factor, window)) {
+    counts_->voids += static_cast<std::uint64_t>(window.columns * window.rows);
+    return leave_unfilled(CheckUnread(factor, window));
+  }
   // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
@@ -365,7 +385,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   if (!has_holes && weights.empty()) {
     if (are_all && undulations.empty() && IsOneHeight(samples)) {
       FillWith(RoundHeight(samples.front()), heights);
-    } else {
+    } else if (left < samples.size()) {
       FillRows(samples, window, cells, wanted, are_all, undulations, heights);
     }
     if (trace != nullptr) TraceWanted(heights, wanted, are_all, *trace);

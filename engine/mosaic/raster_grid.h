@@ -200,6 +200,9 @@ class RasterGrid {
   GridWindow WindowOfPointBlock(std::int64_t block_column, std::int64_t block_row) const;
   Result<PointBlockPtr> BlockOfCells(std::vector<GridCell>& cells, const std::stop_token& stop) const;
 
+  // Whether the statistics say that a window of averages is void, and nothing fills it. False does not mean the
+  // contrary.
+  bool IsUnfilledVoid(int factor, const GridWindow& window) const;
   // Returns the pixel positions of the window's nodes for averages by `factor`.
   template <typename NodeGrid>
   NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
@@ -217,6 +220,7 @@ class RasterGrid {
   double Feather(int factor) const;
   // For calls that read no sample: checks that the file is unchanged if the raster grid has a single member.
   Result<void> CheckUnread() const;
+  Result<void> CheckUnread(int factor, const GridWindow& window) const;
 
   struct Counts {
     std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};

@@ -8,9 +8,17 @@
 #include <utility>
 #include <vector>
 
+#include "engine/common/box_index.h"
 #include "engine/raster/sample_grid.h"
 
 namespace terrace::dem {
+
+// The pixels of a window of averages.
+inline Box PixelsOf(const GridWindow& window, int factor) {
+  const auto pixel = [factor](std::int64_t average) { return static_cast<double>(average * factor); };
+  return {pixel(window.column), pixel(window.row), pixel(window.column + window.columns),
+          pixel(window.row + window.rows)};
+}
 
 inline std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::int64_t row) {
   return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
