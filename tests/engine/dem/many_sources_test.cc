@@ -477,5 +477,50 @@ TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
   }
 }
 
+// A collar of voids to the east; a hole has samples around it, from which it is filled.
+TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
+  const TempDir dir;
+  RasterSpec spec;
+  spec.width = 1200, spec.height = 600;
+  spec.geo_transform = {10, 0.001, 0, 20, 0, -0.001};
+  spec.nodata = -9999;
+  spec.value = [](int column, int row) {
+    const bool is_hole = column > 100 && column < 400 && row > 100 && row < 400;
+    return column >= 600 || is_hole ? -9999 : 100 + column;
+  };
+  const std::string path = WriteRaster(dir, spec);
+  std::vector<GridPlan> plans = PlanGrids({OpenRasterOrFail(path)});
+  const auto grid = RasterGrid::Make(std::move(plans.front()), {.max_void_gap = 8});
+  ASSERT_TRUE(grid);
+  const geo::Lattice lattice{11, 64};
+  const auto key_at = [&](double longitude, double latitude) {
+    const double tile = 180.0 / (1 << lattice.level);
+    return geo::TileKey{lattice.level, static_cast<std::int64_t>((longitude + 180) / tile),
+                        static_cast<std::int64_t>((latitude + 90) / tile)};
+  };
+  const auto read = [&](const geo::TileKey& key, std::vector<float>& smooth) {
+    const NodeWindow window = WindowOfTile(lattice, key);
+    std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
+                               SampleRules::kVoid);
+    GridTrace trace;
+    auto filled = grid->Fill(lattice, window, HeightDatum::kEllipsoid,
+                             {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
+    EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
+    return filled ? Result<GridTrace>(std::move(trace)) : tl::unexpected(filled.error());
+  };
+  std::vector<float> smooth;
+  const auto collar = read(key_at(11, 19.7), smooth);
+  ASSERT_TRUE(collar) << collar.error().message;
+  EXPECT_TRUE(collar->samples.empty());
+  EXPECT_TRUE(smooth.empty());
+  const auto hole = read(key_at(10.25, 19.75), smooth);
+  ASSERT_TRUE(hole) << hole.error().message;
+  EXPECT_FALSE(hole->samples.empty());
+  EXPECT_FALSE(smooth.empty());
+  // What was not read may not outlive its file either.
+  std::filesystem::remove(path);
+  EXPECT_FALSE(read(key_at(11, 19.7), smooth));
+}
+
 }  // namespace
 }  // namespace terrace::dem
