@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
+#include <vector>
+
+#include "engine/mosaic/feather_weights.h"
 
 namespace terrace::dem {
 namespace {
@@ -87,6 +91,36 @@ TEST(FillVoids, DoesNotDependOnTheWindow) {
       const float a = filled[static_cast<std::size_t>(r * core.columns + c)];
       const float b = truth[static_cast<std::size_t>((core.row + r) * kSide + core.column + c)];
       EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b)));
+    }
+  }
+}
+
+// The nearest void or place outside of `wide`, found among all of them.
+TEST(FeatherWeights, AreDistancesToTheNearestVoid) {
+  std::mt19937 random(5);
+  for (const int one_in : {3, 40, 100000}) {
+    const GridWindow wide{-7, 3, 41, 33}, core{1, 9, 27, 20};
+    std::vector<float> heights(static_cast<std::size_t>(wide.columns * wide.rows));
+    for (float& height : heights) height = random() % static_cast<unsigned>(one_in) == 0 ? kVoid : 5;
+    for (const auto& [column_step, row_step] : {std::pair(30.0, 30.0), std::pair(17.0, 31.0)}) {
+      const double length = 210;
+      const std::vector<float> weights = FeatherWeights(heights, wide, core, column_step, row_step, length);
+      for (std::int64_t r = 0; r < core.rows; ++r) {
+        for (std::int64_t c = 0; c < core.columns; ++c) {
+          double nearest = length;
+          for (std::int64_t y = -20; y < wide.rows + 20; ++y) {
+            for (std::int64_t x = -20; x < wide.columns + 20; ++x) {
+              const bool is_inside = x >= 0 && x < wide.columns && y >= 0 && y < wide.rows;
+              if (is_inside && !std::isnan(heights[static_cast<std::size_t>(y * wide.columns + x)])) continue;
+              const double east = static_cast<double>(core.column - wide.column + c - x) * column_step;
+              const double south = static_cast<double>(core.row - wide.row + r - y) * row_step;
+              nearest = std::min(nearest, std::hypot(east, south));
+            }
+          }
+          ASSERT_NEAR(weights[static_cast<std::size_t>(r * core.columns + c)], nearest / length, 1e-6)
+              << one_in << ' ' << c << ' ' << r;
+        }
+      }
     }
   }
 }
