@@ -77,6 +77,12 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
   if (written.ends_with(".json")) {
     return fmt::format("{} looks like a configuration: terrace serve --config {}", written, written);
   }
+  if (place.extension() == ".3tz") {
+    return fmt::format(
+        "{} has 3D Tiles for other programs; terrace serve needs the chunks of a bake without --form, or a file of "
+        "--form single",
+        written);
+  }
   for (const auto& [document, tiles] :
        {std::pair{"layer.json", "0"}, {"tiles.json", "0"}, {"tileset.json", "3dtiles"}}) {
     if (std::filesystem::exists(place / document, ignored) && std::filesystem::is_directory(place / tiles, ignored)) {

@@ -48,7 +48,12 @@ class Help(unittest.TestCase):
             self.assertEqual(result.returncode, 2)
             self.assertIn("which any file server serves", result.stderr)
             (folder / "manifest.json").write_text("{}")
+            self.assertIn("tiles.3tz has 3D Tiles for other programs; terrace serve needs", run("serve", folder / "tiles.3tz").stderr)
             self.assertIn(f"name its folder: terrace serve {place}\n", run("serve", str(folder / "manifest.json")).stderr)
+
+    def test_a_wrong_command_below_another_leads_to_its_own_help(self):
+        result = run("bake", "status")
+        self.assertEqual((result.returncode, result.stderr), (2, "terrace: --queue is required\nRun 'terrace bake status --help' for what is accepted.\n"))
 
     def test_a_bake_that_has_not_finished_says_so(self):
         with tempfile.TemporaryDirectory() as place:
