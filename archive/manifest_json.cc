@@ -253,7 +253,9 @@ Result<Manifest> ParseManifest(std::string_view text) {
   } catch (const Wrong& wrong) {
     return MakeError(ErrorCode::kInvalidArgument, "the manifest is wrong: {}", wrong.what());
   } catch (const nlohmann::json::exception& exception) {
-    return MakeError(ErrorCode::kInvalidArgument, "this is no manifest of an archive ({})", exception.what());
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "this is no manifest of an archive ({}); copy it again, or remove it and bake again",
+                     exception.what());
   }
 }
 

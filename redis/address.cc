@@ -7,7 +7,8 @@
 namespace terrace::redis {
 namespace {
 
-constexpr const char* kForm = "redis://[user[:password]@]HOST:PORT/DATABASE, or rediss:// for TLS";
+// Without a password: the shared cache takes none in its URL, and a queue better has it in a file.
+constexpr const char* kForm = "redis://[user@]HOST:PORT/DATABASE, or rediss:// for TLS";
 
 // Nothing: a percent sign without two hexadecimal digits.
 std::optional<std::string> Decoded(std::string_view text) {

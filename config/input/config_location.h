@@ -43,6 +43,8 @@ class ConfigLocation {
   const std::filesystem::path& directory() const { return directory_; }
   // Makes a path absolute.
   std::string Resolve(const std::filesystem::path& path) const {
+    // The system would read the path only up to the character, and so open another file.
+    if (path.native().find('\0') != std::string::npos) Fail("has the character \\u0000, which no path has; remove it");
     if (!is_command_line_) return (directory_ / path).string();
     if (directory_.empty() && path.is_relative()) Fail(kNoWorkingDirectory);
     return FromWorkingDirectory(directory_, path);

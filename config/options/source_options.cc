@@ -65,6 +65,10 @@ Codec<SourceConfig> SourcePath() {
             if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
               return place.Expected("a path, a glob or a folder");
             }
+            // The system would read the path only up to the character, and so open another file.
+            if (value.get_ref<const std::string&>().find('\0') != std::string::npos) {
+              return place.Fail("has the character \\u0000, which no path has; remove it");
+            }
             source.written = value.get<std::string>();
           },
           [](const SourceConfig& source) { return Json(source.written); }, nullptr, Json::parse(kNonEmptyText)};

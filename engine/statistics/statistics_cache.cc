@@ -193,7 +193,11 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::sh
   const std::string partial = path + ".partial";
   for (bool waiting = false;;) {
     OpenFile file(::open(partial.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-    if (!file.is_open()) return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", partial, ErrorText());
+    if (!file.is_open()) {
+      // A folder that could not be created is the reason why the file cannot be.
+      const std::string reason = failed ? failed.message() : ErrorText();
+      return MakeError(ErrorCode::kUnavailable, "{}: cannot be written: {}", partial, reason);
+    }
     if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
       if (errno != EWOULDBLOCK) {
         return MakeError(ErrorCode::kUnavailable, "{}: cannot be locked: {}", partial, ErrorText());

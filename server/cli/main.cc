@@ -18,8 +18,11 @@ namespace terrace::cli {
 namespace {
 
 int ReportUsage(const CLI::App& program, const CLI::ParseError& error, const std::vector<std::string>& arguments) {
-  const std::vector<CLI::App*> chosen = program.get_subcommands();
-  const std::string name = chosen.empty() ? "" : chosen.front()->get_name() + ' ';
+  std::string name;  // "bake status "
+  for (const CLI::App* app = &program; !app->get_subcommands().empty();) {
+    app = app->get_subcommands().front();
+    name += app->get_name() + ' ';
+  }
   std::fprintf(stderr, "terrace: %s\nRun 'terrace %s--help' for what is accepted.\n",
                ExplainUsage(program, error, arguments).c_str(), name.c_str());
   return kExitUsage;

@@ -22,6 +22,11 @@ namespace {
 namespace http = boost::beast::http;
 using Fields = http::request_parser<http::empty_body>::value_type;
 
+static_assert(kMaxTargetBytes == 8 * 1024 && kMaxHeadBytes == 16 * 1024);
+constexpr std::string_view kLongTarget =
+    "the request target has more than 8 KiB; many locations and rays fit into the body of a POST";
+constexpr std::string_view kLongHead = "the head of the request has more than 16 KiB; send fewer or shorter headers";
+
 tl::unexpected<BadRequest> Bad(int status, std::string_view detail) {
   return tl::unexpected<BadRequest>(BadRequest{status, detail});
 }
@@ -70,7 +75,8 @@ std::optional<std::int64_t> PlainLength(const Fields& fields) {
 // with `Transfer-Encoding: gzip` as having no body and parses the following bytes as another request; this check
 // prevents that.
 const char* FramingProblem(const Fields& fields) {
-  if (fields.count(http::field::transfer_encoding) > 0) return "Transfer-Encoding is not accepted";
+  if (fields.count(http::field::transfer_encoding) > 0)
+    return "Transfer-Encoding is not accepted; send the length of the body as Content-Length";
   const auto lengths = fields.count(http::field::content_length);
   if (lengths > 1) return "more than one Content-Length";
   if (lengths == 0 || fields[http::field::content_length] == "0") return nullptr;
@@ -186,9 +192,9 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
   const std::string_view head = bytes.substr(0, end);  // all of it if there is no end
   // The longest method that is answered, two spaces and " HTTP/1.1" around the target.
   const std::size_t first_line = head.find("\r\n");
-  if (std::min(first_line, head.size()) > kMaxTargetBytes + 18) return Bad(414, "the request target is too long");
+  if (std::min(first_line, head.size()) > kMaxTargetBytes + 18) return Bad(414, kLongTarget);
   if (end == std::string_view::npos ? bytes.size() >= kMaxHeadBytes : end + 4 > kMaxHeadBytes) {
-    return Bad(431, "the request header is too large");
+    return Bad(431, kLongHead);
   }
   for (std::size_t at = head.find('\n', from); at != std::string_view::npos; at = head.find('\n', at + 1)) {
     if (at == 0 || head[at - 1] != '\r') return Bad(400, "a line ends without CR");
@@ -240,7 +246,7 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
   if (!parser.is_header_done()) return Bad(400, "malformed request");
 
   const Fields& fields = parser.get();
-  if (fields.target().size() > kMaxTargetBytes) return Bad(414, "the request target is too long");
+  if (fields.target().size() > kMaxTargetBytes) return Bad(414, kLongTarget);
   if (const char* problem = FramingProblem(fields)) return Bad(400, problem);
   if (const char* problem = HostProblem(fields)) return Bad(400, problem);
 

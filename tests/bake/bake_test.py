@@ -260,6 +260,12 @@ class Bake(BakeCase):
         self.expect_equal(place)
 
     def test_what_makes_no_sense_is_refused(self):
+        broken = self.scratch / "broken.json"
+        broken.write_text('{"listen": 5}')
+        for config, said in ((broken, "/listen: must be text"), (self.scratch / "none.json", "cannot be read")):
+            done = subprocess.run([BINARY, "bake", "--config", config, "--dry-run"], text=True, capture_output=True)
+            self.assertEqual(done.returncode, 2)
+            self.assertIn(f"terrace: {config}: {said}", done.stderr)
         other = self.place("other")
         other.mkdir()
         (other / "photo.jpg").write_text("x")

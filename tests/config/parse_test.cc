@@ -108,6 +108,13 @@ TEST(ParseConfig, KnowsWhatOthersCallAKey) {
               ElementsAre(IsError("/cache", "did you mean \"cache_bytes\" or \"disk_cache\"?")));
 }
 
+TEST(ParseConfig, RefusesPathsWithACharacterThatEndsThem) {
+  EXPECT_THAT(ErrorsOf(R"({"viewer": "a\u0000b", "disk_cache": {"directory": "a\u0000b"},
+                           "datasets": [{"name": "a", "sources": ["a\u0000b"]}]})"),
+              ElementsAre(IsError("/viewer", "u0000"), IsError("/disk_cache/directory", "u0000"),
+                          IsError("/datasets/0/sources/0", "u0000")));
+}
+
 TEST(ParseConfig, SaysWhereAMisplacedKeyBelongs) {
   EXPECT_THAT(ErrorsOf(R"({"floor": 0, "error": 5, "vertical": "egm96", "tile_bytes": 0, "certificate": "a.pem"})"),
               ElementsAre(IsError("/floor", "is no key of this object; \"floor\" belongs in an object of \"datasets\""),

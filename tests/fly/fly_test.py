@@ -91,6 +91,19 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(part, done.stderr)
 
+    def test_says_before_the_flight_that_a_report_cannot_be_written(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "path.csv"
+            path.write_text("-84.3,36.3,3000\n-84.2,36.35,3000\n")
+            for option, file, code, part in (("--report", f"{folder}/no/a.html", 1, "cannot be written: No such file or directory"),
+                                             ("--urls", f"{folder}/no/a.txt", 1, "cannot be written: No such file or directory"),
+                                             ("--report", path, 2, "is the file of --path")):
+                done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", "--path", path, option, file], capture_output=True,
+                                      text=True, timeout=60, check=False)
+                self.assertEqual((done.returncode, done.stdout), (code, ""))
+                self.assertIn(f"terrace: {file} {part}", done.stderr)
+            self.assertTrue(path.read_text().startswith("-84.3"))
+
     def test_says_that_there_is_no_dataset(self):
         status, report = fly(UPSTREAM, path="nothing")
         self.assertEqual(status, 1)

@@ -36,6 +36,8 @@ TEST(RedisAddress, IsRefusedWithoutRepeatingThePassword) {
     ASSERT_FALSE(address) << url;
     EXPECT_EQ(address.error().code, ErrorCode::kInvalidArgument);
     EXPECT_EQ(address.error().message.find("sec"), std::string::npos) << address.error().message;
+    // The shared cache takes no password in its URL.
+    EXPECT_EQ(address.error().message.find("password@"), std::string::npos) << address.error().message;
   }
 }
 

@@ -195,6 +195,9 @@ Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::Co
     config::ConfigResult loaded = config::LoadConfig(config::FromWorkingDirectory(directory, arguments.config));
     if (!loaded) {
       errors = std::move(loaded).error();
+      for (config::ConfigError& error : errors) {
+        error = {"", fmt::format("{}: {}", arguments.config, error.Text())};
+      }
       return MakeError(ErrorCode::kInvalidArgument, "configuration {}", arguments.config);
     }
     input.config = *std::move(loaded);

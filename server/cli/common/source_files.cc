@@ -80,6 +80,12 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
                      "dataset {}: {}: {}; give the folder or file that 'terrace bake' wrote, or \"sources\"",
                      dataset.name, dataset.baked, ErrorText());
   }
+  for (const std::string& file : dataset.edits) {
+    if (::access(file.c_str(), R_OK) == 0) continue;
+    const int reason = errno;
+    return MakeError(ErrorCode::kNotFound, "dataset {}: edits: {}: {}; name a GeoJSON file{}", dataset.name, file,
+                     ErrorText(reason), reason == ENOENT ? SimilarFile(file) : "");
+  }
   if (Result<void> readable = read(dataset.imagery.image, ""); !readable) return readable;
   return read(dataset.water.mask, ", or for a sea level a number of metres");
 }

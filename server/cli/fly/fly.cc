@@ -5,11 +5,15 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <system_error>
 #include <vector>
 
+#include "engine/core/errno_text.h"
+#include "engine/core/result.h"
 #include "fly/flight/flight.h"
 #include "fly/report/html_report.h"
 #include "fly/report/requirement.h"
@@ -29,8 +33,19 @@ bool WriteFile(const std::string& path, const std::string& text) {
   file << text;
   file.close();
   if (file) return true;
-  std::fprintf(stderr, "terrace: %s cannot be written\n", path.c_str());
+  std::fprintf(stderr, "terrace: %s cannot be written: %s\n", path.c_str(), ErrorText().c_str());
   return false;
+}
+
+// Before a flight, which may take hours. An empty file is left; the report replaces it.
+Result<void> CheckWritable(const std::string& path, const std::string& read) {
+  std::error_code ignored;
+  if (std::filesystem::equivalent(path, read, ignored)) {
+    return MakeError(ErrorCode::kInvalidArgument, "{} is the file of --path; give another name", path);
+  }
+  if (path.empty() || std::ofstream(path, std::ios::app)) return {};
+  return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; name a file in a folder that is writable", path,
+                   ErrorText());
 }
 
 int RunFly(const FlyArguments& arguments) {
@@ -38,6 +53,11 @@ int RunFly(const FlyArguments& arguments) {
   if (!options) return Fail(options.error().message, kExitUsage);
   const Result<std::vector<fly::Requirement>> requirements = fly::ParseRequirements(arguments.require);
   if (!requirements) return Fail(requirements.error().message, kExitUsage);
+  for (const std::string& path : {arguments.report, arguments.urls}) {
+    if (const Result<void> writable = CheckWritable(path, arguments.path); !writable) {
+      return Fail(writable.error());
+    }
+  }
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
   fly::Statistics statistics(options->clients);

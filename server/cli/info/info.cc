@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -27,6 +26,7 @@
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
+#include "server/cli/common/output_file.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/common/source_files.h"
 #include "server/cli/info/edits_picture.h"
@@ -184,10 +184,26 @@ int Draw(const dem::DemSource& source, const std::string& path) {
   if (source.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
   const Result<std::string> png = DrawEdits(source);
   if (!png) return Fail(png.error().message, kExitFailure);
-  std::ofstream file(path, std::ios::binary);
-  file << *png;
-  file.close();
-  return file ? kExitOk : Fail(path + ": cannot be written", kExitFailure);
+  Result<OutputFile> file = OutputFile::Open(path);
+  if (!file) return Fail(file.error().message, kExitFailure);
+  file->stream() << *png;
+  const Result<void> written = file->Commit();
+  return written ? kExitOk : Fail(written.error().message, kExitFailure);
+}
+
+// Whether the picture would replace a file that is read.
+bool IsRead(const std::string& picture, const std::vector<std::vector<config::SourceConfig>>& datasets,
+            const std::vector<std::string>& edits) {
+  const auto is_picture = [&](const std::string& file) {
+    std::error_code ignored;
+    return std::filesystem::equivalent(picture, file, ignored);
+  };
+  for (const auto& sources : datasets) {
+    for (const config::SourceConfig& source : sources) {
+      if (std::ranges::any_of(source.files, is_picture)) return true;
+    }
+  }
+  return std::ranges::any_of(edits, is_picture);
 }
 
 int Info(const InfoArguments& arguments) {
@@ -205,7 +221,11 @@ int Info(const InfoArguments& arguments) {
   const dem::RasterCache cache = OpenCache(config);
   std::string problem;
   nlohmann::json all = nlohmann::json::array();
-  for (const auto& sources : Datasets(dems, mosaic, exit_code)) {
+  const auto datasets = Datasets(dems, mosaic, exit_code);
+  if (!draw.empty() && IsRead(draw, datasets, flags.edits)) {
+    return Fail(fmt::format("--draw: {} is a file that is read; give the picture another name", draw), kExitUsage);
+  }
+  for (const auto& sources : datasets) {
     const std::string name = NameOf(sources);
     Progress progress((cache.folder ? "preparing " : "reading ") + name, FileCount(sources));
     config::DatasetConfig dataset = flags;

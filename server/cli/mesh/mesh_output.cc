@@ -27,7 +27,8 @@ Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
                                const std::vector<std::array<std::uint32_t, 3>>& triangles,
                                const proto::GridPlacement& placement, const std::vector<proto::VertexColor>& colors) {
   Result<void> written = proto::WriteMesh(file_.stream(), format_, std::move(vertices), triangles, colors, placement);
-  return written ? file_.Commit() : written;
+  if (!written) return MakeError(written.error().code, "{}: {}", file_.path(), written.error().message);
+  return file_.Commit();
 }
 
 Result<void> MeshOutput::Write(const std::string& bytes) {

@@ -11,7 +11,7 @@
 #include "engine/core/result.h"
 #include "engine/tin/mesh/height_field.h"
 #include "proto/gltf/mesh_file.h"
-#include "server/cli/mesh/output_file.h"
+#include "server/cli/common/output_file.h"
 
 namespace terrace::cli {
 

@@ -64,6 +64,10 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
     return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
                        folder.empty() ? "." : folder);
   }
+  if (std::filesystem::exists(place / "bake.json", ignored) && !IsArchive(path)) {
+    return fmt::format(
+        "{} is a bake that has not finished: it has no manifest; run the same 'terrace bake' again to go on", written);
+  }
   if (written.starts_with("/vsi") && !place.has_extension()) {
     return fmt::format(
         "{} has no extension, so it is no raster; name an archive in a bucket in a configuration: \"baked\": \"{}\", "
@@ -72,6 +76,12 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
   }
   if (written.ends_with(".json")) {
     return fmt::format("{} looks like a configuration: terrace serve --config {}", written, written);
+  }
+  if (place.extension() == ".3tz") {
+    return fmt::format(
+        "{} has 3D Tiles for other programs; terrace serve needs the chunks of a bake without --form, or a file of "
+        "--form single",
+        written);
   }
   for (const auto& [document, tiles] :
        {std::pair{"layer.json", "0"}, {"tiles.json", "0"}, {"tileset.json", "3dtiles"}}) {

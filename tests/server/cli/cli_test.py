@@ -48,7 +48,19 @@ class Help(unittest.TestCase):
             self.assertEqual(result.returncode, 2)
             self.assertIn("which any file server serves", result.stderr)
             (folder / "manifest.json").write_text("{}")
+            self.assertIn("tiles.3tz has 3D Tiles for other programs; terrace serve needs", run("serve", folder / "tiles.3tz").stderr)
             self.assertIn(f"name its folder: terrace serve {place}\n", run("serve", str(folder / "manifest.json")).stderr)
+
+    def test_a_wrong_command_below_another_leads_to_its_own_help(self):
+        result = run("bake", "status")
+        self.assertEqual((result.returncode, result.stderr), (2, "terrace: --queue is required\nRun 'terrace bake status --help' for what is accepted.\n"))
+
+    def test_a_bake_that_has_not_finished_says_so(self):
+        with tempfile.TemporaryDirectory() as place:
+            (pathlib.Path(place) / "bake.json").write_text("{}")
+            result = run("serve", place)
+            self.assertEqual(result.returncode, 2)
+            self.assertIn(f"{place} is a bake that has not finished", result.stderr)
 
     def test_a_file_in_place_of_a_command_is_served(self):
         self.assertIn(f"terrace: unknown command {__file__}; did you mean terrace serve {__file__}?\n", run(__file__).stderr)
@@ -215,6 +227,11 @@ class Config(unittest.TestCase):
                 self.assertEqual((result.returncode, result.stdout), (code, ""), (options, result.stderr))
                 for word in words:
                     self.assertIn(word, result.stderr)
+        for missing in ({"edits": ["a.geojson"]}, {"imagery": {"image": "a.tif"}}, {"water": {"mask": "a.tif"}}):
+            file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [dem], **missing}]}))
+            result = run("serve", "--config", file, "--check-config")
+            self.assertEqual(result.returncode, 1, missing)
+            self.assertRegex(result.stderr, f"dataset a: .*{self.folder}/a.(geojson|tif): No such file or directory; ")
         # Files of a folder that are not rasters do not belong to the dataset.
         (self.folder / "dems").mkdir()
         (self.folder / "dems/a.tif").symlink_to(dem)

@@ -29,12 +29,14 @@ class UnfinishedFile {
 
 class OutputFile {
  public:
-  // If `path` is a symbolic link, writes its target. kUnavailable: the folder is missing or not writable, or the
-  // existing file is not writable.
+  // If `path` is a symbolic link, writes its target. kUnavailable: the folder is missing or not writable, the existing
+  // file is not writable, or it is a device or a pipe.
   static Result<OutputFile> Open(const std::string& path);
 
   // Without Commit, the new file is removed (UnfinishedFile) and the old file at `path` stays.
   std::ostream& stream() { return stream_; }
+
+  const std::string& path() const { return path_; }  // as given
 
   // Replaces the file at `path` and keeps its permissions. kUnavailable: not all data could be written to the disk.
   Result<void> Commit();

@@ -1,4 +1,4 @@
-#include "server/cli/mesh/output_file.h"
+#include "server/cli/common/output_file.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -76,6 +76,10 @@ Result<OutputFile> OutputFile::Open(const std::string& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
     return MakeError(ErrorCode::kUnavailable, "{} is a folder; name a file in it", path);
+  }
+  // A rename would replace a device or a pipe by a file.
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) {
+    return MakeError(ErrorCode::kUnavailable, "{} is a device or a pipe; name a file", path);
   }
   if (fs::exists(path, ignored) && ::access(path.c_str(), W_OK) != 0) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; remove it, or give another name", path,
