@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "engine/gdal/driver_list.h"
+#include "engine/gdal/file_end.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/source_policy.h"
 #include "engine/gdal/vrt_check.h"
@@ -183,6 +184,23 @@ class BlockEnds {
   std::uint64_t last_ = 0;
 };
 
+// Of a GeoTIFF.
+std::uint64_t EndOfBlocks(GDALDataset& dataset, const std::string& path, int bands) {
+  std::error_code unknown;
+  const bool has_own_overviews = !std::filesystem::exists(path + ".ovr", unknown);
+  const bool has_own_mask = !std::filesystem::exists(path + ".msk", unknown);
+  BlockEnds ends(dataset);
+  for (int number = 1; number <= std::min(bands, dataset.GetRasterCount()); ++number) {
+    GDALRasterBand& band = *dataset.GetRasterBand(number);
+    ends.Add(band);
+    for (int i = 0; has_own_overviews && i < band.GetOverviewCount(); ++i) {
+      if (GDALRasterBand* const overview = band.GetOverview(i)) ends.Add(*overview);
+    }
+    if (has_own_mask && HasMaskBand(band)) ends.Add(*band.GetMaskBand());
+  }
+  return ends.last();
+}
+
 }  // namespace
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
@@ -245,25 +263,16 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
 }
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
-  if (!EQUAL(dataset.GetDriverName(), "GTiff") || IsRemote(path)) return {};
+  if (IsRemote(path)) return {};
   std::error_code unknown;
   const std::uint64_t size = std::filesystem::file_size(path, unknown);
   if (unknown) return {};
-  const bool has_own_overviews = !std::filesystem::exists(path + ".ovr", unknown);
-  const bool has_own_mask = !std::filesystem::exists(path + ".msk", unknown);
-  BlockEnds ends(dataset);
-  for (int number = 1; number <= std::min(bands, dataset.GetRasterCount()); ++number) {
-    GDALRasterBand& band = *dataset.GetRasterBand(number);
-    ends.Add(band);
-    for (int i = 0; has_own_overviews && i < band.GetOverviewCount(); ++i) {
-      if (GDALRasterBand* const overview = band.GetOverview(i)) ends.Add(*overview);
-    }
-    if (has_own_mask && HasMaskBand(band)) ends.Add(*band.GetMaskBand());
-  }
-  if (ends.last() <= size) return {};
+  const std::uint64_t end =
+      EQUAL(dataset.GetDriverName(), "GTiff") ? EndOfBlocks(dataset, path, bands) : EndOfSamples(dataset, path);
+  if (end <= size) return {};
   return MakeError(ErrorCode::kUnavailable,
                    "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
-                   size, ends.last());
+                   size, end);
 }
 
 bool HasMaskBand(GDALRasterBand& band) {

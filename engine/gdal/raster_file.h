@@ -26,8 +26,9 @@ bool IsRaster(const std::string& path);
 // OpenRaster without the checks, for further handles on a file that passed them. Null: the file cannot be opened.
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 
-// kUnavailable: a GeoTIFF is truncated within the samples, overviews or mask of its first bands. A truncated file can
-// be opened, but reads of the missing part would fail later, in single tiles. Remote files are not checked.
+// kUnavailable: a GeoTIFF is truncated within the samples, overviews or mask of its first bands, or an ENVI or classic
+// netCDF file is truncated. A truncated file can be opened, but reads of the missing part would fail later, in single
+// tiles; of ENVI and netCDF they would be zeros. Remote files are not checked.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
 // Returns the file and all files that GDAL reads with it: overviews, masks, and the parts of a mosaic with their own.

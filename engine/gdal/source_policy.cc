@@ -162,6 +162,12 @@ Result<void> CheckPlainFile(const std::string& path) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: a file name with a control character; rename the file",
                      EscapeControls(path));
   }
+  for (const char* archive : {"/vsizip/", "/vsitar/", "/vsigzip/", "/vsi7z/", "/vsirar/"}) {
+    if (!path.starts_with(archive)) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: is a part of an archive, and archives are not read; extract it and give the path of the file",
+                     path);
+  }
   if (path.starts_with("/vsi")) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: is no file on this machine, and its beginning is not among the allowed_prefixes", path);

@@ -55,6 +55,7 @@ Result<DetectedNodata> FindVoidsOf(const RasterHeights& raster, GDALRasterBand& 
 Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& options) {
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
+  if (auto complete = CheckComplete(**dataset, path); !complete) return tl::unexpected(complete.error());
   RasterHeights raster;
   raster.width = (*dataset)->GetRasterXSize();
   raster.height = (*dataset)->GetRasterYSize();

@@ -371,6 +371,14 @@ TEST_F(SourcePolicyTest, RefusesItselfWithTheReason) {
   EXPECT_FALSE(OpenRaster((outside_ / "secret.tif").string())) << "a refused policy replaced the one in force";
 }
 
+TEST(SourceNames, PartsOfArchivesAreToBeExtracted) {
+  for (const char* name : {"/vsizip/a.zip/b.tif", "/vsigzip/b.tif.gz", "/vsitar//data/a.tar/b.tif"}) {
+    const auto checked = CheckSourceName(name);
+    ASSERT_FALSE(checked);
+    EXPECT_NE(checked.error().message.find("extract it"), std::string::npos) << checked.error().message;
+  }
+}
+
 TEST(GdalEnvironment, IsClearedButForTheFoldersOfData) {
   ::setenv("GDAL_SKIP", "GTiff", 1);
   ::setenv("CPL_DEBUG", "ON", 1);

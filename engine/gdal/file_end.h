@@ -1,0 +1,20 @@
+// Where the samples of formats end whose drivers return zeros beyond the end of a file, without an error.
+#pragma once
+
+#include <gdal_priv.h>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace terrace::dem {
+
+// Returns a lower bound of the size in bytes of an ENVI or a classic netCDF file that has all its samples; 0 if nothing
+// is known, as for files of other formats.
+std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path);
+
+// The same for the first bytes of a netCDF file. 0: it is of no classic format (CDF-1, CDF-2, CDF-5), as netCDF-4 is,
+// its header is damaged, or it is not complete in `bytes`.
+std::uint64_t EndOfClassicNetCdf(std::string_view bytes);
+
+}  // namespace terrace::dem
