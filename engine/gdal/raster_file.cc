@@ -1,6 +1,7 @@
 #include "engine/gdal/raster_file.h"
 
 #include <cpl_conv.h>
+#include <cpl_minixml.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -201,6 +202,25 @@ std::uint64_t EndOfBlocks(GDALDataset& dataset, const std::string& path, int ban
   return ends.last();
 }
 
+// GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare.
+Result<void> CheckSidecars(GDALDataset& dataset, const std::string& path) {
+  if (IsRemote(path)) return {};
+  const auto refuse = [](const std::string& file, std::string_view what) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {}, and is ignored by GDAL; write it again, or remove it", file,
+                     what);
+  };
+  std::error_code unknown;
+  const std::string mask = path + ".msk", description = path + ".aux.xml";
+  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) {
+    return refuse(mask, "cannot be read as a mask");
+  }
+  if (std::filesystem::exists(description, unknown) && !CPLXMLTreeCloser(CPLParseXMLFile(description.c_str()))) {
+    ForgetGdalError();
+    return refuse(description, "cannot be read as XML");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
@@ -259,6 +279,7 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   }
   if (auto format = CheckRemoteFormat(*dataset, path); !format) return tl::unexpected(format.error());
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
+  if (auto sidecars = CheckSidecars(*dataset, path); !sidecars) return tl::unexpected(sidecars.error());
   return dataset;
 }
 

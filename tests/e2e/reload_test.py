@@ -404,6 +404,13 @@ class Configuration(ReloadTest):
         self.assertTrue(eventually(lambda: "until then it takes a token to see it" in server.log()), server.log())
         self.assertEqual(server.log().count(warning), 1)  # unchanged since the start
 
+    def test_a_token_for_a_dataset_that_is_not_there_is_told(self):
+        token = {"name": "team", "token": "0123456789abcdef", "datasets": ["b", "jacksboo"]}
+        datasets = [self.dataset("b"), self.dataset("jacksboro")]
+        server = self.serve("--config", self.write_config({"tokens": [token], "datasets": datasets}))
+        self.assertIn('tokens: the token team is for dataset jacksboo, which is not there; did you mean "jacksboro"?', server.log())
+        self.assertNotIn("dataset b,", server.log())
+
     def test_a_glob_finds_what_is_put_into_its_folder(self):
         home = self.folder / "dems"
         home.mkdir()

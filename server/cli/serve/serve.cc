@@ -18,6 +18,7 @@
 #include "config/config.h"
 #include "config/file/parse.h"
 #include "config/options/options.h"
+#include "engine/core/nearest_name.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/option_flags.h"
@@ -55,6 +56,19 @@ config::Config WithViewer(config::Config config) {
   if (!std::filesystem::exists(config.viewer.directory, ignored))
     config.viewer.directory = above.parent_path() / kPlace;
   return config;
+}
+
+// A dataset may come with a reload; a wrong name refuses the token's clients with no other sign.
+void WarnAboutTokens(const config::Config& config) {
+  std::vector<KnownName> known;
+  for (const config::DatasetConfig& dataset : config.datasets) known.push_back({dataset.name});
+  for (const config::TokenConfig& token : config.tokens) {
+    for (const std::string& name : token.datasets) {
+      if (std::ranges::find(known, name, &KnownName::name) != known.end()) continue;
+      spdlog::warn("tokens: the token {} is for dataset {}, which is not there{}", token.name, name,
+                   DidYouMean(Quoted(NearestNames(name, known))));
+    }
+  }
 }
 
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
@@ -98,6 +112,7 @@ int Serve(const ServeArguments& arguments) {
     spdlog::warn("viewer: {} is not there: / lists the datasets; set `viewer` to a folder with its files, or to false",
                  options.config.viewer.directory.string());
   }
+  WarnAboutTokens(config);
   options.config.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);
   dem::SetOpenSources(budget->open_sources, budget->vrt_parts);

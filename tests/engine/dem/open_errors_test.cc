@@ -3,6 +3,7 @@
 
 #include <fstream>
 #include <limits>
+#include <string>
 
 #include "engine/gdal/raster_file.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -104,6 +105,23 @@ TEST(OpenErrors, NameDamagedFiles) {
   const std::string path = WriteRaster(dir, {.width = 600, .height = 600});
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   ExpectRefused(path, {});
+}
+
+// GDAL would make heights of the voids that they declare.
+TEST(OpenErrors, NameDamagedSidecars) {
+  const TempDir dir;
+  for (const std::string& text : {std::string(), std::string("<PAMDataset><PAMRasterBand"), std::string("garbage")}) {
+    const std::string path = WriteRaster(dir, {});
+    for (const char* ending : {".msk", ".aux.xml"}) {
+      const std::string sidecar = path + ending;
+      std::ofstream(sidecar, std::ios::binary) << text;
+      ExpectRefused(path, {sidecar + ": cannot be read", "remove it"});
+      std::filesystem::remove(sidecar);
+    }
+  }
+  const std::string path = WriteRaster(dir, {});
+  std::ofstream(path + ".aux.xml") << "<PAMDataset></PAMDataset>";
+  EXPECT_TRUE(OpenRaster(path).has_value());
 }
 
 }  // namespace
