@@ -202,22 +202,23 @@ std::uint64_t EndOfBlocks(GDALDataset& dataset, const std::string& path, int ban
   return ends.last();
 }
 
+bool IsXml(const std::string& file) {
+  const CPLXMLTreeCloser tree(CPLParseXMLFile(file.c_str()));
+  ForgetGdalError();
+  return tree != nullptr && tree->eType == CXT_Element;
+}
+
 // GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare.
 Result<void> CheckSidecars(GDALDataset& dataset, const std::string& path) {
   if (IsRemote(path)) return {};
-  const auto refuse = [](const std::string& file, std::string_view what) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: {}, and is ignored by GDAL; write it again, or remove it", file,
-                     what);
+  const auto refuse = [](const std::string& file, std::string_view format) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: cannot be read as {}, and GDAL ignores it; write it again, or remove it", file, format);
   };
   std::error_code unknown;
   const std::string mask = path + ".msk", description = path + ".aux.xml";
-  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) {
-    return refuse(mask, "cannot be read as a mask");
-  }
-  if (std::filesystem::exists(description, unknown) && !CPLXMLTreeCloser(CPLParseXMLFile(description.c_str()))) {
-    ForgetGdalError();
-    return refuse(description, "cannot be read as XML");
-  }
+  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) return refuse(mask, "a mask");
+  if (std::filesystem::exists(description, unknown) && !IsXml(description)) return refuse(description, "XML");
   return {};
 }
 
