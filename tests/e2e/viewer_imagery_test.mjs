@@ -89,7 +89,12 @@ describe('imagery in the viewer', { skip: hasGdal ? false : 'needs gdal-bin' }, 
     }, undefined, kWait);
     const isMagenta = (pixel) => (pixel & 255) > 1.5 * ((pixel >> 8) & 255) + 30 && ((pixel >> 16) & 255) > 1.5 * ((pixel >> 8) & 255) + 30;
     await drawn();
-    const before = await pixels();
+    // Until nothing changes any more: on a slow machine some tiles come late.
+    let before = await pixels();
+    for (let last = []; before.some((pixel, i) => pixel !== last[i]); before = await pixels()) {
+      last = before;
+      await page.waitForTimeout(1000);
+    }
     assert.ok(!before.some(isMagenta));
     await page.locator('#contours').check();
     // Until all tiles are drawn again, most pixels differ.
