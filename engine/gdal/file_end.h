@@ -1,4 +1,5 @@
-// Where the samples of formats end whose drivers return zeros beyond the end of a file, without an error.
+// The end of the samples in files of ENVI and netCDF. GDAL's drivers of these formats return zeros beyond the end of a
+// file, without an error.
 #pragma once
 
 #include <gdal_priv.h>

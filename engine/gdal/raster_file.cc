@@ -202,23 +202,61 @@ std::uint64_t EndOfBlocks(GDALDataset& dataset, const std::string& path, int ban
   return ends.last();
 }
 
-bool IsXml(const std::string& file) {
+// GDAL reads no description that begins with an XML declaration (`<?xml version="1.0"?>`).
+bool IsReadableDescription(const std::string& file) {
   const CPLXMLTreeCloser tree(CPLParseXMLFile(file.c_str()));
   ForgetGdalError();
-  return tree != nullptr && tree->eType == CXT_Element;
+  return tree != nullptr && tree->eType == CXT_Element && tree->pszValue[0] != '?';
 }
 
 // GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare.
-Result<void> CheckSidecars(GDALDataset& dataset, const std::string& path) {
+Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path) {
   if (IsRemote(path)) return {};
-  const auto refuse = [](const std::string& file, std::string_view format) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: cannot be read as {}, and GDAL ignores it; write it again, or remove it", file, format);
+  const auto refuse = [](const std::string& file, std::string_view what) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: is not used by GDAL: {}; write it again, or remove it", file,
+                     what);
   };
   std::error_code unknown;
   const std::string mask = path + ".msk", description = path + ".aux.xml";
-  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) return refuse(mask, "a mask");
-  if (std::filesystem::exists(description, unknown) && !IsXml(description)) return refuse(description, "XML");
+  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) {
+    return refuse(mask, "it cannot be read as a raster, or lacks the metadata INTERNAL_MASK_FLAGS_1=2");
+  }
+  if (std::filesystem::exists(description, unknown) && !IsReadableDescription(description)) {
+    return refuse(description, "it cannot be read as XML, or begins with an XML declaration (\"<?xml\")");
+  }
+  return {};
+}
+
+bool HasSidecar(const std::string& path) {
+  std::error_code unknown;
+  return std::filesystem::exists(path + ".msk", unknown) || std::filesystem::exists(path + ".aux.xml", unknown);
+}
+
+Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) {
+  std::error_code unknown;
+  const std::uint64_t size = std::filesystem::file_size(path, unknown);
+  if (unknown) return {};
+  const std::uint64_t end =
+      EQUAL(dataset.GetDriverName(), "GTiff") ? EndOfBlocks(dataset, path, bands) : EndOfSamples(dataset, path);
+  if (end <= size) return {};
+  return MakeError(ErrorCode::kUnavailable,
+                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
+                   size, end);
+}
+
+// GDAL opens a part of a VRT when it reads from it. Of a GeoTIFF without sidecars it reports what it cannot read; of
+// other parts it would return zeros or heights for voids, so that they are opened here.
+Result<void> CheckParts(const std::string& vrt, int bands) {
+  for (const std::string& part : PartsOfVrt(vrt)) {
+    if (IsRemote(part) || LooksLikeVrt(part)) continue;  // the list contains the parts of nested VRTs
+    GDALDriverH const driver = GDALIdentifyDriverEx(part.c_str(), GDAL_OF_RASTER, nullptr, nullptr);
+    if (driver != nullptr && EQUAL(GDALGetDriverShortName(driver), "GTiff") && !HasSidecar(part)) continue;
+    const GDALDatasetUniquePtr dataset = ReopenRaster(part);
+    if (dataset == nullptr || dataset->GetRasterCount() < 1) continue;  // reads of it fail
+    auto checked = CheckSidecarsAreRead(*dataset, part);
+    if (checked) checked = CheckEnd(*dataset, part, bands);
+    if (!checked) return MakeError(checked.error().code, "{}: a part of it: {}", vrt, checked.error().message);
+  }
   return {};
 }
 
@@ -280,21 +318,15 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   }
   if (auto format = CheckRemoteFormat(*dataset, path); !format) return tl::unexpected(format.error());
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
-  if (auto sidecars = CheckSidecars(*dataset, path); !sidecars) return tl::unexpected(sidecars.error());
+  // An overview need not have a mask of its own.
+  if (overview >= 0) return dataset;
+  if (auto sidecars = CheckSidecarsAreRead(*dataset, path); !sidecars) return tl::unexpected(sidecars.error());
   return dataset;
 }
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
   if (IsRemote(path)) return {};
-  std::error_code unknown;
-  const std::uint64_t size = std::filesystem::file_size(path, unknown);
-  if (unknown) return {};
-  const std::uint64_t end =
-      EQUAL(dataset.GetDriverName(), "GTiff") ? EndOfBlocks(dataset, path, bands) : EndOfSamples(dataset, path);
-  if (end <= size) return {};
-  return MakeError(ErrorCode::kUnavailable,
-                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
-                   size, end);
+  return EQUAL(dataset.GetDriverName(), "VRT") ? CheckParts(path, bands) : CheckEnd(dataset, path, bands);
 }
 
 bool HasMaskBand(GDALRasterBand& band) {

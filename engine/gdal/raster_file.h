@@ -28,7 +28,8 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 
 // kUnavailable: a GeoTIFF is truncated within the samples, overviews or mask of its first bands, or an ENVI or classic
 // netCDF file is truncated. A truncated file can be opened, but reads of the missing part would fail later, in single
-// tiles; of ENVI and netCDF they would be zeros. Remote files are not checked.
+// tiles; of ENVI and netCDF they would be zeros. Of a VRT, checks the parts that are not GeoTIFFs or have sidecars;
+// kInvalidArgument: GDAL would ignore a sidecar of theirs. Remote files are not checked.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
 // Returns the file and all files that GDAL reads with it: overviews, masks, and the parts of a mosaic with their own.

@@ -185,12 +185,13 @@ Result<void> VisitSamples(GDALRasterBand& band, const SampleRules& rules, int co
     for (int r = 0; r < count; r += rows_per_visit) {
       const int visited = std::min(rows_per_visit, count - r);
       const std::size_t first = Area(cols, r), samples = Area(cols, visited);
-      auto* const doubles = reinterpret_cast<double*>(raw.get()) + first;  // for this type
+      std::byte* const values = raw.get() + first * bytes_per_sample;
+      auto* const doubles = reinterpret_cast<double*>(values);  // where `type` is GDT_Float64
       if (rules.is_signed_byte) {
         for (std::size_t i = 0; i < samples; ++i) doubles[i] -= doubles[i] > 127 ? 256 : 0;
       }
       if (IsPlain(rules)) {
-        ConvertPlain(rules, type, raw.get() + first * bytes_per_sample, samples, heights.get());
+        ConvertPlain(rules, type, values, samples, heights.get());
       } else {
         for (std::size_t i = 0; i < samples; ++i) {
           const bool is_hidden = rules.has_mask && mask[first + i] == 0;

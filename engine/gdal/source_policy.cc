@@ -88,7 +88,7 @@ Result<void> CheckFile(const SourcePolicy& policy, const std::string& path) {
 }
 
 // Files that GDAL opens automatically beside a raster. If they exist, they must be allowed, too.
-Result<void> CheckSidecars(const SourcePolicy& policy, const std::string& path) {
+Result<void> CheckSidecarNames(const SourcePolicy& policy, const std::string& path) {
   if (policy.roots.empty()) return {};
   for (const char* suffix : {".ovr", ".msk", ".aux.xml", ".msk.ovr"}) {
     const std::string sidecar = path + suffix;
@@ -165,15 +165,14 @@ Result<void> CheckPlainFile(const std::string& path) {
   for (const char* archive : {"/vsizip/", "/vsitar/", "/vsigzip/", "/vsi7z/", "/vsirar/"}) {
     if (!path.starts_with(archive)) continue;
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: is a part of an archive, and archives are not read; extract it and give the path of the file",
-                     path);
+                     "{}: is a part of an archive; extract it and give the path of the file", path);
   }
   if (path.starts_with("/vsi")) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{}: is no file on this machine, and its beginning is not among the allowed_prefixes", path);
   }
   if (auto file = CheckFile(*policy, path); !file) return file;
-  return CheckSidecars(*policy, path);
+  return CheckSidecarNames(*policy, path);
 }
 
 Result<void> CheckSourceName(const std::string& path) {

@@ -209,8 +209,8 @@ Result<void> RasterGrid::CheckUnread() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
-// The same for a window of voids.
-Result<void> RasterGrid::CheckUnread(int factor, const GridWindow& window) const {
+// The same for a window of voids, of all members that it overlaps.
+Result<void> RasterGrid::CheckMembersUnread(int factor, const GridWindow& window) const {
   for (const std::size_t i : MembersAt(PixelsOf(window, factor))) {
     if (auto unchanged = members_[i].raster->CheckUnchanged(); !unchanged) return unchanged;
   }
@@ -232,8 +232,9 @@ GridWindow RasterGrid::Grown(const GridWindow& window, int halo, int factor) con
 
 bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
   if (wraps_) return false;  // columns beyond the last one are others
-  // Small voids are filled from samples around them, and averages by overviews are interpolated between such samples.
-  const GridWindow around = Grown(window, options_.max_void_gap / factor + 2, factor);
+  // Small voids are filled from samples around them. Averages by overviews reach up to three averages into a void
+  // (cubic splines, each overview made from the one before), and heights are interpolated between averages.
+  const GridWindow around = Grown(window, options_.max_void_gap / factor + 6, factor);
   const BlockRange range = Ranges(PixelsOf(around, factor));
   if (range.min <= range.max) return false;
   if (options_.voids != HoleFill::kSmooth) return true;
@@ -336,7 +337,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   GridWindow window = cells.MoveIntoWindow(wanted, are_all);
   if (IsUnfilledVoid(factor, window)) {
     counts_->voids += static_cast<std::uint64_t>(window.columns * window.rows);
-    return leave_unfilled(CheckUnread(factor, window));
+    return leave_unfilled(CheckMembersUnread(factor, window));
   }
   // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;

@@ -220,7 +220,7 @@ class RasterGrid {
   double Feather(int factor) const;
   // For calls that read no sample: checks that the file is unchanged if the raster grid has a single member.
   Result<void> CheckUnread() const;
-  Result<void> CheckUnread(int factor, const GridWindow& window) const;
+  Result<void> CheckMembersUnread(int factor, const GridWindow& window) const;
 
   struct Counts {
     std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};

@@ -37,13 +37,15 @@ bool WriteFile(const std::string& path, const std::string& text) {
   return false;
 }
 
-// Before a flight, which may take hours. An empty file is left; the report replaces it.
+// Called before a flight, which may take hours. Creates a missing file, which the report replaces after the flight.
 Result<void> CheckWritable(const std::string& path, const std::string& read) {
   std::error_code ignored;
   if (std::filesystem::equivalent(path, read, ignored)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} is the file of --path; give another name", path);
   }
-  if (path.empty() || std::ofstream(path, std::ios::app)) return {};
+  // A pipe would take the end of this try for the end of the report.
+  const bool is_other = std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored);
+  if (path.empty() || is_other || std::ofstream(path, std::ios::app)) return {};
   return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; name a file in a folder that is writable", path,
                    ErrorText());
 }

@@ -58,7 +58,8 @@ config::Config WithViewer(config::Config config) {
   return config;
 }
 
-// A dataset may come with a reload; a wrong name refuses the token's clients with no other sign.
+// A wrong name is no error, because a reload may add the dataset. Clients with the token would be refused without a
+// reason in the log.
 void WarnAboutTokens(const config::Config& config) {
   std::vector<KnownName> known;
   for (const config::DatasetConfig& dataset : config.datasets) known.push_back({dataset.name});

@@ -66,6 +66,13 @@ std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::s
   return path;
 }
 
+void WriteVrt(const std::string& part, const std::string& path) {
+  const GDALDatasetUniquePtr from(GDALDataset::Open(part.c_str()));
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("VRT");
+  const GDALDatasetUniquePtr written(driver->CreateCopy(path.c_str(), from.get(), FALSE, nullptr, nullptr, nullptr));
+  EXPECT_NE(written, nullptr);
+}
+
 std::optional<std::string> TestDataFile(const std::string& name) {
   const char* folder = std::getenv("TERRACE_TEST_DATA");
   const std::filesystem::path path =

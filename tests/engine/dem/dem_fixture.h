@@ -49,6 +49,9 @@ RasterSpec FlatSquare(double west, double north, int side, double pixel, double 
 // Writes a GeoTIFF and returns its path.
 std::string WriteRaster(const TempDir& dir, const RasterSpec& spec, const std::string& name = "dem.tif");
 
+// Writes a VRT that contains one raster. Precondition: the source policy allows VRTs.
+void WriteVrt(const std::string& part, const std::string& path);
+
 // A file of the test data folder; nothing and a message if it is missing.
 std::optional<std::string> TestDataFile(const std::string& name);
 

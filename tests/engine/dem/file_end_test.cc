@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "engine/gdal/source_policy.h"
 #include "engine/sources/read_raster.h"
 #include "tests/engine/dem/dem_fixture.h"
 
@@ -55,11 +56,51 @@ void ExpectRefusedWhenCut(const std::string& path) {
   }
 }
 
+// Both bands have the heights of Slope().
+std::string EnviOfTwoBands(const TempDir& dir, const char* interleave) {
+  const RasterSpec spec = Slope();
+  const std::string path = dir.File("dem.img");
+  const char* const options[] = {interleave, nullptr};
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("ENVI");
+  const GDALDatasetUniquePtr file(
+      driver->Create(path.c_str(), spec.width, spec.height, 2, GDT_Int16, const_cast<char**>(options)));
+  file->SetGeoTransform(const_cast<double*>(spec.geo_transform.data()));
+  OGRSpatialReference crs;
+  crs.importFromEPSG(4326);
+  file->SetSpatialRef(&crs);
+  for (int band = 1; band <= 2; ++band) {
+    for (int row = 0; row < spec.height; ++row) {
+      for (int column = 0; column < spec.width; ++column) {
+        double height = spec.value(column, row);
+        EXPECT_EQ(file->GetRasterBand(band)->RasterIO(GF_Write, column, row, 1, 1, &height, 1, 1, GDT_Float64, 0, 0,
+                                                      nullptr),
+                  CE_None);
+      }
+    }
+  }
+  return path;
+}
+
 TEST(FileEnd, TruncatedEnviIsRefused) {
   for (const char* interleave : {"INTERLEAVE=BSQ", "INTERLEAVE=BIL", "INTERLEAVE=BIP"}) {
     const TempDir dir;
     ExpectRefusedWhenCut(Written(dir, Slope(), "ENVI", "dem.img", interleave));
+    ExpectRefusedWhenCut(EnviOfTwoBands(dir, interleave));
   }
+}
+
+TEST(FileEnd, TruncatedPartsOfAMosaicAreRefused) {
+  const TempDir dir;
+  const std::string part = Written(dir, Slope(), "ENVI", "dem.img"), mosaic = dir.File("mosaic.vrt");
+  ASSERT_TRUE(AllowVrts());
+  WriteVrt(part, mosaic);
+  EXPECT_TRUE(DemSource::Open(mosaic));
+  std::filesystem::resize_file(part, std::filesystem::file_size(part) - 4);
+  const auto opened = DemSource::Open(mosaic);
+  ASSERT_FALSE(opened);
+  EXPECT_EQ(opened.error().code, ErrorCode::kUnavailable);
+  EXPECT_NE(opened.error().message.find(part + ": is cut short"), std::string::npos) << opened.error().message;
+  ASSERT_TRUE(SetSourcePolicy({}));
 }
 
 TEST(FileEnd, TruncatedClassicNetCdfIsRefused) {

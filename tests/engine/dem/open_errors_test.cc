@@ -6,6 +6,7 @@
 #include <string>
 
 #include "engine/gdal/raster_file.h"
+#include "engine/gdal/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -115,13 +116,54 @@ TEST(OpenErrors, NameDamagedSidecars) {
     for (const char* ending : {".msk", ".aux.xml"}) {
       const std::string sidecar = path + ending;
       std::ofstream(sidecar, std::ios::binary) << text;
-      ExpectRefused(path, {sidecar + ": cannot be read", "remove it"});
+      ExpectRefused(path, {sidecar + ": is not used by GDAL", "cannot be read", "remove it"});
       std::filesystem::remove(sidecar);
     }
   }
   const std::string path = WriteRaster(dir, {});
+  std::ofstream(path + ".aux.xml") << "<?xml version=\"1.0\"?>\n<PAMDataset></PAMDataset>";
+  ExpectRefused(path, {"begins with an XML declaration"});
   std::ofstream(path + ".aux.xml") << "<PAMDataset></PAMDataset>";
   EXPECT_TRUE(OpenRaster(path).has_value());
+}
+
+// Writes a mask beside the raster.
+void WriteMask(const std::string& path) {
+  CPLSetThreadLocalConfigOption("GDAL_TIFF_INTERNAL_MASK", "NO");
+  const GDALDatasetUniquePtr raster(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+  ASSERT_EQ(raster->CreateMaskBand(GMF_PER_DATASET), CE_None);
+  CPLSetThreadLocalConfigOption("GDAL_TIFF_INTERNAL_MASK", nullptr);
+}
+
+TEST(OpenErrors, OverviewsNeedNoMaskOfTheirOwn) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, {.width = 64, .height = 64});
+  WriteMask(path);
+  {
+    const GDALDatasetUniquePtr raster(GDALDataset::Open(path.c_str()));  // read-only: the overviews are in a file
+    const int factor = 2;
+    ASSERT_EQ(raster->BuildOverviews("AVERAGE", 1, &factor, 0, nullptr, nullptr, nullptr), CE_None);
+  }
+  ASSERT_TRUE(std::filesystem::exists(path + ".msk"));
+  ASSERT_TRUE(std::filesystem::exists(path + ".ovr"));
+  for (const int overview : {-1, 0}) {
+    const auto opened = OpenRaster(path, overview);
+    EXPECT_TRUE(opened.has_value()) << opened.error().message;
+  }
+}
+
+TEST(OpenErrors, NameDamagedSidecarsOfPartsOfAMosaic) {
+  const TempDir dir;
+  const std::string part = WriteRaster(dir, {}), mosaic = dir.File("mosaic.vrt");
+  ASSERT_TRUE(AllowVrts());
+  WriteVrt(part, mosaic);
+  EXPECT_TRUE(DemSource::Open(mosaic).has_value());
+  std::ofstream(part + ".msk") << "garbage";
+  ExpectRefused(mosaic, {part + ".msk: is not used by GDAL"});
+  std::filesystem::remove(part + ".msk");
+  WriteMask(part);
+  EXPECT_TRUE(DemSource::Open(mosaic).has_value());
+  ASSERT_TRUE(SetSourcePolicy({}));
 }
 
 }  // namespace

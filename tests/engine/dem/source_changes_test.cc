@@ -103,7 +103,7 @@ TEST(SourceChanges, ChangedPartOfAMosaicInAMosaicIsTold) {
   };
   vrt_of("inner.vrt", "part.tif");
   vrt_of("dem.vrt", "inner.vrt");
-  std::ofstream(dir.File("part.tif.msk")) << "none, but it is there";
+  std::ofstream(dir.File("part.tif.aux.xml")) << "<PAMDataset></PAMDataset>";
   ASSERT_TRUE(SetSourcePolicy({.drivers = {"VRT", "GTiff"}}));
   const auto source = OpenOrFail(dir.File("dem.vrt"));
   ASSERT_NE(source, nullptr);
