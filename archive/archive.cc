@@ -172,7 +172,7 @@ Result<std::vector<std::shared_ptr<const Archive>>> Archive::OpenAll(const std::
   if (only.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(only.error()));
   for (const auto& [name, format] : kFormatNames) {
     const std::string folder = fmt::format("{}/{}", place, name);
-    if (!IsPlace(folder)) continue;
+    if (!MayExist(folder)) continue;
     Result<std::shared_ptr<const Archive>> archive = Open(folder);
     if (!archive && dem::IsGdalName(folder) && archive.error().code == ErrorCode::kNotFound) continue;
     if (!archive) return tl::unexpected(std::move(archive.error()));

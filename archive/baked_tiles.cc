@@ -37,7 +37,7 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   const int level = request.key.level;
   if (request.format != kind.format) return false;
   if (request.format == TileFormat::kHeightPng) {
-    return request.height_encoding == kind.height_encoding && request.height_size == kind.height_size;
+    return request.height_encoding == kind.height_encoding && request.side_px == kind.side_px;
   }
   if (request.error_step != manifest.StepAt(level)) return false;
   if (request.format == TileFormat::kGlb) {
@@ -131,7 +131,7 @@ class Baked final : public tiler::BakedTiles {
     extent_.sources = static_cast<std::size_t>(dataset.sources);
     extent_.finest_level = dataset.finest_level;
     if (manifest.kind.format == TileFormat::kHeightPng) {
-      extent_.max_mercator_depth = manifest.max_level + (manifest.kind.height_size == 512 ? 1 : 0);
+      extent_.max_mercator_depth = manifest.max_level + (manifest.kind.side_px == 512 ? 1 : 0);
       return;
     }
     // Archives of one bake have the same tiles.

@@ -36,7 +36,7 @@ std::string TileJson(const Manifest& manifest) {
   tiles.attribution = dataset.attribution;
   tiles.tile_template = "{z}/{x}/{y}.png?v=" + tiler::VersionText(dataset.generation);
   tiles.max_zoom = manifest.max_level;
-  tiles.tile_size = manifest.kind.height_size;
+  tiles.tile_size = manifest.kind.side_px;
   tiles.encoding = manifest.kind.height_encoding;
   tiles.bounds = dataset.bounds;
   return proto::EncodeTileJson(tiles);

@@ -41,7 +41,7 @@ Result<Manifest> ReadManifest(const std::string& place) {
   const std::string path = place + "/" + kManifestFile;
   const Result<std::string> json = ReadFile(path, kMaxManifestBytes);
   if (!json && json.error().code == ErrorCode::kNotFound) {
-    if (!IsPlace(place)) {
+    if (!MayExist(place)) {
       return MakeError(ErrorCode::kNotFound, "there is no {}; give the folder or file that 'terrace bake' wrote",
                        place);
     }

@@ -112,7 +112,7 @@ BakedDataset ReadDataset(const Json& json) {
 Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_steps) {
   // All members are named, so that a new one fails to compile until it is added here.
   const auto& [dataset, key, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, height_size, map] = kind;
+               height_encoding, side_px, map] = kind;
   static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
   static_cast<void>(map);  // archives have no tiles for maps
   Json json;
@@ -124,7 +124,7 @@ Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_step
   json["compression"] = NameIn(proto::kGlbCompressionNames, compression);
   json["texture"] = NameIn(proto::kTextureFormatNames, texture);
   json["encoding"] = NameIn(proto::kHeightEncodingNames, height_encoding);
-  json["size"] = height_size;
+  json["size"] = side_px;
   json["error_steps"] = error_steps;
   return json;
 }
@@ -139,8 +139,8 @@ void ReadKind(const Json& json, Manifest& manifest) {
   kind.compression = ValueOf(proto::kGlbCompressionNames, json.at("compression"));
   kind.texture = ValueOf(proto::kTextureFormatNames, json.at("texture"));
   kind.height_encoding = ValueOf(proto::kHeightEncodingNames, json.at("encoding"));
-  kind.height_size = WholeOf<int>(json.at("size"), 1, 1 << 16);
-  if (std::ranges::find(tiler::kHeightSizes, kind.height_size) == tiler::kHeightSizes.end()) {
+  kind.side_px = WholeOf<int>(json.at("size"), 1, 1 << 16);
+  if (std::ranges::find(tiler::kSidesPx, kind.side_px) == tiler::kSidesPx.end()) {
     throw Wrong("size must be 256 or 512");
   }
   for (const Json& step : json.at("error_steps")) manifest.error_steps.push_back(WholeOf<int>(step, -1000, 1000));

@@ -68,7 +68,7 @@ std::string UnitMetadata(const tiler::TileRequest& kind, std::uint64_t key) {
   json["scheme"] = is_mercator ? "xyz" : "tms";
   json["projection"] = is_mercator ? "EPSG:3857" : "EPSG:4326";
   if (is_mercator) json["encoding"] = NameIn(proto::kHeightEncodingNames, kind.height_encoding);
-  if (is_mercator) json["tileSize"] = kind.height_size;
+  if (is_mercator) json["tileSize"] = kind.side_px;
   json[kManifestMember] = {{"terrace_archive", kFormatVersion}, {"key", fmt::format("{:016x}", key)}};
   return json.dump();
 }

@@ -24,7 +24,7 @@ void AddRanges(dem::ContentHasher& hasher, const std::vector<geo::TileRange>& ra
 void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
   for (const int value :
        {static_cast<int>(kind.format), static_cast<int>(kind.compression), static_cast<int>(kind.texture),
-        static_cast<int>(kind.coding), static_cast<int>(kind.height_encoding), kind.height_size}) {
+        static_cast<int>(kind.coding), static_cast<int>(kind.height_encoding), kind.side_px}) {
     hasher.Add(value);
   }
   for (const bool value : {kind.normals, kind.water_mask, kind.metadata}) hasher.Add(value);

@@ -26,7 +26,8 @@ class Socket {
   // `ca_file`: PEM; the certificates that may sign the server's; empty: those of the system. The deadline includes the
   // look-up of the host's name (Resolver). kUnavailable: no server listens, the deadline passed, or the certificate
   // does not fit; kInvalidArgument: the file.
-  // Once `stop` is requested, the waits for the peer end after kAfterStop, all together, even if a deadline is later.
+  // After `stop` is requested, all waits for the peer together last at most kAfterStop, also if their deadline is
+  // later.
   static Result<Socket> Connect(const Address& address, const std::string& ca_file, Deadline deadline,
                                 const std::stop_token& stop = {});
   Socket(Socket&& other) noexcept;

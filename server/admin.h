@@ -1,4 +1,5 @@
-// The application on the operators' address: POST /admin/purge erases tiles from all caches; GET /metrics.
+// The application on the operators' address: POST /admin/purge erases tiles from all caches; GET /metrics;
+// GET /version.
 #pragma once
 
 #include <atomic>

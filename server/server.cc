@@ -147,7 +147,8 @@ class RunningServer final : public Server {
                         : Listener::OpenPath(io_, address->path, options_.config.admin_socket_mode, AdminContext());
     if (!listener) return MakeError(listener.error().code, "admin_listen: {}", listener.error().message);
     admin_listener_ = std::move(*listener);
-    spdlog::info("operators: {} answers /admin/purge and /metrics", UrlOf(*admin_listener_, /*is_https=*/false));
+    spdlog::info("operators: {} answers /admin/purge, /metrics and /version",
+                 UrlOf(*admin_listener_, /*is_https=*/false));
     admin_listener_->Start();
     return {};
   }

@@ -47,8 +47,9 @@ class Server {
  public:
   // Returns when the server is listening. Calls the catalog's functions on worker threads. Without a catalog (null),
   // requests wait for the first Replace, at most for request_deadline; /livez, /metrics and /readyz ("opening") answer
-  // meanwhile. kInvalidArgument: a dataset's name is reserved, empty or used twice. kUnavailable: the server cannot
-  // listen on the address, read the viewer or write the access log. Messages name the remedy.
+  // meanwhile. kInvalidArgument: a dataset's name is empty, reserved, used twice or has a '/'; or a token, a trusted
+  // proxy, the certificate or its key cannot be used. kUnavailable: the server cannot listen on the address, read the
+  // viewer or write the access log. Messages name the remedy.
   static Result<std::unique_ptr<Server>> Start(CatalogPtr catalog, ServerOptions options);
 
   // Checks the files that a start needs besides datasets: the viewer, the access log, certificate and key. Returns all
@@ -59,8 +60,8 @@ class Server {
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.
-  // Datasets that are pending answer 503. kInvalidArgument: as above; nothing changes. May be called on any thread, but
-  // not concurrently.
+  // Datasets that are pending answer 503. kInvalidArgument: a name is not valid, as in Start; nothing changes. May be
+  // called on any thread, but not concurrently.
   virtual Result<void> Replace(CatalogPtr catalog, const config::Config& config) = 0;
 
   // Requests a stop and waits for it.

@@ -73,7 +73,7 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 }  // namespace
 
 std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
-  int size = request.height_size, margin = 0;
+  int size = request.side_px, margin = 0;
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
@@ -89,7 +89,7 @@ std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request
       margin = kReliefMargin;
       break;
     case TileFormat::kContours:
-      size = kHeightSizes[0];
+      size = kSidesPx[0];
       margin = kContourMargin;
       break;
   }

@@ -32,8 +32,8 @@ class OpenObject {
  public:
   static Result<OpenObject> Create(const std::string& object) {
     if (!dem::IsRemote(object)) {
-      return MakeError(ErrorCode::kInvalidArgument, "{} is below no allowed prefix; add its bucket to allowed_prefixes",
-                       object);
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{} does not begin with an allowed prefix; add its bucket to allowed_prefixes", object);
     }
     dem::InitGdal();
     dem::ForgetGdalError();

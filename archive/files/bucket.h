@@ -13,8 +13,9 @@ namespace terrace::archive {
 // Whether a place is in one of GDAL's file systems that can be written.
 bool IsBucket(const std::string& place);
 
-// For programs that write to buckets, before the first request: requests that the store refuses for want of time are
-// repeated, and those that stand still for 10 s end. GDAL waits for ever by default.
+// For programs that write to buckets, before the first request. Requests that fail temporarily are repeated up to three
+// times. A request that cannot connect within 10 s, or transfers less than 1 byte per second for 10 s, fails. By
+// default GDAL repeats none and waits without a limit.
 void LimitRequests();
 
 // Writes an object that is there as a whole or not at all: one request, or an upload in parts that is completed at the

@@ -27,7 +27,10 @@ class LocalFile final : public InputFile {
 
   Result<std::string> Read(std::uint64_t offset, std::size_t size) const override {
     if (offset > size_ || size > size_ - offset) {
-      return MakeError(ErrorCode::kUnavailable, "{} is shorter than it says", path_);
+      return MakeError(
+          ErrorCode::kUnavailable,
+          "{} is truncated or damaged: it has {} bytes, and {} bytes from byte {} are needed; copy or bake it again",
+          path_, size_, size, offset);
     }
     std::string bytes(size, '\0');
     for (std::size_t done = 0; done < size;) {
@@ -84,7 +87,7 @@ bool IsSingleFile(const std::string& place) {
   return dem::IsGdalName(place) ? place.ends_with(".pmtiles") : std::filesystem::is_regular_file(place, ignored);
 }
 
-bool IsPlace(const std::string& place) {
+bool MayExist(const std::string& place) {
   std::error_code ignored;
   return dem::IsGdalName(place) || std::filesystem::exists(place, ignored);
 }
@@ -93,7 +96,9 @@ Result<std::string> ReadFile(const std::string& path, std::uint64_t max_bytes) {
   Result<std::unique_ptr<const InputFile>> file = InputFile::Open(path);
   if (!file) return tl::unexpected(std::move(file.error()));
   if ((*file)->size() > max_bytes) {
-    return MakeError(ErrorCode::kInvalidArgument, "{} is larger than any such file: {} bytes", path, (*file)->size());
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} has {} bytes, and the limit is {}; check that it is the right file", path, (*file)->size(),
+                     max_bytes);
   }
   return (*file)->Read(0, (*file)->size());
 }

@@ -23,8 +23,8 @@ class InputFile {
 
 // Whether the place of an archive is one file: a regular file, or a GDAL name that ends with .pmtiles.
 bool IsSingleFile(const std::string& place);
-// Whether something is there. Always true for remote places, which are not looked up.
-bool IsPlace(const std::string& place);
+// False: nothing is at this place. Always true for GDAL names, which are not looked up.
+bool MayExist(const std::string& place);
 
 // The whole file. kInvalidArgument: it is larger than `max_bytes`. Other errors as Open.
 Result<std::string> ReadFile(const std::string& path, std::uint64_t max_bytes);

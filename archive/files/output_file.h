@@ -44,7 +44,8 @@ class OutputFile {
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
 
 // An unnamed temporary file in the folder of `path`, or in that of temporary files if the path is in a bucket. The
-// system removes it when the process ends.
+// system removes it when the process ends. Used by one thread at a time. kUnavailable: the folder cannot be made or
+// written, or the file cannot be read.
 class SpoolFile {
  public:
   static Result<SpoolFile> Create(const std::string& path);

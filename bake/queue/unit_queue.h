@@ -19,22 +19,23 @@ class UnitQueue {
     };
     State state = State::kOver;
     std::size_t unit = 0;
-    int attempt = 0;  // how often it was handed out before
+    int attempt = 0;  // earlier attempts that failed; in a shared queue also those whose worker was lost
   };
 
   virtual ~UnitQueue() = default;
 
   // Does not wait for units.
   virtual Taken Take() = 0;
-  // Its files are in their places.
+  // The unit is done: its files are written.
   virtual void Done(std::size_t unit) = 0;
-  // The bake was stopped.
+  // Gives back a unit that was not baked because the bake was stopped.
   virtual void Return(std::size_t unit) = 0;
-  // It could not be baked. True: it will be handed out again. False: it is given up.
+  // The unit could not be baked. True: it will be handed out again. False: it is given up.
   virtual bool Fail(std::size_t unit, const Error& why) = 0;
 };
 
-// A unit that was handed out this often without success is given up.
+// A unit is given up after this many failed attempts. LocalQueue gives it up one attempt earlier if a source has
+// changed (kChanged).
 inline constexpr int kMaxAttempts = 3;
 
 }  // namespace terrace::bake

@@ -147,7 +147,7 @@ void ReadTokens(const Json& value, const ConfigLocation& place, Config& config) 
     ReadObject(value[i], place.At(i), TokenOptionTable(), token);
     if (!value[i].is_object()) continue;
     if (value[i].contains("token") == value[i].contains("sha256")) {
-      place.At(i).Fail("needs either \"token\" or \"sha256\", one of both");
+      place.At(i).Fail("must have exactly one of \"token\" and \"sha256\"");
     }
     CompareToken(config.tokens, i, place.At(i));
   }

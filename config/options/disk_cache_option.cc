@@ -36,7 +36,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
        .codec = FileBytes(&DiskCacheConfig::tile_bytes)},
       {.key = "refinement_bytes",
        .value = "BYTES",
-       .help = "Disk for the refinements that tiles are made from; 0 keeps none",
+       .help = "Disk for refinements, the records from which a tile is made at any error; 0 keeps none",
        .details = "At least 16 MiB, or 0: about 50 kB a tile at default errors. With refinements on disk, another "
                   "error, format or coding of a tile takes little time after a restart as well",
        .codec = FileBytes(&DiskCacheConfig::refinement_bytes)},

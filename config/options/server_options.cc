@@ -136,7 +136,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "admin_listen",
        .value = "HOST:PORT|unix:PATH",
        .section = "listening",
-       .help = "A second address, for operators: POST /admin/purge and /metrics",
+       .help = "A second address, for operators: POST /admin/purge, GET /metrics, GET /version",
        .details = "Plain HTTP without tokens: whoever reaches it may use it, so take the path of a Unix socket, a "
                   "loopback address or one of a closed network ([operations](operations.md#purging-caches))",
        .codec = Address(&Config::admin_listen, ParseListenAddressOrPath, kListenOrPathSchema),
@@ -165,17 +165,17 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "cache_dir",
        .value = "DIR|none",
        .section = "load",
-       .help = "Folder that keeps statistics and averages of sources, so that the next start need not read them; none "
-               "keeps nothing",
+       .help = "Folder for statistics and averages of sources, so that the next start need not read them; default is "
+               "$CACHE_DIRECTORY, else $XDG_CACHE_HOME/terrace, else ~/.cache/terrace; none keeps nothing",
        .details =
-           "The default is `$CACHE_DIRECTORY`, which systemd sets, else `$XDG_CACHE_HOME/terrace`, else "
-           "`~/.cache/terrace`; the log names the folder. An empty text is `none`. For a folder with one of these two "
-           "names, write `./default` or `./none`. The folder holds the ranges of sources, the errors of their "
-           "averages, and the averages for shallow tiles if the source has no such overviews: about 0.4 bytes per "
-           "sample, or 1.4 for sources with more than 4096 x 4096 samples. The log reports progress; an interrupted "
-           "pass continues at the next start. Sources are identified by path, size and times, so a replaced source is "
-           "read again. Several servers may share the folder. Without the folder, or if it fails, averages are [kept "
-           "in memory](operations.md#cache_dir) as far as they fit. Relative to the folder of the file",
+           "systemd sets `$CACHE_DIRECTORY`. The log names the folder. An empty text is `none`. For a folder with one "
+           "of these two names, write `./default` or `./none`. The folder holds the ranges of sources, the errors of "
+           "their averages, and the averages for shallow tiles if the source has no such overviews: about 0.4 bytes "
+           "per sample, or 1.4 for sources with more than 4096 x 4096 samples. The log reports progress; an "
+           "interrupted pass continues at the next start. Sources are identified by path, size and times, so a "
+           "replaced source is read again. Several servers may share the folder. Without the folder, or if it fails, "
+           "averages are [kept in memory](operations.md#cache_dir) as far as they fit. Relative to the folder of the "
+           "file",
        .codec = CacheDir()},
       {.key = "cache_dir_bytes",
        .value = "BYTES",
@@ -207,7 +207,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "refinement_cache_bytes",
        .value = "BYTES",
        .section = "load",
-       .help = "Memory for the refinements that tiles are made from; 0 is no cache",
+       .help = "Memory for refinements, the records from which a tile is made at any error; 0 is no cache",
        .details = "About half a megabyte a tile. With its refinement in the cache, another error, format or coding of "
                   "a tile costs a fraction of the first one",
        .codec = Bytes(&Config::refinement_cache_bytes, kMaxCacheBytes),
@@ -245,7 +245,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "max_connections",
        .value = "N",
        .section = "load",
-       .help = "Connections at a time; one more closes a connection of the client that has the most",
+       .help = "Open connections; at the limit a new one closes a connection of the client with the most, or gets 503",
        .details =
            "Idle connections are closed first. If the new connection is from that client itself, and none of its "
            "connections can be closed, the new one gets 503 with `Retry-After`; with `tls` it is closed during the "
@@ -425,13 +425,13 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "log_format",
        .value = "FORMAT",
        .section = "log",
-       .help = "Format of the log on stderr: text for people, or json (one object a line) for programs",
+       .help = "Format of the log on stderr: text for people, or json (one object on each line) for programs",
        .codec = Choice(&Config::log_format, {{"text", LogFormat::kText}, {"json", LogFormat::kJson}})},
       {.key = "access_log",
        .value = "FORM",
        .section = "log",
        .help = "Format of the access log: log (lines of the log), combined, json or off",
-       .details = "`combined` is the format of Apache and nginx; `json` is one object a line "
+       .details = "`combined` is the format of Apache and nginx; `json` is one object on each line "
                   "([operations](operations.md#logs))",
        .codec = Choice(&Config::access_log, {{"log", AccessLogForm::kLog},
                                              {"combined", AccessLogForm::kCombined},

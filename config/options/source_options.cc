@@ -113,7 +113,7 @@ void ReadSource(const Json& value, const ConfigLocation& place, DatasetConfig& d
   Result<SourceConfig> expanded = ExpandSource(source.written, place.directory());
   if (!expanded) {
     return (is_object ? place.At("path") : place)
-        .Fail(expanded.error().message + "; correct the path, which counts from " + place.directory().string());
+        .Fail(expanded.error().message + "; correct the path; a relative path starts at " + place.directory().string());
   }
   expanded->vertical = std::move(source.vertical);
   expanded->nodata = std::move(source.nodata);

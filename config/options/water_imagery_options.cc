@@ -15,7 +15,7 @@ Json WaterToJson(const std::string& text) {
 void ReadWater(const Json& value, const ConfigLocation& place, DatasetConfig& dataset) {
   const std::size_t keys = value.is_object() ? value.size() : 0;
   if (keys != 1 || !(value.contains("mask") || value.contains("sea_level"))) {
-    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, one of both)");
+    return place.Expected(R"({"mask": "water.tif"} or {"sea_level": 0}, exactly one of them)");
   }
   if (value.contains("sea_level")) {
     const Json& level = value["sea_level"];

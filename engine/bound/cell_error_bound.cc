@@ -313,11 +313,12 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
 }
 
 double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
-                                      const std::vector<float>& samples, std::int64_t turn, double known) const {
+                                      const std::vector<float>& samples, std::int64_t column_offset,
+                                      double known) const {
   const SampleBox& in = cell_samples.samples;
   if (in.empty()) return 0;
-  if (in.west + turn < window.column || in.east + turn >= window.column + window.columns || in.north < window.row ||
-      in.south >= window.row + window.rows) {
+  if (in.west + column_offset < window.column || in.east + column_offset >= window.column + window.columns ||
+      in.north < window.row || in.south >= window.row + window.rows) {
     return kUnknownError;
   }
   const Position& off = statistics_.misplacement();
@@ -336,7 +337,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
   surface.SetHeights(heights, is_known ? geoid_error : (range.max - range.min) / 2);
   double error = 0, lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = in.north; row <= in.south; ++row) {
-    const float* const line = samples.data() + (row - window.row) * window.columns + (turn - window.column);
+    const float* const line = samples.data() + (row - window.row) * window.columns + (column_offset - window.column);
     for (std::int64_t column = in.west; column <= in.east; ++column) {
       const double sample = line[column];
       if (std::isnan(sample)) continue;

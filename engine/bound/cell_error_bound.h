@@ -33,6 +33,8 @@ struct SampleBox {
   friend bool operator==(const SampleBox&, const SampleBox&) = default;
 };
 
+// Bounds are in metres. `known`: the bound that the tile has already, which smaller ones do not change. A bound of at
+// most `known` may be returned as any value from 0 to `known`.
 class CellErrorBound {
  public:
   // The arguments must outlive this object.
@@ -59,9 +61,8 @@ class CellErrorBound {
   };
 
   // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
-  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. If the
-  // bound is at most `known`, the result is only some value up to `known`. Sets `cell_samples` if BoundBySamples can
-  // give a tighter bound from samples that have not been read.
+  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
+  // `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
   double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
                              std::optional<CellSamples>& cell_samples) const;
 
@@ -69,11 +70,10 @@ class CellErrorBound {
   // sea. Precondition: nothing is blended. False does not mean the contrary.
   bool HasNoSamples(const CellBox& box) const;
 
-  // Returns a bound from the samples in the cell; only some value up to `known` if the bound is at most `known`.
-  // Infinite if some samples lie outside the window. `turn`: offset of the window's columns against the cell's, in
-  // columns.
+  // Returns a bound from the samples in the cell. Infinite if some of them lie outside the window. `column_offset`: is
+  // added to the columns of `cell_samples`, for windows one turn around the Earth further on.
   double BoundBySamples(const TileCell& cell, const CellSamples& cell_samples, const GridWindow& window,
-                        const std::vector<float>& samples, std::int64_t turn, double known) const;
+                        const std::vector<float>& samples, std::int64_t column_offset, double known) const;
 
  private:
   std::optional<std::array<Position, 4>> CornersOf(const TileCell& cell) const;

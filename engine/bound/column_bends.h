@@ -7,9 +7,10 @@
 
 namespace terrace::dem {
 
-// By column: the largest |difference| of a sample from the next one to the east (x) and to the south (y), of two
-// differences that follow each other (xx, yy), and of the eastern differences of two rows (xy). Differences that are
-// NaN do not count. Samples without the neighbour have no such difference. And the sums of the samples, NaN if one is.
+// By column, the largest magnitudes in metres of differences of samples h(column i, row j): x = h(i + 1, j) - h(i, j),
+// y = h(i, j + 1) - h(i, j), xx and yy = differences of two of these that follow each other, xy = x(i, j + 1) - x(i,
+// j). Differences that are NaN do not count. Samples without the neighbour have no such difference. `sum`: of the
+// samples, NaN if one is.
 struct ColumnBends {
   std::vector<float> x, y, xx, yy, xy, sum;
 

@@ -7,7 +7,7 @@
 
 namespace terrace::dem {
 
-// In pixels or in degrees. In pixels, `south` is the first row.
+// In pixels or in degrees. In pixels y is the row, so that `south` is the first row, and `north` the last.
 struct Box {
   double west = 0, south = 0, east = 0, north = 0;
 

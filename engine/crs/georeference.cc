@@ -123,12 +123,24 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
   if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());
   const OGRSpatialReference* srs = dataset.GetSpatialRef();
   if (srs == nullptr || srs->IsEmpty()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: states no coordinate reference system; add it with `gdal_translate -a_srs EPSG:XXXX in out`",
-                     path);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: states no coordinate reference system; add it with `gdal_translate -a_srs EPSG:XXXX in out`{}", path,
+        self.MayBeInDegrees() ? "; if its coordinates are degrees, XXXX is 4326" : "");
   }
   if (auto crs = self.ReadCrs(*srs, path); !crs) return tl::unexpected(crs.error());
   return self;
+}
+
+// Grids of netCDF often have longitudes and latitudes, but state no reference system.
+bool Georeference::MayBeInDegrees() const {
+  constexpr double kMargin = 0.5;  // half a pixel of grids with nodes at the poles
+  const auto is_within = [&](double column, double row) {
+    const double x = to_crs_[0] + column * to_crs_[1] + row * to_crs_[2];
+    const double y = to_crs_[3] + column * to_crs_[4] + row * to_crs_[5];
+    return std::abs(x) <= 360 + kMargin && std::abs(y) <= 90 + kMargin;
+  };
+  return is_within(0, 0) && is_within(width_, 0) && is_within(0, height_) && is_within(width_, height_);
 }
 
 Result<void> Georeference::SetAffine(const std::string& path) {

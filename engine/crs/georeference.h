@@ -100,6 +100,7 @@ class Georeference {
 
  private:
   Result<void> SetAffine(const std::string& path);
+  bool MayBeInDegrees() const;
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
   void FindPeriod(const OGRSpatialReference& srs);
   void FindTurn();

@@ -63,7 +63,7 @@ Result<void> AddRaster(ContentHasher& hasher, const RasterSource& raster, const 
     hasher.Add(number);
   }
   // Detected and configured voids.
-  hasher.Add(rules.rim);
+  hasher.Add(rules.void_margin);
   hasher.Add(std::uint64_t{rules.extra_nodata.size()});
   for (const double value : rules.extra_nodata) hasher.Add(value);
   return {};
@@ -223,20 +223,20 @@ Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, cons
 }
 
 Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, const DemOptions& options) {
-  return OpenAs(std::move(files), options, /*only_kept=*/false);
+  return OpenAs(std::move(files), options, /*only_cached=*/false);
 }
 
-Result<std::unique_ptr<DemSource>> DemSource::OpenKept(std::vector<DemFile> files, const DemOptions& options) {
-  return OpenAs(std::move(files), options, /*only_kept=*/true);
+Result<std::unique_ptr<DemSource>> DemSource::OpenFromCache(std::vector<DemFile> files, const DemOptions& options) {
+  return OpenAs(std::move(files), options, /*only_cached=*/true);
 }
 
 Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files, const DemOptions& options,
-                                                     bool only_kept) {
+                                                     bool only_cached) {
   TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   std::vector<std::string> left_out;
-  const auto rasters = OpenRasters(files, options, left_out, only_kept);
+  const auto rasters = OpenRasters(files, options, left_out, only_cached);
   if (!rasters) return tl::unexpected(rasters.error());
   auto grids = GridsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
   if (!grids) return tl::unexpected(grids.error());

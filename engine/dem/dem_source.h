@@ -31,7 +31,7 @@ class DemSource {
   static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
   // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks some, and all files
   // have passed the other checks; or stopped.
-  static Result<std::unique_ptr<DemSource>> OpenKept(std::vector<DemFile> files, const DemOptions& options);
+  static Result<std::unique_ptr<DemSource>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~DemSource();
 
   const DemInfo& info() const;
@@ -142,7 +142,7 @@ class DemSource {
   class Impl;
   explicit DemSource(std::unique_ptr<Impl> impl);
   static Result<std::unique_ptr<DemSource>> OpenAs(std::vector<DemFile> files, const DemOptions& options,
-                                                   bool only_kept);
+                                                   bool only_cached);
   std::unique_ptr<Impl> impl_;
 };
 

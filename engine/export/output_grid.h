@@ -45,8 +45,9 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
 Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
                                              const std::stop_token& stop);
 
-// A box around `area` in the CRS of the grid, for messages: `area` itself in degrees, without shifts between datums;
-// else the smallest. Nothing: a part of the area has no place there, or it contains a pole or the antimeridian.
+// A box around `area` in the CRS of the grid, for messages. Geographic CRS: `area` itself, without shifts between
+// datums. Projected CRS: the box around 33 points on each side of the area; nothing if one of them has no position
+// there, or if the area crosses the antimeridian or touches a pole.
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
 // A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL

@@ -120,7 +120,7 @@ void SetOpenSources(std::size_t idle, std::size_t vrt_parts) {
   CPLSetConfigOption("GDAL_MAX_DATASET_POOL_SIZE", std::to_string(vrt_parts).c_str());
 }
 
-GdalCounts CountGdalErrors() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }
+GdalCounts ReadGdalCounts() { return {errors, warnings, static_cast<std::uint64_t>(GDALGetCacheUsed64())}; }
 
 std::string TakeGdalError() {
   return last_error.empty() ? std::string("no further detail") : std::exchange(last_error, {});

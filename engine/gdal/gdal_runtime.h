@@ -12,12 +12,12 @@ namespace terrace::dem {
 // Registers drivers and sets GDAL's configuration, once per process. Thread-safe; later calls are cheap.
 void InitGdal();
 
-// GDAL's counts since the start, in all threads; for metrics.
+// For metrics: errors and warnings since the start, in all threads, and the bytes in GDAL's cache of blocks now.
 struct GdalCounts {
   std::uint64_t errors = 0, warnings = 0;
-  std::uint64_t cache_bytes = 0;  // of blocks, now
+  std::uint64_t cache_bytes = 0;
 };
-GdalCounts CountGdalErrors();
+GdalCounts ReadGdalCounts();
 
 // The versions in use: "GDAL 3.6.2, PROJ 9.1.1". Other versions may read or locate samples differently.
 std::string LibraryVersions();

@@ -209,7 +209,17 @@ bool IsReadableDescription(const std::string& file) {
   return tree != nullptr && tree->eType == CXT_Element && tree->pszValue[0] != '?';
 }
 
-// GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare.
+// Whether a band has a mask that is no alpha band.
+bool HasMaskOfItsOwn(GDALDataset& dataset) {
+  for (int i = 1; i <= dataset.GetRasterCount(); ++i) {
+    GDALRasterBand& band = *dataset.GetRasterBand(i);
+    if (HasMaskBand(band) && (band.GetMaskFlags() & GMF_ALPHA) == 0) return true;
+  }
+  return false;
+}
+
+// GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare. It reads no
+// description (.aux.xml) of a VRT.
 Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path) {
   if (IsRemote(path)) return {};
   const auto refuse = [](const std::string& file, std::string_view what) {
@@ -218,18 +228,26 @@ Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path)
   };
   std::error_code unknown;
   const std::string mask = path + ".msk", description = path + ".aux.xml";
-  if (std::filesystem::exists(mask, unknown) && !HasMaskBand(*dataset.GetRasterBand(1))) {
-    return refuse(mask, "it cannot be read as a raster, or lacks the metadata INTERNAL_MASK_FLAGS_1=2");
+  if (std::filesystem::is_regular_file(mask, unknown) && !HasMaskOfItsOwn(dataset)) {
+    return refuse(mask, "it cannot be read as a raster, or the metadata INTERNAL_MASK_FLAGS_1 of its dataset is not 2");
   }
-  if (std::filesystem::exists(description, unknown) && !IsReadableDescription(description)) {
+  const bool is_described = std::filesystem::is_regular_file(description, unknown);
+  if (is_described && !EQUAL(dataset.GetDriverName(), "VRT") && !IsReadableDescription(description)) {
     return refuse(description, "it cannot be read as XML, or begins with an XML declaration (\"<?xml\")");
   }
   return {};
 }
 
-bool HasSidecar(const std::string& path) {
-  std::error_code unknown;
-  return std::filesystem::exists(path + ".msk", unknown) || std::filesystem::exists(path + ".aux.xml", unknown);
+Error CannotOpen(const std::string& path, const std::string& problem) {
+  if (const auto format = LeftOutDriverOf(path)) {
+    return {ErrorCode::kInvalidArgument,
+            fmt::format("{}: its format, {}, is not among the allowed_drivers; add \"{}\" to them, or convert the file "
+                        "with `gdal_translate in out.tif`",
+                        path, *format, *format)};
+  }
+  return {ErrorCode::kInvalidArgument,
+          fmt::format("{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
+                      path, problem, path)};
 }
 
 Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) {
@@ -244,18 +262,21 @@ Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) 
                    size, end);
 }
 
-// GDAL opens a part of a VRT when it reads from it. Of a GeoTIFF without sidecars it reports what it cannot read; of
-// other parts it would return zeros or heights for voids, so that they are opened here.
-Result<void> CheckParts(const std::string& vrt, int bands) {
+// GDAL opens a part of a VRT when it reads from it. It takes a part that cannot be opened for one without data, returns
+// zeros for the end of some truncated parts, and heights for voids of a damaged sidecar. Reads of a truncated GeoTIFF
+// fail, so that those of which the VRT uses the intact part are accepted.
+Result<void> CheckParts(const std::string& vrt) {
+  std::set<std::string> known;
   for (const std::string& part : PartsOfVrt(vrt)) {
-    if (IsRemote(part) || LooksLikeVrt(part)) continue;  // the list contains the parts of nested VRTs
-    GDALDriverH const driver = GDALIdentifyDriverEx(part.c_str(), GDAL_OF_RASTER, nullptr, nullptr);
-    if (driver != nullptr && EQUAL(GDALGetDriverShortName(driver), "GTiff") && !HasSidecar(part)) continue;
+    if (IsRemote(part) || !known.insert(part).second) continue;
+    const auto refuse = [&](const Error& error) {
+      return MakeError(error.code, "{}: a part of it: {}", vrt, error.message);
+    };
     const GDALDatasetUniquePtr dataset = ReopenRaster(part);
-    if (dataset == nullptr || dataset->GetRasterCount() < 1) continue;  // reads of it fail
-    auto checked = CheckSidecarsAreRead(*dataset, part);
-    if (checked) checked = CheckEnd(*dataset, part, bands);
-    if (!checked) return MakeError(checked.error().code, "{}: a part of it: {}", vrt, checked.error().message);
+    if (dataset == nullptr || dataset->GetRasterCount() < 1) return refuse(CannotOpen(part, TakeGdalError()));
+    if (auto sidecars = CheckSidecarsAreRead(*dataset, part); !sidecars) return refuse(sidecars.error());
+    if (EQUAL(dataset->GetDriverName(), "GTiff") || EQUAL(dataset->GetDriverName(), "VRT")) continue;
+    if (auto complete = CheckEnd(*dataset, part, 1); !complete) return refuse(complete.error());
   }
   return {};
 }
@@ -304,17 +325,7 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   if (auto name = CheckSourceName(path); !name) return tl::unexpected(name.error());
   GDALDatasetUniquePtr dataset = ReopenRaster(path, overview);
   if (dataset == nullptr) {
-    std::string problem = TakeGdalError();
-    if (const auto format = LeftOutDriverOf(path)) {
-      return MakeError(
-          ErrorCode::kInvalidArgument,
-          "{}: its format, {}, is not among the allowed_drivers; add \"{}\" to them, or convert the file with "
-          "`gdal_translate in out.tif`",
-          path, *format, *format);
-    }
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
-                     path, problem, path);
+    return tl::unexpected(CannotOpen(path, TakeGdalError()));
   }
   if (auto format = CheckRemoteFormat(*dataset, path); !format) return tl::unexpected(format.error());
   if (auto shape = CheckShape(*dataset, path); !shape) return tl::unexpected(shape.error());
@@ -326,7 +337,7 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
   if (IsRemote(path)) return {};
-  return EQUAL(dataset.GetDriverName(), "VRT") ? CheckParts(path, bands) : CheckEnd(dataset, path, bands);
+  return EQUAL(dataset.GetDriverName(), "VRT") ? CheckParts(path) : CheckEnd(dataset, path, bands);
 }
 
 bool HasMaskBand(GDALRasterBand& band) {

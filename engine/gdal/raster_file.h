@@ -12,15 +12,17 @@
 namespace terrace::dem {
 
 // Opens `path` read-only. Errors, with the remedy: the source policy does not allow the name, the file is not a raster,
-// is remote and not a GeoTIFF, has no band, has complex samples, or its sides, bands or storage blocks are absurdly
-// large. `overview`: number of an overview to open instead of the full raster; -1: the full raster.
+// is remote and not a GeoTIFF, has no band, has complex samples, or is too large: more than 2^22 samples on a side,
+// 2^36 samples, 4,096 bands or 128 MiB in a storage block. `overview`: number of an overview to open instead of the
+// full raster; -1: the full raster.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
 // Clears what GDAL has cached of remote files: of the raster, or of the parts of a VRT. Call before a dataset is
 // reopened, so that the current content is read.
 void ForgetRemote(const std::string& path);
 
-// Whether a GDAL driver accepts the file by its name and first bytes. False for files of overviews and masks.
+// Whether OpenRaster should be tried: a GDAL driver accepts the name and the first bytes, or the source policy refuses
+// the file, and OpenRaster returns the reason. False for sidecars: overviews, masks, headers, world files.
 bool IsRaster(const std::string& path);
 
 // OpenRaster without the checks, for further handles on a file that passed them. Null: the file cannot be opened.
@@ -28,8 +30,9 @@ GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview = -1);
 
 // kUnavailable: a GeoTIFF is truncated within the samples, overviews or mask of its first bands, or an ENVI or classic
 // netCDF file is truncated. A truncated file can be opened, but reads of the missing part would fail later, in single
-// tiles; of ENVI and netCDF they would be zeros. Of a VRT, checks the parts that are not GeoTIFFs or have sidecars;
-// kInvalidArgument: GDAL would ignore a sidecar of theirs. Remote files are not checked.
+// tiles; of ENVI and netCDF they would be zeros. Of a VRT, checks the parts: kUnavailable, an ENVI or
+// classic netCDF file is truncated; kInvalidArgument, a part cannot be opened, or has a sidecar that GDAL cannot read
+// and would ignore. Remote files are not checked.
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands = 1);
 
 // Returns the file and all files that GDAL reads with it: overviews, masks, and the parts of a mosaic with their own.
@@ -39,7 +42,7 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path);
 // Whether one of the files that GDAL lists for the dataset has a name with this ending, such as ".ovr".
 bool HasFileEndingWith(GDALDataset& dataset, std::string_view ending);
 
-// Fails if the raster is too large for one mesh.
+// kInvalidArgument: more than 2^15 samples on a side, or more than 2^29 samples.
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
 
 // Whether a mask says which samples are valid: a mask of the dataset or of this band, or an alpha band that GDAL uses

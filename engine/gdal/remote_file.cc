@@ -42,7 +42,8 @@ RemoteFile::~RemoteFile() = default;
 Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
   if (!IsRemote(path)) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{} is below no allowed prefix; add its bucket to allowed_prefixes, or give a folder", path);
+                     "{} does not begin with an allowed prefix; add its bucket to allowed_prefixes, or give a folder",
+                     path);
   }
   InitGdal();
   ForgetGdalError();
@@ -71,7 +72,11 @@ std::uint64_t RemoteFile::size() const { return impl_->size; }
 
 Result<std::string> RemoteFile::Read(std::uint64_t offset, std::size_t size) const {
   if (offset > impl_->size || size > impl_->size - offset) {
-    return MakeError(ErrorCode::kUnavailable, "{} is shorter than it says", impl_->path);
+    return MakeError(
+        ErrorCode::kUnavailable,
+        "{} is truncated or damaged: it has {} bytes, and {} bytes from byte {} are needed; copy or bake it "
+        "again",
+        impl_->path, impl_->size, size, offset);
   }
   std::string bytes(size, '\0');
   const std::lock_guard lock(impl_->mutex);

@@ -154,7 +154,7 @@ void ConvertPlain(const SampleRules& rules, GDALDataType type, const std::byte* 
   }
 }
 
-// For rules without a rim.
+// For rules without a margin of voids.
 Result<void> VisitSamples(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                           const AddRows& add, const std::stop_token& stop) {
   const int rows_at_once = std::clamp(kSamplesPerRead / cols, 1, rows);
@@ -226,11 +226,11 @@ Result<void> ReadHeights(GDALRasterBand& band, const SampleRules& rules, int col
 
 Result<void> VisitHeights(GDALRasterBand& band, const SampleRules& rules, int col, int row, int cols, int rows,
                           const AddRows& add, const std::stop_token& stop) {
-  if (rules.rim == 0) return VisitSamples(band, rules, col, row, cols, rows, add, stop);
+  if (rules.void_margin == 0) return VisitSamples(band, rules, col, row, cols, rows, add, stop);
   // Extends the window by the reach of voids, so that a void does not depend on the window.
-  const int left = std::max(col - rules.rim, 0), top = std::max(row - rules.rim, 0);
-  const int wide = std::min(col + cols + rules.rim, band.GetXSize()) - left;
-  const int high = std::min(row + rows + rules.rim, band.GetYSize()) - top;
+  const int left = std::max(col - rules.void_margin, 0), top = std::max(row - rules.void_margin, 0);
+  const int wide = std::min(col + cols + rules.void_margin, band.GetXSize()) - left;
+  const int high = std::min(row + rows + rules.void_margin, band.GetYSize()) - top;
   std::vector<float> around;
   around.reserve(Area(wide, high));
   const auto keep = [&](const float* heights, std::int64_t count) {
@@ -238,8 +238,9 @@ Result<void> VisitHeights(GDALRasterBand& band, const SampleRules& rules, int co
   };
   if (auto read = VisitSamples(band, rules, left, top, wide, high, keep, stop); !read) return read;
   std::vector<char> near;
-  for (int r = 0; r < high; ++r) WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.rim, near);
-  for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.rim, near);
+  for (int r = 0; r < high; ++r)
+    WidenVoids(&around[static_cast<std::size_t>(r) * wide], wide, 1, rules.void_margin, near);
+  for (int c = 0; c < wide; ++c) WidenVoids(&around[static_cast<std::size_t>(c)], high, wide, rules.void_margin, near);
   for (int r = 0; r < rows; ++r) add(around.data() + std::ptrdiff_t{row - top + r} * wide + (col - left), 1);
   return {};
 }

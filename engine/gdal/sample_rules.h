@@ -25,9 +25,9 @@ struct SampleRules {
   bool compare_as_float = false;
   std::vector<double> extra_nodata;                         // further raw values that are voids: configured or detected
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
-  // Samples within this distance of a void, along either axis, are voids too, because resampling mixed them with nodata
-  // values. Applies only at full resolution.
-  int rim = 0;
+  // Samples within this number of samples of a void, along either axis, are voids too, because resampling mixed them
+  // with nodata values. Applies only at full resolution.
+  int void_margin = 0;
   bool has_mask = false;         // a mask band says which samples are valid
   bool is_signed_byte = false;   // bytes above 127 are negative numbers; GDAL before 3.7 does not convert them
   bool is_indicator = false;     // valid nonzero samples become 1, all others 0

@@ -26,7 +26,7 @@ void PointBlock::Compact() {
     is_whole &= sample >= kMin && sample <= kMax && sample == std::trunc(sample);
   }
   if (is_level) {
-    level = first;
+    uniform_height = first;
   } else if (is_whole) {
     whole.reserve(bridged.size());
     for (const float sample : bridged) whole.push_back(static_cast<std::int16_t>(sample));
@@ -37,7 +37,7 @@ void PointBlock::Compact() {
 }
 
 std::optional<double> PointBlock::HeightAt(const GridCell& cell) const {
-  if (level) return *level;
+  if (uniform_height) return *uniform_height;
   if (whole.empty()) return Interpolate(smooth.empty() ? bridged : smooth, window, cell);
   // The same numbers in the same order as Interpolate.
   const auto lerp = [](double first, double second, double weight) { return first + weight * (second - first); };
@@ -50,7 +50,8 @@ std::optional<double> PointBlock::HeightAt(const GridCell& cell) const {
 std::vector<float> PointBlock::Samples() const { return smooth.empty() ? Bridged() : smooth; }
 
 std::vector<float> PointBlock::Bridged() const {
-  if (level) return std::vector<float>(static_cast<std::size_t>(window.columns * window.rows), *level);
+  if (uniform_height)
+    return std::vector<float>(static_cast<std::size_t>(window.columns * window.rows), *uniform_height);
   return whole.empty() ? bridged : std::vector<float>(whole.begin(), whole.end());
 }
 

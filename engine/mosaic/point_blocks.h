@@ -26,10 +26,10 @@ struct PointBlock {
   std::vector<float> smooth;    // holes are filled as well; empty: there are no holes
   // Instead of `bridged`, where there are no voids: whole metres, or one height that all samples have, as on the sea.
   std::vector<std::int16_t> whole;
-  std::optional<float> level;
+  std::optional<float> uniform_height;
 
   bool has_voids() const { return !measured.empty(); }
-  // Moves samples into `whole` or `level`, if that is possible.
+  // Moves samples into `whole` or `uniform_height`, if that is possible.
   void Compact();
   // Interpolate (raster/grid_cells.h) with narrow voids and holes filled.
   std::optional<double> HeightAt(const GridCell& cell) const;

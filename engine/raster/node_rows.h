@@ -20,9 +20,9 @@ class NodeRows {
   NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
            std::size_t end);
 
-  // Returns one height per node from `first` on. NaN where a sample with a nonzero weight is void, and where the caller
-  // must call Interpolate; undefined if the node's cell lies outside the window. Valid until the next call.
-  // Precondition: if the cells are separable, those of the row lie in the window's rows.
+  // Returns one height per node from `first` on. NaN: a sample with a nonzero weight is void, or nodes like this one
+  // are not supported; Interpolate tells which. Undefined if the node's cell lies outside the window. Valid until the
+  // next call. Precondition: if the cells are separable, those of the row lie in the window's rows.
   std::span<const double> Row(std::size_t j);
 
  private:
@@ -65,9 +65,9 @@ std::size_t CountVoids(std::span<const float> heights);
 // one. Precondition: all spans have one entry per node.
 bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted);
 
-// The places of nodes in samples, index plus weight on each axis, in the cells of GridAxes::CellAt. NaN where the
-// height is NaN, and where a place is not between 0 and `limit`. Returns false if the caller must use CellAt for some
-// of them: near the ends of an axis, and if columns wrap. Precondition: all spans have one entry per node.
+// The places of nodes, in samples: column + weight and row + weight of GridAxes::CellAt. NaN if the node's height is
+// NaN, if a place is not between 0 and `limit`, or if it is near the end of an axis or columns wrap. Returns false if a
+// node has the last of these reasons: use CellAt for it. Precondition: all spans have one entry per node.
 bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
                        Position limit, std::span<double> x, std::span<double> y);
 

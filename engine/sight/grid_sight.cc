@@ -181,11 +181,11 @@ Result<void> GridSight::Probe(Scan& scan) {
     const auto at = static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
     const auto south = static_cast<std::size_t>(window.columns);
     const float* const heights = (*block)->heights().data() + at;
-    const float* const owned = (*block)->owned().data() + at;
+    const float* const unfilled = (*block)->unfilled().data() + at;
     const double east_of = x - static_cast<double>(column), south_of = y - static_cast<double>(row);
     double ground =
         Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
-    if (std::isnan(ground + owned[0] + owned[1] + owned[south] + owned[south + 1])) continue;
+    if (std::isnan(ground + unfilled[0] + unfilled[1] + unfilled[south] + unfilled[south + 1])) continue;
     if (!blocks_.includes_undulations()) {
       ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
     }
@@ -381,11 +381,11 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const std::size_t south = window.rows > 1 ? static_cast<std::size_t>(window.columns) : 0;
   const float* const heights = block.heights().data() + at;
   const double nw = heights[0], ne = heights[east], sw = heights[south], se = heights[south + east];
-  const float* const owned = block.owned().data() + at;
-  const double all =
-      nw + ne + sw + se +
-      (scan.surface == SightSurface::kNotHoles ? 0.0 * (owned[0] + owned[east] + owned[south] + owned[south + east])
-                                               : 0.0);
+  const float* const unfilled = block.unfilled().data() + at;
+  const double all = nw + ne + sw + se +
+                     (scan.surface == SightSurface::kNotHoles
+                          ? 0.0 * (unfilled[0] + unfilled[east] + unfilled[south] + unfilled[south + east])
+                          : 0.0);
   const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
   if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
     MeasureRim(scan, block, column, row, first, last);
@@ -442,7 +442,7 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
     const GridCell cell{column, row, std::clamp(scan.on_grid.x.At(s) - shift - static_cast<double>(column), 0.0, 1.0),
                         std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0)};
     const bool is_owned =
-        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.owned(), block.window(), cell));
+        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.unfilled(), block.window(), cell));
     const auto height = is_owned ? Interpolate(block.heights(), block.window(), cell) : std::nullopt;
     if (!height) return std::nullopt;
     const double undulation_m = blocks_.includes_undulations()

@@ -1,4 +1,5 @@
-// A block of samples as ellipsoidal heights, with the largest height of every part of it.
+// A block of samples, with the largest height of every part of it. Heights are ellipsoidal if
+// SightBlocks::includes_undulations(), else in the source's datum.
 #pragma once
 
 #include <cstdint>
@@ -30,9 +31,9 @@ class SightBlock {
   SightBlock(const PointBlock& source, const std::vector<float>& undulations);
 
   const GridWindow& window() const { return window_; }
-  const std::vector<float>& heights() const { return heights_; }  // NaN: void
-  // NaN: voids that are not narrow, and holes. Only voids count.
-  const std::vector<float>& owned() const { return owned_.empty() ? heights_ : owned_; }
+  const std::vector<float>& heights() const { return heights_; }  // metres; NaN: void
+  // The samples before holes were filled, to be tested for NaN: undulations may be missing. Narrow voids are filled.
+  const std::vector<float>& unfilled() const { return unfilled_.empty() ? heights_ : unfilled_; }
 
   // A bound over the cells between two cells of the block, inclusive; possibly over more cells.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
@@ -40,8 +41,9 @@ class SightBlock {
   // of 2 x 2 cells; voids do not count.
   const std::vector<float>& largest() const { return largest_; }
 
-  // The largest heights of overlapping squares of cells: of 2 * side x 2 * side cells from every multiple of `side`.
-  // Every run of at most `side` cells lies in the square that its first cell is in the first quarter of.
+  // The largest heights of overlapping squares of cells. Square (i, j) covers 2 * side x 2 * side cells from cell
+  // (i * side, j * side) on. A box of at most side x side cells lies in the square (column / side, row / side) of its
+  // first cell.
   struct Squares {
     int shift = 0;  // side = 1 << shift
     std::int64_t columns = 0;
@@ -62,8 +64,8 @@ class SightBlock {
   };
 
   GridWindow window_;
-  std::vector<float> heights_, owned_, largest_;  // owned_: empty if its voids are those of heights_
-  std::vector<Level> levels_;                     // cells of 2, 4, 8 .. cells a side
+  std::vector<float> heights_, unfilled_, largest_;  // unfilled_: empty if its voids are those of heights_
+  std::vector<Level> levels_;                        // cells of 2, 4, 8 .. cells a side
   Squares squares_of_4_, squares_of_8_;
 
   Squares SquaresOf(int shift) const;
@@ -88,6 +90,7 @@ class SightBlocks {
   // Whether undulations are in the blocks: between samples at most 240 m apart they are as good as linear. Else
   // Undulation has to be added at each position.
   bool includes_undulations() const { return geoid_ == nullptr || is_fine_; }
+  // Metres. Precondition: !includes_undulations().
   double Undulation(Position degrees) const { return reader_->At(degrees); }
   // At least the largest undulation on Earth.
   static constexpr double kMaxUndulation = 120;

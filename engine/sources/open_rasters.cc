@@ -107,11 +107,11 @@ class Opening {
  public:
   using Opened = Result<std::unique_ptr<RasterSource>>;
 
-  Opening(const std::vector<DemFile>& files, const DemOptions& options, bool only_kept)
+  Opening(const std::vector<DemFile>& files, const DemOptions& options, bool only_cached)
       : files_(files),
         options_(options),
-        only_kept_(only_kept),
-        threads_(only_kept ? 0 : ThreadsOfEach(files.size())),
+        only_kept_(only_cached),
+        threads_(only_cached ? 0 : ThreadsOfEach(files.size())),
         shares_(files.size()),
         opened_(files.size()) {}
 
@@ -182,17 +182,17 @@ class Opening {
 }  // namespace
 
 Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& options, std::vector<std::string>& left_out,
-                            bool only_kept) {
+                            bool only_cached) {
   const std::string folder = EscapeControls(std::filesystem::path(files.front().path).parent_path().string());
   LeftOutFiles others = LeaveOutOthers(files);
   // If statistics are missing, the files are opened once more, and told then.
-  if (!only_kept) others.Log();
+  if (!only_cached) others.Log();
   if (files.empty()) {
-    if (only_kept) others.Log();
+    if (only_cached) others.Log();
     return MakeError(ErrorCode::kNotFound,
                      "{}: none of the files in this folder is a raster; name a folder of rasters or a raster", folder);
   }
-  Opening opening(files, options, only_kept);
+  Opening opening(files, options, only_cached);
   ParallelFor(files.size(), [&opening](std::size_t i) { return opening.Open(i); });
   Rasters rasters;
   std::vector<DemFile> kept;
@@ -211,7 +211,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     } else if (opening.LacksStatistics(opened)) {
       if (!lacking) lacking = opened.error();
     } else {
-      if (only_kept) others.Log(), opening.Log();
+      if (only_cached) others.Log(), opening.Log();
       if (!options.fault || options.stop.stop_requested()) return tl::unexpected(opened.error());
       options.fault(opened.error());
       if (!fault) fault = opened.error();
@@ -219,7 +219,7 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
     kept.push_back(std::move(files[i]));
   }
   if (lacking) return tl::unexpected(*std::move(lacking));
-  if (only_kept) others.Log(), opening.Log();
+  if (only_cached) others.Log(), opening.Log();
   LogLeftOut(spdlog::level::warn, without_height);
   left_out = std::move(others.missed);
   left_out.insert(left_out.end(), without_height.begin(), without_height.end());

@@ -36,7 +36,7 @@ std::uint64_t HashOf(const RasterLayout& layout, bool find_voids, const std::str
     writer.Put<std::uint8_t>(rule ? 1 : 0);
   }
   for (const double rule :
-       {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest, double(rules.rim)}) {
+       {rules.scale, rules.offset, rules.metres_per_unit, rules.lowest, rules.highest, double(rules.void_margin)}) {
     writer.Put(rule);
   }
   writer.Put(static_cast<std::uint32_t>(rules.extra_nodata.size()));

@@ -8,16 +8,16 @@
 
 namespace terrace::dem {
 
-// Averages by 2 are also stored for large rasters without overviews, so that their tiles read no more samples than
-// those of smaller rasters.
+// Whether the raster has no overviews and more samples than kMaxSamplesWithoutAverages. Averages by 2 are stored for
+// such rasters only.
 inline constexpr std::int64_t kMaxSamplesWithoutAverages = std::int64_t{4096} * 4096;
 bool NeedsAverages(const RasterLayout& layout);
 
-// Returns the sum of the factors 2 .. kLargestDirect / 2 whose averages are stored; the statistics contain those from
-// kLargestDirect on. A factor is stored if ReadGrid would start from more than 512 x 512 samples, and from more than
-// about four per average. So a tile reads at most about four samples per node. Without overviews, averages by 4 and
-// more are stored, a third of a byte per sample. Averages by 2 would take four times as much and save a tenth of the
-// tiles that read them (docs/performance.md).
+// Returns a sum: `factor` is a part of it if averages by `factor` (2 .. kLargestDirect / 2, powers of two) are stored;
+// the statistics contain those from kLargestDirect on. They are stored if ReadGrid would otherwise start from more than
+// 512 x 512 samples, and from averages by less than half of the factor (less than the factor if NeedsAverages). So a
+// tile reads at most about four samples per node. Averages by 4 and more take a third of a byte per sample; averages by
+// 2 take four times as much (docs/performance-log.md).
 unsigned KeptFactors(const RasterLayout& layout);
 
 // Whether the statistics contain averages from kLargestDirect on, by the same rule.

@@ -379,9 +379,10 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
 bool NeedsSamplesAlone(const RasterLayout& layout) { return layout.overview_factors.empty() && !layout.wraps; }
 
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
-                                            std::int64_t& read, const std::stop_token& stop, std::mutex* turn) {
+                                            std::int64_t& read, const std::stop_token& stop,
+                                            std::mutex* dataset_mutex) {
   std::unique_lock<std::mutex> lock;
-  if (turn != nullptr) lock = std::unique_lock(*turn);
+  if (dataset_mutex != nullptr) lock = std::unique_lock(*dataset_mutex);
   GDALRasterBand& band = *dataset.GetRasterBand(1);
   ChunkStatistics statistics = VoidStatistics(chunk, layout);
   if (!MayHaveSamples(band, layout, chunk)) return VoidOrOverviews(dataset, layout, chunk, stop);

@@ -60,10 +60,11 @@ struct ChunkStatistics {
   BlockSum first_row, last_row;    // of the raster's first and last row within the chunk
   std::vector<BlockRange> ranges;  // by RangeTable block, row by row
   std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
-  // By factor 2, 4, .. kLargestDirect, as far as the raster has them:
-  std::vector<std::vector<float>> errors;    // by AveragingErrors block, or for the share of a block
+  // One entry per factor 2, 4, .. kLargestDirect, up to the raster's largest factor. Errors are in metres, one per
+  // AveragingErrors block; a block of factor 64 is larger than a chunk, so its error is of the part in this chunk.
+  std::vector<std::vector<float>> errors;
   std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not stored
-  std::vector<std::vector<BlockSum>> sums;   // of factors 128 .. 1024, as the averages
+  std::vector<std::vector<BlockSum>> sums;   // one entry per factor 128 .. 1024; row by row
 
   bool is_void() const { return valid == 0; }
   // For factors of KeptFactors: for all of them or none. A void chunk has averages if an overview has heights there.
@@ -76,12 +77,12 @@ ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);
 // Number of averages of a factor in a chunk that is not void; 0 if an overview has them.
 std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int factor);
 
-// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading. `turn`:
-// locked while the samples are read, so that several threads may share the dataset and `read`; null: one thread uses
-// them. kUnavailable: the raster cannot be read. kCancelled: stopped.
+// Increments `read` if samples were read; chunks that a sparse file does not store are void without reading.
+// `dataset_mutex`: locked while the samples are read, so that several threads may share the dataset and `read`; null:
+// one thread uses them. kUnavailable: the raster cannot be read. kCancelled: stopped.
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
                                             std::int64_t& read, const std::stop_token& stop = {},
-                                            std::mutex* turn = nullptr);
+                                            std::mutex* dataset_mutex = nullptr);
 
 // Whether statistics need the dataset only for their samples. Otherwise threads must not share it: overviews, and the
 // averages beyond the antimeridian, are read in between.

@@ -316,7 +316,7 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
         "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
         "need `-a_scale FACTOR`, the metres of one{}",
         PlainNumber(kMaxAbsHeight),
-        layout_.rules.extra_nodata.empty() && layout_.rules.rim <= 0
+        layout_.rules.extra_nodata.empty() && layout_.rules.void_margin <= 0
             ? ""
             : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
               "configuration \"nodata\": \"declared\") they are not");

@@ -12,8 +12,9 @@ namespace terrace::dem {
 // Adds samples to a range. Returns the number of those that are not void.
 std::int64_t AddToRange(std::span<const float> samples, BlockRange& range);
 
-// Samples of a row between averages of `weights.size()` samples each. Run i is as many samples between averages i and
-// i + 1; `weights` are their distances from average i, in averages.
+// Samples of a row between averages of n = weights.size() samples each. Run i is the n samples between the centres of
+// averages i and i + 1. `weights`: the distance of a run's samples from the centre of average i, as a fraction of the
+// distance between the centres.
 struct SampleRuns {
   const float* samples = nullptr;
   const double* averages = nullptr;  // runs + 1

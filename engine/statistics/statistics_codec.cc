@@ -131,7 +131,7 @@ template <typename Archive, typename Detected>
 void DetectedFields(Archive& archive, Detected& detected) {
   archive.Size(detected.values);
   for (auto& value : detected.values) archive(value);
-  archive(detected.lowest, detected.highest, detected.rim);
+  archive(detected.lowest, detected.highest, detected.void_margin);
   archive.Rest(detected.text);
 }
 

@@ -230,7 +230,7 @@ void DetectedNodata::AddTo(SampleRules& rules) const {
   rules.extra_nodata.insert(rules.extra_nodata.end(), values.begin(), values.end());
   rules.lowest = std::max(rules.lowest, lowest);
   rules.highest = std::min(rules.highest, highest);
-  rules.rim = std::max(rules.rim, rim);
+  rules.void_margin = std::max(rules.void_margin, void_margin);
 }
 
 bool MayHideVoids(const SampleRules& rules, double lowest, double highest, bool has_voids, bool has_collar) {
@@ -269,12 +269,12 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
   BandScanner beyond(band, found, leap, stop);
   read = beyond.ForEachChunk([&](int c, int r) { beyond.CountBeyond(c, r, evidence); });
   if (!read) return tl::unexpected(read.error());
-  if (has_collar && evidence.IsDense()) detected.rim = kCollarRim;
+  if (has_collar && evidence.IsDense()) detected.void_margin = kCollarRim;
   const auto mixed = [&](const Beyond& beyond_it, double bound) {
     if (!evidence.AreMixtures(beyond_it)) return false;
     say(fmt::format("{} samples {} {} m at their edges", beyond_it.all, bound < 0 ? "below" : "above",
                     PlainNumber(bound)));
-    if (beyond_it.all * kMixed >= evidence.near_void) detected.rim = kMixedRim;
+    if (beyond_it.all * kMixed >= evidence.near_void) detected.void_margin = kMixedRim;
     return true;
   };
   if (mixed(evidence.below_land, kLowestLand)) {

@@ -49,7 +49,7 @@ struct ZeroEdges {
 struct DetectedNodata {
   std::vector<double> values;                               // raw values
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres
-  int rim = 0;                                              // samples, of SampleRules
+  int void_margin = 0;                                      // of SampleRules
   std::string text;                                         // for people
 
   bool any() const { return !text.empty(); }

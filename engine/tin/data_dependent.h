@@ -15,9 +15,9 @@
 // Therefore it takes less to keep u-v than to take p-w, and least away from p: there are three thresholds. All of this
 // together saves 3 to 6 % of the vertices (docs/decisions/0007).
 //
-// A test depends on its quadrilateral, on which of the corners beyond the edge is the youngest, and on how its edge
-// came into the outline. The cavity therefore does not depend on the order of the tests, on the triangle that the
-// insertion starts from, or on slots.
+// A test depends on its quadrilateral, on which corner of the triangle beyond the edge was inserted last (misfits are
+// computed relative to it, so their rounding depends on it), and on how its edge came into the outline. The cavity
+// therefore does not depend on the order of the tests, on the triangle that the insertion starts from, or on slots.
 //
 // Tests can therefore be done in groups. The walk around p absorbs the triangles that the shape decides on. One scan
 // then measures the triangles of the outline it has found, and both triangles of the other cut wherever the fit

@@ -18,7 +18,8 @@ class Client {
   Client(const FlightOptions& options, int number, HttpClient& http, boost::asio::thread_pool& workers,
          Statistics& statistics);
 
-  // Draws a frame at `now_s` seconds since the start of all clients. One thread at a time.
+  // Draws a frame at `now_s` seconds since the start of all clients. `is_late`: the frame started more than one frame
+  // period after its due time. One thread at a time.
   void Frame(double now_s, bool is_late);
 
   Phase phase() const { return phase_; }

@@ -33,7 +33,13 @@ const char* NameOf(Outcome outcome);  // as in reports: "ok", "refused (429, 503
 const char* KeyOf(Outcome outcome);   // as in JSON: "ok", "refused", ...
 
 // Where the server had the tile, from Server-Timing.
-enum class CacheTier { kHit, kLower, kJoin, kMiss, kUnknown };
+enum class CacheTier {
+  kHit,     // in memory
+  kLower,   // in a tier below memory: archive, disk or shared cache
+  kJoin,    // the request joined the build of another one
+  kMiss,    // built for this request
+  kUnknown  // the reply does not say
+};
 inline constexpr std::size_t kCacheTiers = 5;
 const char* NameOf(CacheTier tier);
 CacheTier ParseCacheTier(const std::string& server_timing);
@@ -90,6 +96,8 @@ struct Totals {
                 version_changes = 0;
   std::uint64_t incomplete_tiles = 0;
   std::uint64_t frames = 0, flying_frames = 0, refined_frames = 0, late_frames = 0, mixed_frames = 0;
+  // Flying frames whose Coverage was measured; those of them with holes; those where no tile was selected at some
+  // point.
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
   double worst_hole = 0;  // share of the screen
   double worst_px = 0, worst_stated_px = 0;

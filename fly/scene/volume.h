@@ -75,7 +75,9 @@ double DistanceSquared(const Volume& volume, const geo::Vec3& position, const Ge
 
 geo::Vec3 CenterOf(const Volume& volume);
 
-// Whether the volume is above, at or below the point: always if it contains the Earth's centre.
+// Whether the volume is above, at or below the point. For a region: its rectangle contains the point. For a
+// sphere: it contains the Earth's centre, or meets the half-line from there through the point's projection onto the
+// ellipsoid. A box is tested as its bounding sphere.
 bool MeetsVertical(const Volume& volume, const GeodeticPoint& point);
 
 }  // namespace terrace::fly

@@ -37,9 +37,9 @@ int LevelsUnder(Availability available, const geo::TileKey& root);
 // the file arrives.
 inline constexpr int kMaxServedSubtreeLevels = 7;
 
-// The number of levels of each .subtree in a tree of `levels` levels. A path to the deepest tile crosses as few
-// subtrees as possible, all with this number of levels. If the deepest subtrees had few levels, they would begin at a
-// deep level, one at each of its many tiles. loaders.gl fetches all subtrees of a tree one by one before it draws.
+// The number of levels of each .subtree in a tree of `levels` levels, at most kMaxServedSubtreeLevels: the smallest one
+// for which a path from the root to the deepest tile crosses as few subtrees as possible. Equal numbers keep the
+// subtrees few: loaders.gl fetches all of them, one by one, before it draws.
 int SubtreeLevels(int levels);
 
 struct TreeRoot {

@@ -34,7 +34,7 @@ HWY_INLINE double LargestAt(const LatticeCrossings& edge) {
     // Surplus lanes repeat the last crossing.
     const V lines = hn::Min(hn::Iota(d, line), last_line);
     const V part = hn::Mul(hn::Sub(lines, from), inverse);
-    const V along = hn::Add(hn::Set(d, edge.along_from), hn::Mul(part, hn::Set(d, edge.along)));
+    const V along = hn::Add(hn::Set(d, edge.along_from), hn::Mul(part, hn::Set(d, edge.along_change)));
     const V cell = hn::Min(hn::Max(hn::Floor(along), zero), last_cell);
     const auto at = hn::DemoteTo(
         integers, hn::Add(hn::Mul(lines, hn::Set(d, edge.line_stride)), hn::Mul(cell, hn::Set(d, edge.step))));

@@ -14,15 +14,15 @@ struct LatticePoint {
   double x = 0, y = 0;
 };
 
-// Where an edge crosses the lattice's lines of one direction. Axes are named for lines of columns.
+// Where an edge crosses the lattice's lines of one direction: the columns or the rows.
 struct LatticeCrossings {
-  double from, to;           // across the lines, at both ends
-  double along_from, along;  // along the lines: at the first end; the difference to the last end
-  double height, rise;       // of the edge at the first end; the difference to the last end
-  double bend;               // the deviation of the surface between two crossings is at most bend * the cell's twist
-  const float *heights, *twists;
-  std::int32_t line_stride, step;  // from one line to the next, and along a line
-  int cells;
+  double from, to;                  // the coordinate across the lines at the first and the last end, lattice steps
+  double along_from, along_change;  // the coordinate along the lines at the first end; last minus first
+  double height, rise;              // of the edge at the first end; last minus first; metres
+  double bend;  // between two crossings the surface deviates by at most bend * the cell's twist; without a unit
+  const float *heights, *twists;   // metres, from the tile's south-western sample and cell
+  std::int32_t line_stride, step;  // index = line * line_stride + cell * step
+  int cells;                       // along a line
 };
 
 class EdgeBound {

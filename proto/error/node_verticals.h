@@ -62,10 +62,11 @@ class NodeVerticals {
   struct Shift {
     double x = 0, y = 0;
   };
-  // Bounds for one triangle. The longitude of a point is the mean of the corners' longitudes, weighted with
-  // their distances from the axis, up to the cube of their difference. The offset of its latitude has three parts. The
-  // point is nearer to the axis than the corners: less than sin cos d^2 / 8 for a difference d in longitude. The other
-  // two are the covariances of latitude with height and with the radius of curvature. All bounds are a few times too
+  // Bounds for one triangle. The longitude of a point is the mean of the corners' longitudes, weighted with their
+  // distances from the axis; the error of this is of third order in the difference of their longitudes. The offset of
+  // its latitude has three terms: the point is nearer to the axis than the corners, at most by
+  // sin(latitude) cos(latitude) d^2 / 8 for a difference d in longitude; the covariance of latitude and height; that of
+  // latitude and radius of curvature. All bounds are a few times too
   // large. That costs time, but the result is the same: triangles within the shift are measured exactly.
   struct Bounds {
     Shift shift;

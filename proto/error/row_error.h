@@ -23,13 +23,16 @@ struct LinearRow {
 // The largest difference from `count` samples.
 double LargestOfLinearRow(const LinearRow& row, const float* samples, std::size_t count);
 
-// Heights along a row of nodes where their plumb lines meet a plane: (rest - radius across) / (cos across + north),
-// across = x cos + y sin of a node's longitude.
+// Heights along a row of nodes where their plumb lines meet the plane dot(normal, point) = offset. A node at longitude
+// l has the height (rest - radius * across) / (cos * across + north), across = x * cos(l) + y * sin(l). For a latitude
+// b, whose point on the ellipsoid is `radius` metres from the axis and z metres from the equator's plane: x = normal.x,
+// y = normal.y, cos = cos(b), north = sin(b) * normal.z, rest = offset - z * normal.z.
 struct PlumbRow {
   double x = 0, y = 0, cos = 0, north = 0, rest = 0, radius = 0;
 };
 
-// The largest difference from `count` samples. `min_up`: becomes the smallest |cos across + north|.
+// The largest difference from `count` samples, metres; nodes without a height (NaN) do not count. `min_up`: becomes the
+// smallest |cos * across + north|; if it is too small for the plane, the result has no meaning.
 double LargestOfPlumbRow(const PlumbRow& row, const geo::SinCos* columns, const float* samples, std::size_t count,
                          double& min_up);
 

@@ -37,8 +37,8 @@ double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width
 using GridPoint = std::array<std::int64_t, 3>;
 
 // The vertices of `mesh` at their exact lattice positions and heights, rounded to the grid. The point of a node does
-// not depend on the tile. libm's sine may differ in the last bit between processors; geo::ToEcef rounds to a
-// micrometre, so two processors can differ here only if a coordinate is within a micrometre of a tie.
+// not depend on the tile. Sines and cosines have the same bits on every processor (engine/geo/sine.h), so the
+// points have, too.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
 // The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`. Limits refine a step only until

@@ -99,7 +99,7 @@ constexpr MapParameterRow kRows[] = {
 }  // namespace
 
 Result<void> SetTileSize(int& size, std::string_view text) {
-  static_assert(tiler::kHeightSizes == std::array{256, 512});
+  static_assert(tiler::kSidesPx == std::array{256, 512});
   return SetOneOf(size, "size", text, {{"256", 256}, {"512", 512}});
 }
 
@@ -178,7 +178,7 @@ Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, til
   tile.map = parameters->map;
   tile.map.picture = picture;
   if (tile.format != tiler::TileFormat::kContours) {
-    tile.height_size = parameters->size;
+    tile.side_px = parameters->size;
     return {};
   }
   const std::uint32_t least = tiler::MinIntervalCm(tile.key.level);

@@ -14,12 +14,12 @@
 namespace terrace::server {
 
 struct MapTileParameters {
-  int size = tiler::kHeightSizes[0];
+  int size = tiler::kSidesPx[0];
   tiler::MapParameters map;                     // interval_cm is 0 if none is requested
   std::optional<proto::PictureFormat> picture;  // TileJSON's `format`
 };
 
-// The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kHeightSizes.
+// The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kSidesPx.
 Result<void> SetTileSize(int& size, std::string_view text);
 
 // Parses the parameters of a format: `azimuth`, `altitude`, `zfactor` and `size` of hillshades; `style` and `size` of

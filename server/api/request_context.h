@@ -53,7 +53,7 @@ struct RouteRow {
   DatasetScope scope = DatasetScope::kOneDataset;
   bool is_probe = false;          // a health check: exempt from rate limits
   bool needs_no_catalog = false;  // answered without a catalog
-  bool has_templates = false;     // the reply contains the token of the request's query
+  bool has_templates = false;     // the reply contains URL templates, which repeat the token if it came in the query
   bool takes_any_query = false;   // the query is state of the page; the server ignores it
   // Limit of a POST's body, from the number of locations that one request may have. Null: POST is not supported.
   std::size_t (*max_body_bytes)(std::size_t max_locations) = nullptr;
@@ -66,7 +66,7 @@ struct Grant {
   std::string name;  // empty: the grant of requests without a token
   bool sees_all = false;
   std::unordered_set<std::string> datasets;
-  double requests_per_second = 0;
+  double requests_per_second = 0;  // 0: the limit of the server
 
   bool Sees(const std::string& dataset) const { return sees_all || datasets.contains(dataset); }
 };
@@ -79,7 +79,7 @@ struct RequestContext {
   std::string token;            // from the Authorization header, else from the query; secret: never logged or cached
   bool token_in_query = false;  // the token came in the query
   GrantPtr grant;               // what the client may see; null: everything
-  bool has_bad_token = false;
+  bool has_bad_token = false;   // a token was sent that the server does not know; `grant` is the anonymous one
 
   bool sees_all() const { return !grant || grant->sees_all; }
 };

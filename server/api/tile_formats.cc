@@ -77,7 +77,7 @@ Result<void> ReadHeightPng(std::string_view query, const RequestFields&, const D
                      "the dataset has no such tile; its tiles.json tells the bounds and levels of what it has");
   }
   tile.height_encoding = parameters->encoding;
-  tile.height_size = parameters->size;
+  tile.side_px = parameters->size;
   return {};
 }
 

@@ -41,7 +41,7 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
 
 struct HeightTileParameters {
   proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
-  int size = tiler::kHeightSizes[0];
+  int size = tiler::kSidesPx[0];
 };
 
 // Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.

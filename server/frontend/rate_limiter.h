@@ -25,7 +25,8 @@ class RateLimiter {
 
   struct Turn {
     bool granted = true;
-    std::chrono::milliseconds wait{0};  // until the request may continue, or until the next one would be granted
+    // Granted: delay before the request continues. Refused: time until a request would be granted.
+    std::chrono::milliseconds wait{0};
   };
 
   // Takes one request from the client's bucket. Grants it also if the bucket will hold one within `longest_wait`.

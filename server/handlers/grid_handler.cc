@@ -88,7 +88,7 @@ Result<void> CheckHasHeights(const GridQuery& query, const dem::OutputGrid& grid
                              const DatasetView& view) {
   if (!HasIntegers(query.format) || query.range || steps.voids < dem::Area(grid.columns, grid.rows)) return {};
   return MakeError(ErrorCode::kInvalidArgument,
-                   "bbox: no node of the grid has a height, which 16-bit integers cannot say; bbox is "
+                   "bbox: no node of the grid has a height, and 16-bit integers have no value for a void; bbox is "
                    "west,south,east,north in units of the crs, EPSG:{}: {}; the data is in {}: choose a bbox there, "
                    "format=f32 or geotiff, where voids are NaN, or a range",
                    grid.epsg, grid.unit, DataBox(grid, view));

@@ -41,7 +41,7 @@ Answer AnswerLive(const Handlers&, const RequestContext& context) {
 Response PendingResponse(const PendingDataset& dataset, std::string_view request_id) {
   Response response = ProblemResponse(
       503,
-      dataset.has_failed ? "this dataset is not served yet: its source cannot be opened as it is now"
+      dataset.has_failed ? "this dataset is not served yet: it cannot be opened as its files are now"
                          : fmt::format("this dataset is being prepared: {} % of its sources is read", dataset.percent),
       request_id);
   response.headers.emplace_back("Retry-After", kPendingRetryAfter);
@@ -71,8 +71,8 @@ Answer AnswerReady(const Handlers& handlers, const RequestContext& context) {
     } else if (dataset.empty()) {
       text += "the configuration file is wrong, the last good one is in force\n";
     } else {
-      text +=
-          fmt::format("dataset{}: its source cannot be opened as it is now\n", context.sees_all() ? " " + dataset : "");
+      text += fmt::format("dataset{}: cannot be opened as its files are now; the log has the reason\n",
+                          context.sees_all() ? " " + dataset : "");
     }
   }
   for (const PendingDataset& dataset : pending) {

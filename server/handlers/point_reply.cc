@@ -24,8 +24,10 @@ Answer AnswerPoints(const Handlers& handlers, const RequestContext& context, Poi
 
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view) {
   if (datum != dem::HeightDatum::kOrthometric || view.has_datum) return {};
-  return MakeError(ErrorCode::kInvalidArgument,
-                   "datum: it is not known what this dataset's heights count from, so there are no orthometric ones");
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "datum: the vertical datum of this dataset is unknown, so it has no orthometric heights; leave datum out to get "
+      "the heights of the source");
 }
 
 PointReply StartPointReply(const Request& request, bool is_binary) {

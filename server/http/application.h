@@ -19,7 +19,8 @@ namespace terrace::server {
 
 // The decision made from a request's head alone.
 struct Admission {
-  std::chrono::milliseconds wait{0};     // before the request continues, or until the next one would be granted
+  // Delay before the request continues, or before `refusal` is sent. Not used with `delays_refusal`.
+  std::chrono::milliseconds wait{0};
   std::optional<Response> refusal = {};  // sent instead of an answer; the request's body is not read
   bool delays_refusal = false;           // the client exceeds its rate; an immediate refusal would be retried at once
   std::size_t max_body_bytes = 0;        // limit of a POST's body

@@ -27,8 +27,9 @@ struct JobOrder {
   int level = 0;         // a client's job of a lower level runs first, even if it arrives shortly after: shallow tiles
                          // cover the area of deep tiles. Deep tiles are not delayed indefinitely
   bool is_long = false;  // takes seconds; a bounded number of long jobs runs at a time
-  JobClock::time_point deadline = JobClock::time_point::max();  // of the wait
-  std::uint64_t kind = 0;                                       // jobs of one kind take about the same time
+  // When the caller stops waiting for the result. A job that cannot start by then is refused.
+  JobClock::time_point deadline = JobClock::time_point::max();
+  std::uint64_t kind = 0;  // jobs of one kind take about the same time
 };
 
 // A job that waits or runs. Its functions must not throw.

@@ -58,7 +58,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     const JobClock::time_point now = now_();
     // Compared in seconds, because a deadline may be time_point::max().
     if (queue_.ExpectedWait(job->order, now) > std::chrono::duration<double>(job->order.deadline - now)) {
-      return MakeError(ErrorCode::kOverloaded, "too much work is waiting to begin with this before its deadline");
+      return MakeError(ErrorCode::kOverloaded, "too many jobs are waiting: this job cannot start before its deadline");
     }
     queue_.Push(job, now);
     // Jobs that an idle thread is about to fetch are not waiting: a pool with queue length 0 still works.

@@ -3,7 +3,8 @@
 // Jobs wait in the queue. A job is refused if it would have to wait past its deadline. If the queue is full, the newest
 // job of the client with the most waiting jobs is dropped. A caller that no longer waits withdraws its job.
 //
-// Thread-safe. A job that was accepted is run, also during shutdown.
+// Thread-safe. An accepted job runs, also during shutdown, unless it is withdrawn or dropped. A dropped job gets
+// `on_dropped`.
 #pragma once
 
 #include <atomic>

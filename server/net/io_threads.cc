@@ -17,7 +17,7 @@ void RunAll(asio::io_context& io) {
       io.run();
       return;
     } catch (const std::exception& exception) {
-      spdlog::error("an I/O thread goes on after: {}", exception.what());
+      spdlog::error("an I/O thread caught an exception and continues: {}", exception.what());
     }
   }
 }

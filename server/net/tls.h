@@ -19,8 +19,8 @@ namespace terrace::server {
 
 class TlsContext {
  public:
-  // PEM files; the certificate's file may contain its chain. kInvalidArgument, kUnavailable: a file cannot be read or
-  // is not PEM, or key and certificate do not belong together.
+  // PEM files; the certificate's file may contain its chain. kInvalidArgument: a file cannot be read or is not PEM, or
+  // key and certificate do not belong together.
   static Result<std::unique_ptr<TlsContext>> Open(std::filesystem::path certificate, std::filesystem::path key);
 
   std::shared_ptr<asio::ssl::context> Current() const;

@@ -106,7 +106,7 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
 std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
   if (!serving_ || stale_since_) return 0;
   if (HasToRecoverCache()) {
-    spdlog::info("dataset {}: what was kept of its sources in cache_dir is gone; it is opened anew", wanted_.name);
+    spdlog::info("dataset {}: its statistics in cache_dir are missing; reopening the dataset", wanted_.name);
     MarkStale();
     return 0;
   }
@@ -168,8 +168,8 @@ void DatasetSlot::Fail(const Error& error) {
   retry_delay_ = std::clamp<Clock::duration>(2 * retry_delay_, kFirstRetry, kLastRetry);
   retry_at_ = Clock::now() + retry_delay_;
   if (std::exchange(problem_, error.message) == error.message) return;
-  spdlog::warn("dataset {}: cannot be opened, {}; trying again: {}", wanted_.name,
-               serving_ ? "tiles that are cached are still served" : "it is not served yet", error.message);
+  spdlog::warn("dataset {}: cannot be opened: {}; {}; the server tries again", wanted_.name, error.message,
+               serving_ ? "cached tiles are still served" : "the dataset is not served yet");
 }
 
 bool DatasetSlot::TakeOpened() {

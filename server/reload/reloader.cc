@@ -31,7 +31,7 @@ void WarnAboutRestart(const config::Config& started, const config::Config& now, 
   for (const std::string& key : config::ChangedServerOptions(now, next)) {
     if (!config::NeedsRestart(key)) continue;
     if (std::ranges::find(differ, key) == differ.end()) continue;  // back to what it was at the start
-    spdlog::warn("configuration: {} has changed, which takes a restart; until then the old value holds", key);
+    spdlog::warn("configuration: {} has changed; the change takes effect after a restart", key);
   }
 }
 
@@ -51,8 +51,8 @@ void WarnAboutAccess(const config::Config& started, const config::Config& now, c
     const bool is_seen = first != at_start.end() && first->second;
     if (dataset.is_public == is_seen) continue;
     if (before != until_now.end() && before->second == dataset.is_public) continue;  // reported already
-    spdlog::warn("configuration: \"public\" of dataset {} has changed, which takes a restart; until then {}",
-                 dataset.name, is_seen ? "everybody sees it" : "it takes a token to see it");
+    spdlog::warn("configuration: \"public\" of dataset {} has changed; restart the server to apply it; until then {}",
+                 dataset.name, is_seen ? "everybody sees it" : "a token is needed to see it");
   }
 }
 
@@ -163,7 +163,8 @@ void Reloader::CheckConfigFile(bool is_requested) {
   if (!next) {
     std::string problem = TextOf(next.error());
     if (!is_requested && problem == config_problem_) return;
-    spdlog::error("the new configuration is wrong, the old one stays: {}", problem);
+    spdlog::error("{}{}the new configuration is wrong, the old one stays: {}", hooks_.file,
+                  hooks_.file.empty() ? "" : ": ", problem);
     config_problem_ = std::move(problem);
     return;
   }

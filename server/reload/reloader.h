@@ -27,6 +27,7 @@ class Reloader {
   struct Hooks {
     // Loads the configuration as at a start of the server.
     std::function<config::ConfigResult()> load;
+    std::string file = {};  // that it is loaded from, for the log; empty: none
     // Returns false if `load` would return the same as last time. Empty: always true.
     std::function<bool()> may_have_changed = {};
     DatasetOpener open;

@@ -53,6 +53,7 @@ class RecordDb {
   ~RecordDb();
 
   // Erases the files of a store that is not open, without reading them. Other files in its directory stay.
+  // kUnavailable: the disk does not respond, or the store is open.
   static Result<void> Destroy(const RecordDbOptions& options);
 
   // Nothing if there is no such record. kInvalidArgument: the record is damaged. kUnavailable: the disk does not
@@ -67,7 +68,8 @@ class RecordDb {
   Result<void> Write(std::span<const Change> changes);
 
   // Erases the records whose keys begin with `prefix` and that `is_chosen` accepts. Reads all that begin with it.
-  // Returns their number. Errors: those of Write.
+  // Returns their number. kCancelled: `stop` was requested. kInvalidArgument: a record is damaged. kUnavailable: as
+  // Write. After an error records may be left.
   Result<std::size_t> EraseIf(std::string_view prefix, const std::function<bool(std::string_view key)>& is_chosen,
                               const std::stop_token& stop = {});
 
@@ -75,7 +77,7 @@ class RecordDb {
   std::size_t bytes() const;
   std::size_t entries() const;
 
-  // Checks that a file of 1 MiB can be written to the store's directory.
+  // Checks that a file of 1 MiB can be written to the store's directory. kUnavailable: it cannot.
   static Result<void> CheckWritable(const RecordDbOptions& options);
 
  private:

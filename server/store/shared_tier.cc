@@ -124,7 +124,7 @@ void SharedTier::Report(const std::string& why, bool is_off) {
   if (is_off) {
     spdlog::warn("shared cache: {}; it is switched off until Redis answers, tiles are built meanwhile", why);
   } else {
-    spdlog::warn("shared cache: {}; nothing is written until it does, values are read", why);
+    spdlog::warn("shared cache: {}; values are read, but not written until Redis accepts writes again", why);
   }
 }
 

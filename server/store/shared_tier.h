@@ -1,14 +1,14 @@
-// A key-value store that several servers share: a Redis that may be slow, full, stopped or wrong. Nothing waits for it
-// longer than one time-out, and nothing depends on it.
+// A key-value store that several servers share: a Redis that may be slow, full, stopped or wrong. Without it tiles are
+// built.
 //
-// Thread-safe. Find blocks for at most one time-out, on a connection that is open already. Opening connections,
-// writing, testing and trying again are the work of a thread of the store. After a time-out, or another failure of a
-// connection, the store is switched off for `retry_after`, and then until a connection opens and answers within the
-// time-out: meanwhile Find returns at once, without a system call. The first look-up that fails ends all others that
-// are under way. So a failing Redis costs one time-out, whatever the number of connections and callers. Connections
-// that nobody used for `test_after` are tested, and those that Redis has closed are replaced, before a look-up meets
-// them. Log and statistics report it. All keys begin with "terrace:" in Redis, so that a user's rights can be limited
-// to them.
+// Thread-safe. Find and Take block for at most one time-out, on a connection that is open already. Erase blocks until
+// Redis has scanned all keys. Opening connections, writing, testing and trying again are the work of a thread of the
+// store. After a time-out, or another failure of a connection, the store is switched off for `retry_after`, and then
+// until a connection opens and answers within the time-out: meanwhile Find returns at once, without a system call. The
+// first look-up that fails ends all others that are under way. So a failing Redis costs one time-out, whatever the
+// number of connections and callers. Connections that nobody used for `test_after` are tested, and those that Redis has
+// closed are replaced, before a look-up meets them. Log and statistics report it. All keys begin with "terrace:" in
+// Redis, so that a user's rights can be limited to them.
 #pragma once
 
 #include <atomic>
@@ -53,6 +53,7 @@ class SharedTier {
   // Writes waiting values, unless Redis fails or this takes longer than half a second.
   ~SharedTier();
 
+  // From now on no value is accepted, and waiting values are dropped. For callers that have no time to wait for Redis.
   void Abandon();
 
   // Returns nothing if the value is absent, too large or damaged, if Redis failed, or if the store is switched off.
@@ -63,14 +64,16 @@ class SharedTier {
   // Removes a value that Find returned and that could not be parsed.
   void Forget(const std::string& key);
 
-  // Takes the lease of a key, which ends with Release or after `time`. kHeld: another server has it; wait, and look
-  // again. kNone: the store is switched off; do not wait.
+  // Takes the lease of a key, which ends with Release or after `time`. Blocks for at most one time-out. kHeld: another
+  // server has it; wait, and look again. kNone: there is no lease, because the store is switched off, Redis failed, or
+  // Redis refuses writes; do not wait.
   enum class Lease { kTaken, kHeld, kNone };
   Lease Take(const std::string& key, std::chrono::milliseconds time);
   void Release(const std::string& key);
 
   // Erases the values whose keys begin with `prefix` and that `is_chosen` accepts, also those that wait to be written.
-  // Blocks. Returns their number. kUnavailable: Redis failed. kCancelled: stopped. In both cases values may be left.
+  // Opens a connection, and blocks until all keys are scanned. Returns their number. kUnavailable: Redis failed.
+  // kCancelled: `stop` was requested. In both cases values may be left.
   Result<std::size_t> Erase(const std::string& prefix, const std::function<bool(std::string_view key)>& is_chosen,
                             const std::stop_token& stop);
 

@@ -192,7 +192,8 @@ void AccessLog::Write(const ReplyRecord& record) {
     if (!writer.Write(line)) return;
     missed = writer.TakeMissed();
   }
-  if (missed > 0) spdlog::warn("{}: {} lines before the last one are missing: nobody took them", name(), missed);
+  if (missed > 0)
+    spdlog::warn("{}: dropped {} lines before the last one: the file or pipe did not accept them", name(), missed);
 }
 
 void AccessLog::Reopen() {
@@ -209,7 +210,9 @@ void AccessLog::Reopen() {
     ::close(std::exchange(descriptor_, descriptor));
     writer_ = std::make_unique<LineWriter>(descriptor);
   }
-  if (missed > 0) spdlog::warn("{}: {} lines are missing at the end of the old file", name(), missed);
+  if (missed > 0)
+    spdlog::warn("{}: dropped {} lines at the end of the old file: the file or pipe did not accept them", name(),
+                 missed);
 }
 
 }  // namespace terrace::server

@@ -27,7 +27,8 @@ struct ReplyRecord {
   std::chrono::microseconds duration{0};  // from the end of the request's head
   std::string_view route;                 // a literal
   std::string_view dataset;               // an existing dataset, or empty
-  std::string_view cache;                 // hit, miss, join or -
+  // Where the tile was: hit, miss, join, the name of the tier that had it (tiler::TileStore::name), or -.
+  std::string_view cache;
   std::string_view request_id;
   std::string_view peer;                 // address and port
   std::string_view client;               // the client that a trusted proxy reports; empty if the peer is the client

@@ -340,7 +340,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
   all.push_back(Versions(state.catalog->datasets));
   add(kCounter, "terrace_catalogs_total", "How often what is served was replaced", state.catalogs);
   const tiler::TilePipeline* const pipeline = state.catalog->pipeline.get();
-  const dem::GdalCounts gdal = pipeline != nullptr ? dem::CountGdalErrors() : dem::GdalCounts();
+  const dem::GdalCounts gdal = pipeline != nullptr ? dem::ReadGdalCounts() : dem::GdalCounts();
   add(kCounter, "terrace_gdal_errors_total", "Failures that GDAL reported", gdal.errors);
   add(kCounter, "terrace_gdal_warnings_total", "Warnings that GDAL reported", gdal.warnings);
   add(kGauge, "terrace_gdal_cache_bytes", "Blocks of sources in GDAL's cache", gdal.cache_bytes);

@@ -132,7 +132,7 @@ int main(int argc, char** argv) {
   CLI::App app("Builds tiles of a dataset as its server would, each once, and prints one line of JSON");
   app.add_option("config", arguments.config, "A server's configuration")->required()->check(CLI::ExistingFile);
   app.add_option("dataset", arguments.dataset, "The name of one of its datasets")->required();
-  app.add_option("tiles", arguments.tiles, "A file of paths, one a line")->required()->check(CLI::ExistingFile);
+  app.add_option("tiles", arguments.tiles, "A file of paths, one on each line")->required()->check(CLI::ExistingFile);
   app.add_option("--threads", arguments.threads, "As many builds at a time")->check(CLI::PositiveNumber);
   app.add_option("--rounds", arguments.rounds, "Builds each tile as many times")->check(CLI::PositiveNumber);
   app.add_flag("--normals", arguments.normals, "Tiles with octvertexnormals");

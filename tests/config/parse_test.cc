@@ -137,7 +137,7 @@ TEST(ParseConfig, SaysWhereAMisplacedKeyBelongs) {
 TEST(ParseConfig, ShowsTheFormOfLayers) {
   EXPECT_THAT(ErrorsOf(R"({"datasets": [{"name": "a", "sources": ["a.tif"], "imagery": "a.tif", "water": true}]})"),
               ElementsAre(IsError("/datasets/0/imagery", "must be {\"image\": \"photo.tif\"}"),
-                          IsError("/datasets/0/water", "or {\"sea_level\": 0}, one of both")));
+                          IsError("/datasets/0/water", "or {\"sea_level\": 0}, exactly one of them")));
 }
 
 TEST(ParseConfig, EscapesKeysInPathsAsJsonPointersDo) {

@@ -92,7 +92,7 @@ TEST_F(SourcePaths, ReachTheConfigWithTheirErrors) {
   ASSERT_FALSE(none);
   EXPECT_THAT(none.error(),
               ElementsAre(IsError("/datasets/0/sources/0",
-                                  "no file matches; correct the path, which counts from " + folder_.string())));
+                                  "no file matches; correct the path; a relative path starts at " + folder_.string())));
 }
 
 }  // namespace

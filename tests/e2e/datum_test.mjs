@@ -99,7 +99,7 @@ describe('vertical datums', () => {
     assert.equal((await json(`${server.url}/egm96/heights?locations=1,2&datum=orthometric`)).datum, 'orthometric');
     const refused = await request(`${server.url}/plain/heights?locations=1,2&datum=orthometric`);
     assert.equal(refused.status, 400);
-    assert.match(refused.body.toString(), /not known what this dataset's heights count from/);
+    assert.match(refused.body.toString(), /the vertical datum of this dataset is unknown/);
   });
 
   it('logs the operation and the lack of one', () => {

@@ -21,10 +21,9 @@ TILE = "/earth/4/9/11.terrain"
 TOKEN = "0123456789abcdef"
 
 
-def free_port():
-    with socket.socket() as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
+def two_free_ports():
+    with socket.create_server(("127.0.0.1", 0)) as one, socket.create_server(("127.0.0.1", 0)) as other:
+        return one.getsockname()[1], other.getsockname()[1]
 
 
 def wait_for_port(port):
@@ -73,7 +72,7 @@ class Proxied(unittest.TestCase):
 
     @classmethod
     def start_nginx(cls):
-        cls.http_port, cls.port = free_port(), free_port()
+        cls.http_port, cls.port = two_free_ports()
         certificates = cls.folder / "certificates"
         certificates.mkdir()
         subprocess.run(["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes", "-days", "2",

@@ -313,7 +313,7 @@ class Preparing(unittest.TestCase):
             with self.serve({"hills": hills, "jacksboro": SAMPLE}) as server:
                 server.wait_until_it_answers()
                 self.gate.open()
-                server.eventually("/readyz", 200, "degraded\ndataset hills: its source cannot be opened as it is now\n")
+                server.eventually("/readyz", 200, "degraded\ndataset hills: cannot be opened as its files are now; the log has the reason\n")
                 status, headers, body = server.get("/hills/layer.json")
                 self.assertEqual((status, headers["Retry-After"]), (503, "5"))
                 self.assertIn(b"cannot be opened", body)

@@ -382,8 +382,8 @@ class Configuration(ReloadTest):
                            "max_locations": 1})
         self.assertTrue(eventually(lambda: self.names(server) == ["b", "a"]
                                    and server.json("/datasets")["datasets"][1]["attribution"] == "new"), server.log())
-        self.assertIn("max_connections has changed, which takes a restart", server.log())
-        self.assertIn("max_locations has changed, which takes a restart; until then the old value holds", server.log())
+        self.assertIn("max_connections has changed; the change takes effect after a restart", server.log())
+        self.assertIn("max_locations has changed; the change takes effect after a restart", server.log())
         self.assertEqual(server.get("/a/heights?locations=36.3,-84.2|36.3,-84.1")[0], 200)
         self.write_config({"datasets": [self.dataset("b")]})
         self.assertTrue(eventually(lambda: self.names(server) == ["b"]))
@@ -399,9 +399,9 @@ class Configuration(ReloadTest):
         self.assertNotIn(warning, server.log())
         self.write_config({"tokens": [token], "datasets": [other, self.dataset("a")]})
         self.assertTrue(eventually(lambda: server.get("/a/layer.json")[0] == 200), server.log())
-        self.assertIn(f"{warning}, which takes a restart; until then everybody sees it", server.log())
+        self.assertIn(f"{warning}; restart the server to apply it; until then everybody sees it", server.log())
         self.write_config({"tokens": [token], "datasets": [other, public, self.dataset("c", public=True)]})
-        self.assertTrue(eventually(lambda: "until then it takes a token to see it" in server.log()), server.log())
+        self.assertTrue(eventually(lambda: "until then a token is needed to see it" in server.log()), server.log())
         self.assertEqual(server.log().count(warning), 1)  # unchanged since the start
 
     def test_a_token_for_a_dataset_that_is_not_there_is_told(self):

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Measures the time of tiles end to end, by level and by stage: `make bench-serve`.
 
-    tests/load/bench_serve.py [--data FOLDER] [--only NAME,...] [--tiles N] [--rounds N] BINARY [BINARY...]
+    tests/load/bench_serve.py [--data FOLDER] [--only NAME,...] [--raster FILE] [--tiles N] [--rounds N] BINARY [BINARY...]
 
 Each BINARY serves each dataset with one worker, without caches, and gets requests for the same tiles of each level, one
 after the other. Binaries take turns within each round, so that other load on the machine affects all of them. The output for each
@@ -203,6 +203,7 @@ def main():
     parser.add_argument("binaries", nargs="+", metavar="BINARY")
     parser.add_argument("--data", type=pathlib.Path, default=ROOT / "../shared/data", metavar="FOLDER")
     parser.add_argument("--only", default=",".join(DATASETS), help="names of datasets: " + ", ".join(DATASETS))
+    parser.add_argument("--raster", type=pathlib.Path, metavar="FILE", help='1" raster in place of that of "geographic" and "cog"')
     parser.add_argument("--tiles", type=int, default=40, help="of each level")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--peer", help="see above")
@@ -211,6 +212,8 @@ def main():
     missing = True
     for name in arguments.only.split(","):
         names, levels = DATASETS[name]
+        if arguments.raster and names == MAUI[:1]:
+            names = [str(arguments.raster.resolve())]
         sources = [(arguments.data / source).resolve() for source in names]
         if not all(source.exists() for source in sources):
             print(f"{name}: left out, {arguments.data} does not have {', '.join(names)}")

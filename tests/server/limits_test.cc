@@ -234,9 +234,10 @@ TEST_F(Limits, NamesDatasetsWithProblemsToThoseWhoMaySeeThem) {
   options.config.tokens = {{"everybody", config::TokenHash(kAll), {}, 0}};
   Start(options);
   server_->SetProblems({{"maui", "/secret/maui.tif is gone"}});
-  EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: its source cannot be opened as it is now\n");
+  EXPECT_EQ(Fetch(port(), "/readyz").body,
+            "degraded\ndataset: cannot be opened as its files are now; the log has the reason\n");
   EXPECT_EQ(Fetch(port(), "/readyz", std::string("Authorization: Bearer ") + kAll + "\r\n").body,
-            "degraded\ndataset maui: its source cannot be opened as it is now\n");
+            "degraded\ndataset maui: cannot be opened as its files are now; the log has the reason\n");
 }
 
 TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {

@@ -110,7 +110,8 @@ TEST_F(Pending, DatasetsAreToldWhileOthersAreServed) {
   server_->SetProblems({{"andes", "/secret/andes.tif: is no raster"}});
   EXPECT_NE(Fetch(port(), "/datasets").body.find(R"({"name":"andes","percent":0,"failed":true})"), std::string::npos);
   EXPECT_EQ(Fetch(port(), "/readyz").body,
-            "degraded\ndataset andes: its source cannot be opened as it is now\ndataset alps: being prepared, 99 %\n");
+            "degraded\ndataset andes: cannot be opened as its files are now; the log has the reason\ndataset alps: "
+            "being prepared, 99 %\n");
   const Reply failed = Fetch(port(), "/andes/layer.json");
   EXPECT_EQ(failed.status, 503);
   EXPECT_NE(failed.body.find("cannot be opened"), std::string::npos);

@@ -163,7 +163,7 @@ TEST_F(Replace, DoesNotWaitForADatasetWithAProblem) {
   EXPECT_EQ(told, 1) << "it may be mended meanwhile";
   const Reply ready = Fetch(server_->port(), "/readyz");
   EXPECT_EQ(ready.status, 200);
-  EXPECT_EQ(ready.body, "degraded\ndataset maui: its source cannot be opened as it is now\n");
+  EXPECT_EQ(ready.body, "degraded\ndataset maui: cannot be opened as its files are now; the log has the reason\n");
 }
 
 TEST_F(Replace, TakesOverTheOptionsThatMayChange) {

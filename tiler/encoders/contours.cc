@@ -11,7 +11,7 @@ namespace terrace::tiler {
 Result<void> EncodeContours(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   encoded.refinement = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
-  const MapWindow window(input.request.key, kHeightSizes[0], kContourMargin);
+  const MapWindow window(input.request.key, kSidesPx[0], kContourMargin);
   const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kSource, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);

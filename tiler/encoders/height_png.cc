@@ -28,7 +28,7 @@ double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding enco
 Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const Dataset& dataset = input.dataset;
   const TileRequest& request = input.request;
-  const int size = request.height_size;
+  const int size = request.side_px;
   // A tile of 512 pixels has the pixels of the four tiles of 256 below it.
   const int depth = request.key.level + (size == 512 ? 1 : 0);
   if (depth > dataset.source->info().max_mercator_depth) {

@@ -30,7 +30,7 @@ Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, cons
   if (!input.dataset.imagery.image) return NoImagery();
   const auto start = std::chrono::steady_clock::now();
   const geo::TileKey& key = input.request.key;
-  const int size = input.request.height_size, depth = key.level + (size == 512 ? 1 : 0);
+  const int size = input.request.side_px, depth = key.level + (size == 512 ? 1 : 0);
   return EncodeMapPicture(input.dataset.imagery.image->ReadMercator(depth, key.x * size, key.y * size, size, stop),
                           start, input, encoded);
 }
@@ -38,7 +38,7 @@ Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, cons
 Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   if (!input.dataset.imagery.image) return NoImagery();
   const auto start = std::chrono::steady_clock::now();
-  return EncodeMapPicture(input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.height_size, stop),
+  return EncodeMapPicture(input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.side_px, stop),
                           start, input, encoded);
 }
 

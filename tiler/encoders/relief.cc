@@ -18,7 +18,7 @@ Result<std::vector<Gradient>> ReadGradients(const EncoderInput& input, EncodedTi
                                             const std::stop_token& stop) {
   encoded.refinement = RefinementUse::kNone;
   const auto start = std::chrono::steady_clock::now();
-  const MapWindow window(input.request.key, input.request.height_size, kReliefMargin);
+  const MapWindow window(input.request.key, input.request.side_px, kReliefMargin);
   const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kEllipsoid, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);
@@ -77,7 +77,7 @@ Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, co
     const int shade = hillshade.Of(gradient);
     values.push_back(shade == 0 ? -1 : shade);
   }
-  return StoreBytes(EncodeGrey(values, input.request.height_size, input.request.map.picture), encoded, start);
+  return StoreBytes(EncodeGrey(values, input.request.side_px, input.request.map.picture), encoded, start);
 }
 
 Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
@@ -88,7 +88,7 @@ Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const 
   steps.reserve(gradients->size());
   for (const Gradient& gradient : *gradients) steps.push_back(SlopeStep(gradient));
   const auto encode = input.request.map.slope_style == SlopeStyle::kColors ? EncodeSlopeColors : EncodeGrey;
-  return StoreBytes(encode(steps, input.request.height_size, input.request.map.picture), encoded, start);
+  return StoreBytes(encode(steps, input.request.side_px, input.request.map.picture), encoded, start);
 }
 
 }  // namespace terrace::tiler

@@ -44,7 +44,7 @@ std::string_view GetText(ByteReader& reader) {
 std::string RecordKey(const CacheKey& key) {
   const auto& [request, generation, edits] = key;
   const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, height_size, map] = request;
+               height_encoding, side_px, map] = request;
   static_cast<void>(dataset);  // the generation identifies it
   ByteWriter writer;
   writer.Put(generation);
@@ -58,7 +58,7 @@ std::string RecordKey(const CacheKey& key) {
   writer.Put(static_cast<std::uint8_t>(water_mask));
   writer.Put(static_cast<std::uint8_t>(metadata));
   writer.Put(static_cast<std::uint8_t>(height_encoding));
-  writer.Put(static_cast<std::int32_t>(height_size));
+  writer.Put(static_cast<std::int32_t>(side_px));
   if (IsForMaps(format)) {
     const auto& [picture, azimuth_deg, altitude_deg, z_factor_hundredths, slope_style, interval_cm] = map;
     writer.Put(static_cast<std::uint8_t>(picture));

@@ -11,7 +11,7 @@
 namespace terrace::tiler {
 
 struct DrawnMeshKey {
-  std::uint64_t generation = 0;
+  std::uint64_t generation = 0;  // Dataset::generation: with the edits
   geo::TileKey key;
   int error_step = 0;
   bool is_glb = false;

@@ -34,7 +34,7 @@ constexpr bool IsMercator(TileFormat format) {
 constexpr bool IsForMaps(TileFormat format) { return format > TileFormat::kHeightPng; }
 
 // Pixels along an edge of a height tile or of a picture for maps; the first is the default.
-inline constexpr std::array<int, 2> kHeightSizes = {256, 512};
+inline constexpr std::array<int, 2> kSidesPx = {256, 512};
 
 struct TileRequest {
   std::uint32_t dataset = 0;  // index into the catalog's datasets
@@ -49,9 +49,9 @@ struct TileRequest {
   bool normals = false;
   bool water_mask = false;
   bool metadata = false;
-  // Tiles of IsMercator(format), and kGeodeticImagery: height_size * height_size pixels.
+  // Tiles of IsMercator(format), and kGeodeticImagery: side_px * side_px pixels.
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
-  int height_size = kHeightSizes[0];
+  int side_px = kSidesPx[0];
   MapParameters map;  // IsForMaps(format)
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;

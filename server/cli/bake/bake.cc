@@ -57,9 +57,10 @@ void AddWhat(CLI::App& command, BakeArguments& arguments) {
                   "must not run meanwhile")
       ->type_name("DIR");
   command
-      .add_option("--form", arguments.form,
-                  "chunks: files of a few thousand tiles, for terrace serve and updates; folder: a file a tile, for "
-                  "static hosts; single: one PMTiles file; 3tz: one file of 3D Tiles")
+      .add_option(
+          "--form", arguments.form,
+          "chunks: files of a few thousand tiles, for terrace serve and updates; folder: one file for each tile, for "
+          "static hosts; single: one PMTiles file; 3tz: one file of 3D Tiles")
       ->check(OneForm())
       ->type_name("chunks|folder|single|3tz")
       ->capture_default_str()
@@ -123,7 +124,7 @@ void AddStatus(CLI::App& bake, int& exit_code) {
   command->add_option("--queue", arguments->queue, "Redis of the job")->type_name("redis://HOST:PORT/DB")->required();
   command->add_option("--job", arguments->job, "The name of the job")->type_name("NAME")->required();
   AddQueueSecrets(*command, *arguments, "Options");
-  command->add_flag("--json", how->json, "Prints JSON, with --watch a line each time");
+  command->add_flag("--json", how->json, "Prints JSON, with --watch one line each time");
   command->add_flag("--watch", how->watch, "Prints again every two seconds, until the job has ended");
   command->add_flag("--remove", how->remove, "Removes the job from Redis; the files of the bake stay");
   command->callback([arguments, how, &exit_code] { exit_code = FinishOutput(ShowStatus(*arguments, *how)); });
@@ -171,7 +172,9 @@ void AddHow(CLI::App& command, BakeArguments& arguments) {
       ->type_name("PLACE")
       ->group(kHow);
   command.add_flag("--json", arguments.json, "Prints one line of JSON for each file, and a summary")->group(kHow);
-  command.add_flag("--yes", arguments.yes, "Bakes more than 1,000,000,000 tiles without asking")->group(kHow);
+  command
+      .add_flag("--yes", arguments.yes, "Allows a bake of more than 1,000,000,000 tiles, which is refused otherwise")
+      ->group(kHow);
 }
 
 void AddPlanning(CLI::App& command, BakeArguments& arguments) {
@@ -181,21 +184,26 @@ void AddPlanning(CLI::App& command, BakeArguments& arguments) {
       ->group(kPlanning);
   command
       .add_option("--catalogue", arguments.catalogue,
-                  "With --dry-run, instead of DEMs: a list of one-degree cells such as N46E008, one a line")
+                  "With --dry-run, instead of DEMs: a list of one-degree cells such as N46E008, one on each line")
       ->type_name("FILE")
       ->group(kPlanning);
   command
-      .add_option("--arc-seconds", arguments.arc_seconds, "Of the catalogue: spacing of samples from south to north")
+      .add_option("--arc-seconds", arguments.arc_seconds,
+                  "With --catalogue: spacing of samples from south to north, in arc seconds")
       ->check(NumberAbove0("a number above 0"))
       ->capture_default_str()
       ->type_name("S")
       ->group(kPlanning);
-  command.add_option("--bytes-per-tile", arguments.bytes_per_tile, "Assumed for the catalogue")
+  command
+      .add_option("--bytes-per-tile", arguments.bytes_per_tile,
+                  "With --catalogue: assumed mean size of a tile in bytes")
       ->check(NumberAbove0("a number above 0"))
       ->capture_default_str()
       ->type_name("N")
       ->group(kPlanning);
-  command.add_option("--ms-per-tile", arguments.milliseconds_per_tile, "Assumed for the catalogue")
+  command
+      .add_option("--ms-per-tile", arguments.milliseconds_per_tile,
+                  "With --catalogue: assumed mean time to build a tile in milliseconds")
       ->check(NumberAbove0("a number above 0"))
       ->capture_default_str()
       ->type_name("MS")
@@ -219,8 +227,10 @@ void AddBake(CLI::App& app, int& exit_code) {
       "  terrace bake --config terrace.json --dataset maui --into-cache /var/cache/terrace\n"
       "  terrace bake alps.tif --dry-run\n\n"
       "A bake that was interrupted goes on when the same command is run again: finished files are checked and\n"
-      "kept. The manifest is written last. Exit codes: 0 complete; 1 files failed or are missing, and are listed;\n"
-      "2 wrong arguments; 130 or 143 stopped by a signal.");
+      "kept. The manifest is written last.\n\n"
+      "Exit codes: 0 the bake, or its shard, is complete; 1 it is not complete: files failed or are missing, or a\n"
+      "source, the place or Redis cannot be used; 2 the arguments are wrong, or do not fit the place or the job;\n"
+      "130 or 143 stopped by a signal.");
   AddWhat(*command, *arguments);
   AddHow(*command, *arguments);
   AddPlanning(*command, *arguments);

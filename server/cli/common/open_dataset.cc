@@ -89,7 +89,7 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
 
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress, std::stop_token stop,
-                                                   std::function<void(const Error&)> fault, bool only_kept) {
+                                                   std::function<void(const Error&)> fault, bool only_cached) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
@@ -102,8 +102,8 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.progress = progress;
   options.stop = std::move(stop);
   options.fault = std::move(fault);
-  return only_kept ? dem::DemSource::OpenKept(FilesOf(wanted), options)
-                   : dem::DemSource::Open(FilesOf(wanted), options);
+  return only_cached ? dem::DemSource::OpenFromCache(FilesOf(wanted), options)
+                     : dem::DemSource::Open(FilesOf(wanted), options);
 }
 
 Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
@@ -145,10 +145,10 @@ Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const de
   return dataset;
 }
 
-Result<std::optional<tiler::Dataset>> OpenKept(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
-                                               const std::string& version, const std::stop_token& stop) {
+Result<std::optional<tiler::Dataset>> OpenFromCache(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
+                                                    const std::string& version, const std::stop_token& stop) {
   if (wanted.sources.empty() && !wanted.baked.empty()) return OpenBakedAlone(wanted);
-  auto source = OpenSource(wanted, cache, /*progress=*/{}, stop, /*fault=*/{}, /*only_kept=*/true);
+  auto source = OpenSource(wanted, cache, /*progress=*/{}, stop, /*fault=*/{}, /*only_cached=*/true);
   const bool lacks_statistics = !source && source.error().code == ErrorCode::kCancelled && !stop.stop_requested();
   if (lacks_statistics) return std::nullopt;
   if (!source) return tl::unexpected(source.error());

@@ -15,12 +15,12 @@
 namespace terrace::cli {
 
 // Opens all files of the dataset and reads their statistics, which are stored in `cache`. Errors name the file and the
-// remedy. `fault`: dem::DemOptions. `only_kept`: dem::DemSource::OpenKept.
+// remedy. `fault`: dem::DemOptions. `only_cached`: dem::DemSource::OpenFromCache.
 Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                    const std::function<void(double)>& progress,
                                                    std::stop_token stop = {},
                                                    std::function<void(const Error&)> fault = {},
-                                                   bool only_kept = false);
+                                                   bool only_cached = false);
 
 // Makes a dataset from an open source, with its water mask and imagery. `version`: of this program. Tiles contain it,
 // so a new version is a new generation.
@@ -35,7 +35,7 @@ Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const de
 
 // The same from statistics that `cache` has, without reading a raster. Nothing: it lacks some. All sources were checked
 // then, but not edits, the water mask and the imagery, which need an open source.
-Result<std::optional<tiler::Dataset>> OpenKept(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
-                                               const std::string& version, const std::stop_token& stop);
+Result<std::optional<tiler::Dataset>> OpenFromCache(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
+                                                    const std::string& version, const std::stop_token& stop);
 
 }  // namespace terrace::cli

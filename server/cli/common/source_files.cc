@@ -69,7 +69,15 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
     return MakeError(ErrorCode::kNotFound, "dataset {}: {}: {}; give the path of a raster file on this machine{}{}",
                      dataset.name, path, ErrorText(reason), remedy, reason == ENOENT ? SimilarFile(path) : "");
   };
+  const auto read_grid = [&](const std::string& vertical) -> Result<void> {
+    if (!vertical.starts_with('/') || ::access(vertical.c_str(), R_OK) == 0) return {};
+    const int reason = errno;
+    return MakeError(ErrorCode::kNotFound, "dataset {}: vertical: {}: {}; name a grid of undulations, or a datum{}",
+                     dataset.name, vertical, ErrorText(reason), reason == ENOENT ? SimilarFile(vertical) : "");
+  };
+  if (Result<void> readable = read_grid(dataset.vertical); !readable) return readable;
   for (const config::SourceConfig& source : dataset.sources) {
+    if (Result<void> readable = read_grid(source.vertical.value_or("")); !readable) return readable;
     for (const std::string& file : source.files) {
       if (Result<void> readable = read(file, ""); !readable) return readable;
     }

@@ -1,5 +1,6 @@
 // terrace fly: a client that flies over a served dataset, and reports how it was served.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <atomic>
@@ -43,9 +44,11 @@ Result<void> CheckWritable(const std::string& path, const std::string& read) {
   if (std::filesystem::equivalent(path, read, ignored)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} is the file of --path; give another name", path);
   }
-  // A pipe would take the end of this try for the end of the report.
-  const bool is_other = std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored);
-  if (path.empty() || is_other || std::ofstream(path, std::ios::app)) return {};
+  // A pipe would take the end of a try for the end of the report.
+  const bool is_pipe = std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored) &&
+                       !std::filesystem::is_directory(path, ignored);
+  const bool is_writable = is_pipe ? ::access(path.c_str(), W_OK) == 0 : bool(std::ofstream(path, std::ios::app));
+  if (path.empty() || is_writable) return {};
   return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; name a file in a folder that is writable", path,
                    ErrorText());
 }
@@ -74,6 +77,9 @@ int RunFly(const FlyArguments& arguments) {
       },
       statistics);
 
+  // The reports may wait for the reader of a pipe.
+  std::signal(SIGINT, SIG_DFL);
+  std::signal(SIGTERM, SIG_DFL);
   const fly::FlightRecord record = statistics.record();
   const fly::Summary summary = fly::Summarize(*options, record);
   const fly::Judgements judgements = fly::Judge(*requirements, summary);

@@ -112,7 +112,7 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
   options.frames_per_second = arguments.fps;
   options.clients = arguments.clients;
   options.max_loads = arguments.loads;
-  options.max_tile_bytes = static_cast<std::uint64_t>(arguments.cache_mb) << 20;
+  options.max_tile_bytes = static_cast<std::uint64_t>(arguments.cache_mib) << 20;
   options.first_view_limit_s = arguments.first_view_limit;
   options.arrival_limit_s = std::min(options.arrival_limit_s, arguments.first_view_limit);
   options.http.timeout_s = arguments.timeout;
@@ -135,16 +135,18 @@ void AddNumber(CLI::App& command, const char* name, T& value, const char* type, 
 void AddPathFlags(CLI::App& command, FlyArguments& a) {
   command.option_defaults()->group("Flight path");
   command
-      .add_option("--path", a.path,
-                  "File of points: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch a line; or "
-                  "GeoJSON with a LineString")
+      .add_option(
+          "--path", a.path,
+          "File of points, one on each line: lon,lat,height[,heading,pitch] or seconds,lon,lat,height,heading,pitch; "
+          "or GeoJSON with a LineString")
       ->type_name("FILE");
   command.add_option("--from", a.from, "Start, degrees and metres above the ellipsoid")->type_name("LON,LAT,H");
   command.add_option("--to", a.to, "End; the client flies back and forth")->type_name("LON,LAT,H");
-  command.add_option("--circle", a.circle, "Circle around a place, metres")->type_name("LON,LAT,H,RADIUS");
+  command.add_option("--circle", a.circle, "Circle around a place: degrees; height and radius in metres")
+      ->type_name("LON,LAT,H,RADIUS");
   AddNumber(command, "--speed", a.speed, "M/S", 0.001, 1e7, "Metres per second");
   AddNumber(command, "--pitch", a.pitch, "DEGREES", -90.0, 90.0,
-            "Where the path states none; 0 looks at the horizon, -90 down");
+            "Pitch of the camera if the path has none: 0 is the horizon, -90 straight down");
   command.add_option("--duration", a.duration, "Seconds of the flight; default: once along the path, at least 10")
       ->type_name("S")
       ->check(CLI::Range(0.0, 7 * 86400.0).description(""));
@@ -163,11 +165,12 @@ void AddClientFlags(CLI::App& command, FlyArguments& a) {
   AddNumber(command, "--width", a.width, "PX", 1, 32768, "Width of the screen");
   AddNumber(command, "--height", a.height, "PX", 1, 32768, "Height of the screen");
   AddNumber(command, "--loads", a.loads, "N", 1, 1000, "Requests of a client at a time");
-  AddNumber(command, "--cache", a.cache_mb, "MIB", 1, 65536, "Decoded tiles that a client keeps");
+  AddNumber(command, "--cache", a.cache_mib, "MIB", 1, 65536, "Memory for the decoded tiles of one client");
   command.add_flag("--forbid-holes", a.forbid_holes, "Load all four siblings before any of them is drawn");
   command.add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")->type_name("HEADER");
   command.add_flag("--insecure", a.insecure, "Accept any TLS certificate");
-  AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0, "Until a request without a complete reply is given up");
+  AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0,
+            "Longest time of connecting, and from a request to its complete reply");
   AddNumber(command, "--first-view-limit", a.first_view_limit, "S", 0.1, 3600.0,
             "A client takes off after this time without a full view");
 }
@@ -177,7 +180,7 @@ void AddReportFlags(CLI::App& command, FlyArguments& a) {
   command.add_option("--report", a.report, "Page with plots, without references to other files")
       ->type_name("FILE.html");
   command.add_flag("--json", a.json, "Report as JSON on stdout; progress goes to stderr");
-  command.add_option("--urls", a.urls, "Paths of all requested tiles, in order, one a line")->type_name("FILE");
+  command.add_option("--urls", a.urls, "Paths of all requested tiles, in order, one on each line")->type_name("FILE");
   command
       .add_option("--require", a.require,
                   "Exit status 1 unless all hold: full-view=2s, p50=10ms, p99=50ms, refined=95%, screen-error=20px, "

@@ -15,8 +15,15 @@ namespace terrace::cli {
 
 struct FlyArguments {
   std::string url, path, from, to, circle, format = "terrain", report, urls, require;
-  double speed = 200, fps = 60, fov = 60, pitch = -20, sse = 16, duration = -1, timeout = 30, first_view_limit = 30;
-  int clients = 1, loads = 20, width = 1920, height = 1080, cache_mb = 512;
+  double speed = 200;                          // metres per second
+  double fov = 60, pitch = -20;                // degrees
+  double sse = 16;                             // pixels
+  double duration = -1;                        // seconds; below 0: once along the path, at least 10
+  double timeout = 30, first_view_limit = 30;  // seconds
+  double fps = 60;
+  int clients = 1, loads = 20;
+  int width = 1920, height = 1080;  // pixels
+  int cache_mib = 512;              // for each client
   bool json = false, forbid_holes = false, insecure = false;
   std::vector<std::string> headers;
 };

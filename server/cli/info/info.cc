@@ -262,8 +262,8 @@ int Info(const InfoArguments& arguments) {
     if (!draw.empty()) exit_code = std::max(exit_code, Draw(*source, draw));
   }
   if (!problem.empty()) {
-    std::fprintf(stderr, "terrace: cache_dir %s: %s; what is learnt anew is not kept there\n",
-                 cache.folder->path().c_str(), problem.c_str());
+    std::fprintf(stderr, "terrace: cache_dir %s: %s; new statistics are not saved\n", cache.folder->path().c_str(),
+                 problem.c_str());
   }
   if (cache.folder) cache.folder->Trim();
   if (json) fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));

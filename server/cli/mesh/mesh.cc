@@ -103,7 +103,7 @@ std::string ComplainAboutArea(const MeshArguments& arguments) {
   const bool is_plain = arguments.max_error > 0 && arguments.criterion != kDataDependent && !arguments.compact &&
                         arguments.threads == 1 && !arguments.color.IsUsed();
   if (!is_plain) {
-    return "--edits, --vertical and --bbox make the mesh of a served area, whose one goal is a --max-error above 0; "
+    return "with --edits, --vertical or --bbox the only goal is --max-error, and it must be above 0; "
            "leave out --points, --rms, --criterion, --compact, --threads and colours";
   }
   if (!arguments.coordinates.empty() && !IsOfAreas(arguments.coordinates))
@@ -282,16 +282,18 @@ void AddCriterionOptions(CLI::App& command, MeshArguments& arguments) {
       ->type_name("NAME")
       ->capture_default_str();
   command
-      .add_option("--measure", arguments.measure,
-                  "With data-dependent: how the fit of two triangles is measured: sum-max, sum-squares, max-max or "
-                  "normals; by default sum-max")
+      .add_option(
+          "--measure", arguments.measure,
+          "With data-dependent: the misfit of two triangles that is compared: sum-max (sum of their largest errors), "
+          "sum-squares (sum of all squared errors), max-max (the larger of their largest errors), normals (angle "
+          "between their normals); by default sum-max")
       ->check(OneOf(kMeasures))
       ->type_name("NAME");
   command
       .add_option(
           "--qthresh", arguments.qthresh,
-          "With data-dependent: weight of the shape of triangles against their fit: 0 uses the fit alone, 1 the "
-          "shape wherever it differs; by default 0.5")
+          "With data-dependent: when the shape of triangles decides instead of their fit: 0 never, 1 whenever the "
+          "shapes differ; by default 0.5")
       ->check(NumberFrom(0, 1, "a number from 0 to 1"))
       ->type_name("SHARE");
 }

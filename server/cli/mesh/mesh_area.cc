@@ -150,7 +150,7 @@ int MeshArea(const AreaMeshArguments& arguments) {
 }
 
 void AddAreaOptions(CLI::App& command, AreaOptions& options) {
-  constexpr const char* kGroup = "Areas in metres, as /mesh of a server; with --max-error";
+  constexpr const char* kGroup = "Meshes of an area, as /{dataset}/mesh of a server; need --max-error";
   std::vector<config::OptionInfo> of_datasets = config::DatasetOptions();
   std::erase_if(of_datasets, [](const auto& option) { return option.key != "edits" && option.key != "vertical"; });
   AddFlags(command, of_datasets, kGroup, options.dataset);

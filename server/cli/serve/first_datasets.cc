@@ -146,7 +146,7 @@ std::optional<FirstDatasets> OpenFirstDatasets(const config::Config& config, con
     open[i] = *std::move(dataset);
   };
   for (std::size_t i = 0; i < wanted.size(); ++i) {
-    auto kept = OpenKept(wanted[i], cache, TERRACE_VERSION, stop);
+    auto kept = OpenFromCache(wanted[i], cache, TERRACE_VERSION, stop);
     if (stop.stop_requested()) return std::nullopt;
     if (kept && !*kept) {
       lacking.push_back(i);

@@ -38,7 +38,7 @@ class StderrSink final : public spdlog::sinks::base_sink<std::mutex> {
     if (!Put(message)) return;
     const std::uint64_t missed = server::LineWriter::Stderr().TakeMissed();
     if (missed == 0) return;
-    const std::string note = fmt::format("{} lines before the last one are missing: nobody took them", missed);
+    const std::string note = fmt::format("dropped {} lines before the last one: stderr did not accept them", missed);
     Put({message.logger_name, spdlog::level::warn, note});
   }
   void flush_() override {}

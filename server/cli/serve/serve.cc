@@ -73,6 +73,7 @@ void WarnAboutTokens(const config::Config& config) {
 }
 
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
+  WarnAboutTokens(config);
   if (const int exit_code = CheckStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
       exit_code != kExitOk)
     return exit_code;

@@ -169,6 +169,7 @@ int ServeRun::ServeDatasets() {
 server::Reloader::Hooks ServeRun::MakeHooks() {
   server::Reloader::Hooks hooks;
   hooks.load = [this] { return watch_.Load(); };
+  hooks.file = arguments_.config_file;
   hooks.may_have_changed = [this] { return watch_.MayHaveChanged(); };
   hooks.stop = stop_opening_.get_token();
   hooks.open = [cache = cache_, shares = shares_, end = hooks.stop](const config::DatasetConfig& wanted,

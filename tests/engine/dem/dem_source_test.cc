@@ -245,21 +245,21 @@ TEST(DemSource, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
   std::ofstream(wrong) << "no raster";
   DemOptions options;
   options.cache = CacheIn(cache);
-  const auto lacks = DemSource::OpenKept({{path}}, options);
+  const auto lacks = DemSource::OpenFromCache({{path}}, options);
   ASSERT_FALSE(lacks);
   EXPECT_EQ(lacks.error().code, ErrorCode::kCancelled);
-  const auto is_checked = DemSource::OpenKept({{path}, {wrong}}, options);
+  const auto is_checked = DemSource::OpenFromCache({{path}, {wrong}}, options);
   ASSERT_FALSE(is_checked);
   EXPECT_NE(is_checked.error().code, ErrorCode::kCancelled);
   EXPECT_NE(is_checked.error().message.find(wrong), std::string::npos) << is_checked.error().message;
   EXPECT_FALSE(std::filesystem::exists(cache) && !std::filesystem::is_empty(cache)) << "nothing was begun";
 
   const auto prepared = OpenOrFail(path, options);
-  const auto kept = DemSource::OpenKept({{path}}, options);
+  const auto kept = DemSource::OpenFromCache({{path}}, options);
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ((*kept)->fingerprint(), prepared->fingerprint());
   options.cache = {};
-  EXPECT_FALSE(DemSource::OpenKept({{path}}, options)) << "without a cache nothing is kept";
+  EXPECT_FALSE(DemSource::OpenFromCache({{path}}, options)) << "without a cache nothing is kept";
 }
 
 }  // namespace

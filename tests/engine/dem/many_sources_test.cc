@@ -428,17 +428,18 @@ TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
 }
 
-// Files without statistics are opened once more after OpenKept, and told then.
+// Files without statistics are opened once more after OpenFromCache, and told then.
 TEST(ManySources, TheLogSaysTheSameOfAFileOnce) {
   const TempDir dir;
   DemOptions options;
   options.cache = CacheIn(dir.File("cache"));
   const auto files = WriteFolder(dir, 2);
   EXPECT_TRUE(DemSource::Open({files.front()}, options).has_value());
-  EXPECT_EQ(LogOf([&] { EXPECT_FALSE(DemSource::OpenKept(files, options).has_value()); }), "");
-  for (const bool only_kept : {false, true}) {
+  EXPECT_EQ(LogOf([&] { EXPECT_FALSE(DemSource::OpenFromCache(files, options).has_value()); }), "");
+  for (const bool only_cached : {false, true}) {
     const std::string log = LogOf([&] {
-      EXPECT_TRUE((only_kept ? DemSource::OpenKept(files, options) : DemSource::Open(files, options)).has_value());
+      EXPECT_TRUE(
+          (only_cached ? DemSource::OpenFromCache(files, options) : DemSource::Open(files, options)).has_value());
     });
     EXPECT_EQ(std::ranges::count(log, '\n'), 2) << log;
   }

@@ -43,7 +43,7 @@ TEST(OpenErrors, OfferGeoreferencing) {
   ExpectRefused(WriteRaster(dir, {.georeferenced = false, .crs = ""}),
                 {"no georeference", "gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out"});
   ExpectRefused(WriteRaster(dir, {.geo_transform = {7, .1, 0, 47, 0, -.1}, .crs = ""}),
-                {"no coordinate reference system", "gdal_translate -a_srs EPSG:XXXX in out"});
+                {"no coordinate reference system", "gdal_translate -a_srs EPSG:XXXX in out", "XXXX is 4326"});
   ExpectRefused(WriteRaster(dir, {.crs = "LOCAL_CS[\"site grid\",UNIT[\"metre\",1]]"}), {"not tied to the Earth"});
 }
 
@@ -152,18 +152,62 @@ TEST(OpenErrors, OverviewsNeedNoMaskOfTheirOwn) {
   }
 }
 
-TEST(OpenErrors, NameDamagedSidecarsOfPartsOfAMosaic) {
+// An alpha band masks, too, but a .msk is another mask.
+TEST(OpenErrors, NameADamagedMaskBesideAnAlphaBand) {
   const TempDir dir;
-  const std::string part = WriteRaster(dir, {}), mosaic = dir.File("mosaic.vrt");
-  ASSERT_TRUE(AllowVrts());
-  WriteVrt(part, mosaic);
-  EXPECT_TRUE(DemSource::Open(mosaic).has_value());
-  std::ofstream(part + ".msk") << "garbage";
-  ExpectRefused(mosaic, {part + ".msk: is not used by GDAL"});
-  std::filesystem::remove(part + ".msk");
-  WriteMask(part);
-  EXPECT_TRUE(DemSource::Open(mosaic).has_value());
-  ASSERT_TRUE(SetSourcePolicy({}));
+  const std::string path = dir.File("alpha.tif");
+  {
+    const char* const options[] = {"ALPHA=YES", nullptr};
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+    const GDALDatasetUniquePtr written(driver->Create(path.c_str(), 16, 16, 2, GDT_Byte, const_cast<char**>(options)));
+    written->GetRasterBand(2)->Fill(255);
+  }
+  EXPECT_TRUE(OpenRaster(path).has_value());
+  std::ofstream(path + ".msk") << "garbage";
+  const auto opened = OpenRaster(path);
+  ASSERT_FALSE(opened);
+  EXPECT_NE(opened.error().message.find("alpha.tif.msk: is not used by GDAL"), std::string::npos);
+}
+
+class OpenErrorsOfMosaics : public testing::Test {
+ protected:
+  OpenErrorsOfMosaics() { EXPECT_TRUE(AllowVrts()); }
+  ~OpenErrorsOfMosaics() override { EXPECT_TRUE(SetSourcePolicy({})); }
+
+  const TempDir dir_;
+  const std::string part_ = WriteRaster(dir_, {}), mosaic_ = dir_.File("mosaic.vrt");
+};
+
+TEST_F(OpenErrorsOfMosaics, NameDamagedSidecarsOfParts) {
+  WriteVrt(part_, mosaic_);
+  EXPECT_TRUE(DemSource::Open(mosaic_).has_value());
+  std::ofstream(part_ + ".msk") << "garbage";
+  ExpectRefused(mosaic_, {part_ + ".msk: is not used by GDAL"});
+  std::filesystem::remove(part_ + ".msk");
+  WriteMask(part_);
+  EXPECT_TRUE(DemSource::Open(mosaic_).has_value());
+}
+
+TEST_F(OpenErrorsOfMosaics, NameDamagedSidecarsOfNestedMosaics) {
+  const std::string inner = dir_.File("inner.vrt");
+  WriteVrt(part_, inner);
+  WriteMask(part_);
+  std::filesystem::rename(part_ + ".msk", inner + ".msk");
+  std::ofstream(mosaic_) << R"(<VRTDataset rasterXSize="16" rasterYSize="16"><SRS>EPSG:4326</SRS>
+    <GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform><VRTRasterBand dataType="Float32" band="1"><ComplexSource>
+    <SourceFilename relativeToVRT="1">inner.vrt</SourceFilename><SourceBand>1</SourceBand><UseMaskBand>true</UseMaskBand>
+    </ComplexSource></VRTRasterBand></VRTDataset>)";
+  const auto opened = DemSource::Open(mosaic_);
+  EXPECT_TRUE(opened.has_value()) << opened.error().message;
+  std::filesystem::resize_file(inner + ".msk", 8);
+  ExpectRefused(mosaic_, {inner + ".msk: is not used by GDAL"});
+}
+
+// GDAL would take such parts for parts without data.
+TEST_F(OpenErrorsOfMosaics, NamePartsThatCannotBeOpened) {
+  WriteVrt(part_, mosaic_);
+  std::ofstream(part_, std::ios::trunc) << "garbage";
+  ExpectRefused(mosaic_, {part_ + ": cannot be opened as a raster"});
 }
 
 }  // namespace

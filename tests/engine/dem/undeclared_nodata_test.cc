@@ -129,7 +129,7 @@ TEST(UndeclaredNodata, AWindowShowsTheSameVoidsAsTheWhole) {
   GDALRasterBand& band = *dataset->GetRasterBand(1);
   SampleRules rules = SampleRules::Of(band, "");
   rules.lowest = -500;
-  rules.rim = 2;
+  rules.void_margin = 2;
   std::vector<float> whole(200 * 200), part(37 * 23);
   ASSERT_TRUE(ReadHeights(band, rules, 0, 0, 200, 200, whole.data(), {}));
   for (const auto& [col, row] : {std::pair(60, 80), std::pair(0, 0), std::pair(120, 110), std::pair(163, 177)}) {

@@ -197,7 +197,7 @@ TEST(NegotiateTile, HeightTilesAreThoseThatMeetTheBounds) {
     EXPECT_EQ(tile->format, tiler::TileFormat::kHeightPng);
     EXPECT_EQ(tile->coding, tiler::Coding::kIdentity) << "PNG is compressed already";
   }
-  EXPECT_EQ(find("/maui/4/15/7.png?size=512")->height_size, 512);
+  EXPECT_EQ(find("/maui/4/15/7.png?size=512")->side_px, 512);
   for (const char* missing : {"/maui/1/0/1.png", "/maui/5/16/14.png", "/maui/5/31/20.png", "/maui/6/63/29.png",
                               "/maui/5/31/14.png?size=512", "/nope/0/0/0.png"}) {
     const Result<tiler::TileRequest> tile = find(missing);

@@ -227,11 +227,12 @@ class Config(unittest.TestCase):
                 self.assertEqual((result.returncode, result.stdout), (code, ""), (options, result.stderr))
                 for word in words:
                     self.assertIn(word, result.stderr)
-        for missing in ({"edits": ["a.geojson"]}, {"imagery": {"image": "a.tif"}}, {"water": {"mask": "a.tif"}}):
+        for missing in ({"edits": ["a.geojson"]}, {"imagery": {"image": "a.tif"}}, {"water": {"mask": "a.tif"}}, {"vertical": "./a.gtx"},
+                        {"sources": [{"path": dem, "vertical": "./a.gtx"}]}):
             file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [dem], **missing}]}))
             result = run("serve", "--config", file, "--check-config")
             self.assertEqual(result.returncode, 1, missing)
-            self.assertRegex(result.stderr, f"dataset a: .*{self.folder}/a.(geojson|tif): No such file or directory; ")
+            self.assertRegex(result.stderr, fr"dataset a: .*{self.folder}/(\./)?a\.(geojson|tif|gtx): No such file or directory; ")
         # Files of a folder that are not rasters do not belong to the dataset.
         (self.folder / "dems").mkdir()
         (self.folder / "dems/a.tif").symlink_to(dem)

@@ -89,8 +89,8 @@ class MeshOfAreas(unittest.TestCase):
         wrong.write_text(json.dumps({"type": "FeatureCollection", "features": [
             feature({"op": "flaten", "height": 1}, ring(-84.21, 36.29, -84.20, 36.30))]}))
         for code, words, arguments in (
-                (2, "--max-error above 0", ("--edits", self.edits, "--points", 100)),
-                (2, "--max-error above 0", ("--edits", self.edits, "--max-error", 0)),
+                (2, "the only goal is --max-error", ("--edits", self.edits, "--points", 100)),
+                (2, "the only goal is --max-error", ("--edits", self.edits, "--max-error", 0)),
                 (2, "leave out", ("--bbox", BOX, "--max-error", 5, "--compact")),
                 (2, "enu, ecef or geographic", ("--bbox", BOX, "--max-error", 5, "--coordinates", "pixel")),
                 (2, "belongs to --edits and --bbox", ("--max-error", 5, "--coordinates", "enu")),

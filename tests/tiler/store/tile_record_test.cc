@@ -94,7 +94,7 @@ TEST(TileRecord, KeysDifferWhereverTheBytesMay) {
   keys[11].request.water_mask = true;
   keys[12].request.metadata = true;
   keys[13].request.height_encoding = proto::HeightEncoding::kTerrarium;
-  keys[14].request.height_size = 512;
+  keys[14].request.side_px = 512;
   std::set<std::string> different;
   // Parameters of tiles for maps.
   for (const TileFormat format : {TileFormat::kHillshade, TileFormat::kSlope, TileFormat::kContours,
