@@ -69,42 +69,15 @@ PointBlockCache& PointBlockCache::Shared() {
   return *cache;
 }
 
-PointBlockPtr PointBlockCache::Find(const PointBlockKey& key) {
-  const std::lock_guard lock(mutex_);
-  const auto found = index_.find(key);
-  if (found == index_.end()) return nullptr;
-  entries_.splice(entries_.begin(), entries_, found->second);
-  return found->second->block;
-}
-
 void PointBlockCache::Insert(const PointBlockKey& key, PointBlockPtr block) {
-  std::list<Entry> gone;  // freed after the lock is released
-  const std::lock_guard lock(mutex_);
-  if (index_.contains(key) || ChargeOf(*block) > capacity_bytes_) return;
-  bytes_ += ChargeOf(*block);
-  entries_.push_front({key, std::move(block)});
-  index_.emplace(key, entries_.begin());
-  while (bytes_ > capacity_bytes_) {
-    bytes_ -= ChargeOf(*entries_.back().block);
-    index_.erase(entries_.back().key);
-    gone.splice(gone.end(), entries_, std::prev(entries_.end()));
-  }
+  const std::size_t bytes = ChargeOf(*block);
+  blocks_.Insert(key, std::move(block), bytes);
 }
 
 bool PointBlockCache::Note(const PointBlockKey& key) {
   const std::lock_guard lock(mutex_);
   noted_.resize(kNoted);
   return std::exchange(noted_[Hash{}(key) % kNoted], key) == key;
-}
-
-std::size_t PointBlockCache::count() const {
-  const std::lock_guard lock(mutex_);
-  return entries_.size();
-}
-
-std::size_t PointBlockCache::bytes() const {
-  const std::lock_guard lock(mutex_);
-  return bytes_;
 }
 
 }  // namespace terrace::dem

@@ -6,13 +6,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <unordered_map>
 #include <vector>
 
+#include "engine/common/recent_blocks.h"
 #include "engine/raster/grid_cells.h"
 
 namespace terrace::dem {
@@ -58,10 +57,10 @@ class PointBlockCache {
   // about 60,000 blocks of one height.
   static constexpr std::size_t kCapacityBytes = std::size_t{64} << 20;
 
-  explicit PointBlockCache(std::size_t capacity_bytes = kCapacityBytes) : capacity_bytes_(capacity_bytes) {}
+  explicit PointBlockCache(std::size_t capacity_bytes = kCapacityBytes) : blocks_(capacity_bytes) {}
   static PointBlockCache& Shared();  // is never destroyed: worker threads may outlive static objects
 
-  PointBlockPtr Find(const PointBlockKey& key);  // null: not kept
+  PointBlockPtr Find(const PointBlockKey& key) { return blocks_.Find(key); }  // null: not kept
   void Insert(const PointBlockKey& key, PointBlockPtr block);
 
   // Returns whether the block was noted by an earlier call, and notes it. A few notes may be lost: each replaces that
@@ -69,23 +68,16 @@ class PointBlockCache {
   // whole.
   bool Note(const PointBlockKey& key);
 
-  std::size_t count() const;
-  std::size_t bytes() const;
+  std::size_t count() const { return blocks_.count(); }
+  std::size_t bytes() const { return blocks_.bytes(); }
 
  private:
   struct Hash {
     std::size_t operator()(const PointBlockKey& key) const noexcept;
   };
-  struct Entry {
-    PointBlockKey key;
-    PointBlockPtr block;
-  };
 
-  const std::size_t capacity_bytes_;
-  mutable std::mutex mutex_;
-  std::list<Entry> entries_;  // most recently used first
-  std::unordered_map<PointBlockKey, std::list<Entry>::iterator, Hash> index_;
-  std::size_t bytes_ = 0;
+  RecentBlocks<PointBlockKey, PointBlock, Hash> blocks_;
+  std::mutex mutex_;
   std::vector<PointBlockKey> noted_;  // by hash
 };
 

@@ -5,6 +5,7 @@
 #include <xxhash.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "engine/common/dem_types.h"
+#include "engine/common/recent_blocks.h"
 #include "engine/core/errno_text.h"
 #include "engine/raster/node_rows.h"
 
@@ -40,11 +42,37 @@ AveragesPlace PlaceOf(const Chunk& chunk, const RasterLayout& layout, unsigned f
   }
 }
 
+struct ChunkKey {
+  std::uint64_t averages = 0;  // CachedAverages' number in this process
+  int factor = 0, chunk = 0;
+
+  friend bool operator==(const ChunkKey&, const ChunkKey&) = default;
+};
+
+struct ChunkKeyHash {
+  std::size_t operator()(const ChunkKey& key) const noexcept {
+    const std::uint64_t numbers[] = {key.averages, static_cast<std::uint64_t>(key.factor),
+                                     static_cast<std::uint64_t>(key.chunk)};
+    return XXH3_64bits(numbers, sizeof numbers);
+  }
+};
+
+std::uint64_t NextId() {
+  static std::atomic<std::uint64_t> last{0};
+  return ++last;
+}
+
 }  // namespace
+
+struct CachedAverages::ChunkAverages {
+  std::unique_ptr<char[]> bytes;  // as in the file: the checksum, then floats, row by row
+  const char* floats() const { return bytes.get() + sizeof(std::uint64_t); }
+};
 
 CachedAverages::CachedAverages(const OpenFile& file, std::string path, RasterLayout layout,
                                std::vector<std::uint64_t> offsets)
-    : identity_(IdentityOf(file.get()).value_or(FileIdentity())),
+    : id_(NextId()),
+      identity_(IdentityOf(file.get()).value_or(FileIdentity())),
       path_(std::move(path)),
       layout_(std::move(layout)),
       factors_(KeptFactors(layout_)),
@@ -72,6 +100,30 @@ void CachedAverages::TouchHourly(const OpenFile& file) const {
   if (now - last >= kHour && touched_s_.compare_exchange_strong(last, now)) Touch(file.get());
 }
 
+Result<std::shared_ptr<const CachedAverages::ChunkAverages>> CachedAverages::ReadChunk(const OpenFile& file, int factor,
+                                                                                       int index, std::uint64_t offset,
+                                                                                       std::size_t size) const {
+  // Never destroyed: worker threads may outlive static objects.
+  static auto* const recent = new RecentBlocks<ChunkKey, ChunkAverages, ChunkKeyHash>(kMaxBytesInMemory);
+  const ChunkKey key{id_, factor, index};
+  if (auto known = recent->Find(key)) return known;
+  const std::size_t size_with_checksum = sizeof(std::uint64_t) + size * sizeof(float);
+  const auto chunk =
+      std::make_shared<const ChunkAverages>(ChunkAverages{std::make_unique_for_overwrite<char[]>(size_with_checksum)});
+  std::uint64_t checksum = 0;
+  const bool read =
+      ReadAt(file.get(), offsets_[static_cast<std::size_t>(index)] + offset, chunk->bytes.get(), size_with_checksum);
+  std::memcpy(&checksum, chunk->bytes.get(), sizeof checksum);
+  if (!read || XXH3_64bits(chunk->floats(), size * sizeof(float)) != checksum) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of chunk {} by factor {} are damaged", path_, index,
+                     factor);
+  }
+  bytes_read_ += size_with_checksum;
+  constexpr std::size_t kEntryBytes = 200;
+  recent->Insert(key, chunk, size_with_checksum + kEntryBytes);
+  return chunk;
+}
+
 // The window does not wrap here: columns of the chunk lie at `window.column` + multiples of the grid's width.
 Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window,
                                        float* out) const {
@@ -82,20 +134,11 @@ Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int ind
                      east = std::min(left + place.columns, window.column + window.columns);
   const std::int64_t north = std::max(top, window.row), south = std::min(top + place.rows, window.row + window.rows);
   if (west >= east || north >= south || offsets_[static_cast<std::size_t>(index)] == 0) return {};
-  const std::size_t size = sizeof(std::uint64_t) + place.bytes();
-  const auto bytes = std::make_unique_for_overwrite<char[]>(size);
-  std::uint64_t checksum = 0;
-  const bool read = ReadAt(file.get(), offsets_[static_cast<std::size_t>(index)] + place.offset, bytes.get(), size);
-  std::memcpy(&checksum, bytes.get(), sizeof checksum);
-  const char* const floats = bytes.get() + sizeof checksum;
-  if (!read || XXH3_64bits(floats, place.bytes()) != checksum) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: the averages of chunk {} by factor {} are damaged", path_, index,
-                     factor);
-  }
-  bytes_read_ += size;
+  const auto averages = ReadChunk(file, factor, index, place.offset, Area(place.columns, place.rows));
+  if (!averages) return tl::unexpected(averages.error());
   for (std::int64_t row = north; row < south; ++row) {
     std::memcpy(out + (row - window.row) * window.columns + (west - window.column),
-                floats + ((row - top) * place.columns + west - left) * std::ptrdiff_t{sizeof(float)},
+                (*averages)->floats() + ((row - top) * place.columns + west - left) * std::ptrdiff_t{sizeof(float)},
                 static_cast<std::size_t>(east - west) * sizeof(float));
   }
   return {};

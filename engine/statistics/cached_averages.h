@@ -2,7 +2,9 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -14,9 +16,12 @@
 namespace terrace::dem {
 
 // Averages of KeptFactors in a finished cache file. Thread-safe. Opens the file for each read, because a dataset may
-// have thousands of them.
+// have thousands of them. The chunks that were read last are in memory, because adjacent tiles share them.
 class CachedAverages {
  public:
+  // For all rasters of the process.
+  static constexpr std::size_t kMaxBytesInMemory = std::size_t{32} << 20;
+
   // `file`: the open cache file at `path`.
   CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
@@ -31,14 +36,19 @@ class CachedAverages {
 
   int min_factor() const { return static_cast<int>(factors_ & (~factors_ + 1)); }
 
-  // Bytes read so far.
+  // Bytes read from the file so far.
   std::uint64_t bytes_read() const { return bytes_read_; }
 
  private:
   Result<OpenFile> Open() const;
   void TouchHourly(const OpenFile& file) const;
   Result<void> CopyChunk(const OpenFile& file, int factor, int index, const GridWindow& window, float* out) const;
+  struct ChunkAverages;
+  // Returns the averages of a chunk that is not void, `size` floats at `offset` of the chunk's averages in the file.
+  Result<std::shared_ptr<const ChunkAverages>> ReadChunk(const OpenFile& file, int factor, int index,
+                                                         std::uint64_t offset, std::size_t size) const;
 
+  const std::uint64_t id_;  // of its chunks in memory
   FileIdentity identity_;
   std::string path_;
   RasterLayout layout_;

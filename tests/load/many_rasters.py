@@ -105,7 +105,7 @@ def main():
             server.terminate()
             server.wait()
     tables = min(arguments.rasters * 0.09, 256)
-    formula = 4 * arguments.cache_mb + WORKERS * 20 + 100 + 64 + 8 + tables
+    formula = 4 * arguments.cache_mb + WORKERS * 20 + 100 + 64 + 32 + 8 + tables
     wrong = len(statuses) - statuses.count(200)
     print(f"{arguments.rasters} rasters, {arguments.tiles} tiles, {wrong} failed: {before:.0f} MB at the start, {after:.0f} MB in all; "
           f"formula {formula:.0f} MB, of which {tables:.0f} MB are tables")

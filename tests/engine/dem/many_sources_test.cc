@@ -295,6 +295,9 @@ TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
         EXPECT_EQ(bytes, 0U);
       } else {
         EXPECT_GE(bytes, std::uint64_t{4} * static_cast<unsigned>(blocks * blocks));
+        EXPECT_EQ((*kept)->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value(),
+                  whole->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value());
+        EXPECT_EQ((*kept)->averages()->bytes_read(), before + bytes) << "chunks stay in memory";
       }
     }
   }

@@ -1,0 +1,50 @@
+#include "engine/common/recent_blocks.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+
+namespace terrace::dem {
+namespace {
+
+using Blocks = RecentBlocks<int, int, std::hash<int>>;
+
+TEST(RecentBlocks, TheLeastRecentlyUsedOnesAreDropped) {
+  Blocks blocks(30);
+  for (int key = 1; key <= 3; ++key) blocks.Insert(key, std::make_shared<int>(10 * key), 10);
+  EXPECT_EQ(*blocks.Find(1), 10);
+  blocks.Insert(4, std::make_shared<int>(40), 10);
+  EXPECT_EQ(blocks.Find(2), nullptr);
+  for (const int key : {1, 3, 4}) EXPECT_EQ(*blocks.Find(key), 10 * key);
+  EXPECT_EQ(blocks.bytes(), 30U);
+  EXPECT_EQ(blocks.count(), 3U);
+}
+
+TEST(RecentBlocks, TheFirstBlockOfAKeyStays) {
+  Blocks blocks(30);
+  blocks.Insert(1, std::make_shared<int>(10), 10);
+  blocks.Insert(1, std::make_shared<int>(11), 20);
+  EXPECT_EQ(*blocks.Find(1), 10);
+  EXPECT_EQ(blocks.bytes(), 10U);
+}
+
+TEST(RecentBlocks, ABlockOfMoreThanTheCapacityIsNotKept) {
+  Blocks blocks(30);
+  blocks.Insert(1, std::make_shared<int>(10), 10);
+  blocks.Insert(2, std::make_shared<int>(20), 31);
+  EXPECT_EQ(blocks.Find(2), nullptr);
+  EXPECT_NE(blocks.Find(1), nullptr);
+}
+
+TEST(RecentBlocks, ADroppedBlockLivesAsLongAsSomebodyUsesIt) {
+  Blocks blocks(10);
+  blocks.Insert(1, std::make_shared<int>(10), 10);
+  const Blocks::BlockPtr block = blocks.Find(1);
+  blocks.Insert(2, std::make_shared<int>(20), 10);
+  EXPECT_EQ(blocks.Find(1), nullptr);
+  EXPECT_EQ(*block, 10);
+}
+
+}  // namespace
+}  // namespace terrace::dem
