@@ -72,9 +72,9 @@ std::string EnviOfTwoBands(const TempDir& dir, const char* interleave) {
     for (int row = 0; row < spec.height; ++row) {
       for (int column = 0; column < spec.width; ++column) {
         double height = spec.value(column, row);
-        EXPECT_EQ(file->GetRasterBand(band)->RasterIO(GF_Write, column, row, 1, 1, &height, 1, 1, GDT_Float64, 0, 0,
-                                                      nullptr),
-                  CE_None);
+        EXPECT_EQ(
+            file->GetRasterBand(band)->RasterIO(GF_Write, column, row, 1, 1, &height, 1, 1, GDT_Float64, 0, 0, nullptr),
+            CE_None);
       }
     }
   }
