@@ -7,10 +7,11 @@
 
 namespace terrace::dem {
 
-// By column, the largest magnitudes in metres of differences of samples h(column i, row j): x = h(i + 1, j) - h(i, j),
-// y = h(i, j + 1) - h(i, j), xx and yy = differences of two of these that follow each other, xy = x(i, j + 1) - x(i,
-// j). Differences that are NaN do not count. Samples without the neighbour have no such difference. `sum`: of the
-// samples, NaN if one is.
+// By column i, the largest magnitudes, in metres, of differences of the samples h(i, j) in rows j:
+//   x(i, j) = h(i + 1, j) - h(i, j)    y(i, j) = h(i, j + 1) - h(i, j)
+//   xx(i, j) = x(i + 1, j) - x(i, j)   yy(i, j) = y(i, j + 1) - y(i, j)   xy(i, j) = x(i, j + 1) - x(i, j)
+// Differences that are NaN do not count. Samples without the neighbours have no such difference. `sum`: of the samples,
+// NaN if one is.
 struct ColumnBends {
   std::vector<float> x, y, xx, yy, xy, sum;
 

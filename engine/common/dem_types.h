@@ -151,8 +151,7 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
-  int finest_level =
-      0;  // the deepest one without edits; less than max_level if edits add levels (edits/deeper_tiles.h)
+  int finest_level = 0;  // the deepest one without edits, which may add levels (edits/deeper_tiles.h)
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.

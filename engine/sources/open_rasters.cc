@@ -110,7 +110,7 @@ class Opening {
   Opening(const std::vector<DemFile>& files, const DemOptions& options, bool only_cached)
       : files_(files),
         options_(options),
-        only_kept_(only_cached),
+        only_cached_(only_cached),
         threads_(only_cached ? 0 : ThreadsOfEach(files.size())),
         shares_(files.size()),
         opened_(files.size()) {}
@@ -145,7 +145,7 @@ class Opening {
   }
 
   bool LacksStatistics(const Opened& opened) const {
-    return only_kept_ && !options_.stop.stop_requested() && !opened && opened.error().code == ErrorCode::kCancelled;
+    return only_cached_ && !options_.stop.stop_requested() && !opened && opened.error().code == ErrorCode::kCancelled;
   }
 
   // Nothing: not begun.
@@ -168,10 +168,10 @@ class Opening {
 
   const std::vector<DemFile>& files_;
   const DemOptions& options_;
-  const bool only_kept_;
+  const bool only_cached_;
   const unsigned threads_;  // of each file
   const std::shared_ptr<StatisticsPages> pages_ = std::make_shared<StatisticsPages>(kKeptTables, kPagedTables);
-  SourceLog log_{only_kept_};  // if statistics are missing, the files are opened again, and log then
+  SourceLog log_{only_cached_};  // if statistics are missing, the files are opened again, and log then
   std::mutex mutex_;
   std::map<std::size_t, std::stop_source> running_;  // guarded by mutex_, as are these
   std::vector<double> shares_;                       // done of each file

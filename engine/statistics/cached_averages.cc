@@ -119,7 +119,7 @@ Result<std::shared_ptr<const CachedAverages::ChunkAverages>> CachedAverages::Rea
                      factor);
   }
   bytes_read_ += size_with_checksum;
-  constexpr std::size_t kEntryBytes = 200;
+  constexpr std::size_t kEntryBytes = 200;  // of lists and allocations, about
   recent->Insert(key, chunk, size_with_checksum + kEntryBytes);
   return chunk;
 }

@@ -1,13 +1,9 @@
 // Thousands of sources: which of them a tile examines, what stays in memory, and how they are opened.
-#include <spdlog/sinks/ostream_sink.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <random>
-#include <sstream>
 #include <utility>
 
 #include "engine/bound/grid_statistics.h"
@@ -15,15 +11,10 @@
 #include "engine/mosaic/raster_grid.h"
 #include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
+#include "tests/engine/dem/source_fixture.h"
 
 namespace terrace::dem {
 namespace {
-
-std::shared_ptr<const RasterSource> OpenRasterOrFail(const std::string& path) {
-  auto raster = RasterSource::Open(path);
-  EXPECT_TRUE(raster.has_value()) << raster.error().message;
-  return raster ? *std::move(raster) : nullptr;
-}
 
 // One raster grid of columns x rows rasters of side x side samples, each at its own height.
 RasterGrid MakeGrid(const TempDir& dir, const std::array<double, 6>& first, const std::string& crs, int columns,
@@ -411,18 +402,6 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
 
-// What is logged by a function.
-template <typename Function>
-std::string LogOf(const Function& function) {
-  std::ostringstream text;
-  const auto before = spdlog::default_logger();
-  spdlog::set_default_logger(
-      std::make_shared<spdlog::logger>("test", std::make_shared<spdlog::sinks::ostream_sink_mt>(text)));
-  function();
-  spdlog::set_default_logger(before);
-  return text.str();
-}
-
 TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   const TempDir dir;
   const auto files = WriteFolder(dir, 30);
@@ -446,84 +425,6 @@ TEST(ManySources, TheLogSaysTheSameOfAFileOnce) {
     });
     EXPECT_EQ(std::ranges::count(log, '\n'), 2) << log;
   }
-}
-
-// The grid closes on whole columns. The remainder of 360 degrees is between its last and its first column, and a bound
-// on the error must include it.
-TEST(OneSource, WhatIsLeftOfAFullTurnCountsAsMisplacement) {
-  for (const double left : {0.0, -0.0095, 0.0095}) {  // columns
-    const TempDir dir;
-    const double pixel = 360 / (720 + left);
-    const auto raster = OpenRasterOrFail(WriteRaster(dir, {.width = 720,
-                                                           .height = 4,
-                                                           .geo_transform = {-180, pixel, 0, 1, 0, -pixel},
-                                                           .value = [](int col, int row) { return col + row; }}));
-    std::vector<GridPlan> plans = PlanGrids({raster});
-    ASSERT_EQ(plans.size(), 1U);
-    const auto grid = RasterGrid::Make(std::move(plans.front()), {.max_void_gap = 64});
-    ASSERT_TRUE(grid);
-    EXPECT_TRUE(grid->wraps());
-    EXPECT_GE(grid->members().front().misplacement.x, std::abs(left) * 0.999);
-    EXPECT_LE(grid->members().front().misplacement.x, std::abs(left) * 3 + 1e-6);
-  }
-}
-
-TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
-  for (const int width : {360, 361, 540}) {  // pixels, nodes at -180 and 180 degrees, one and a half turns
-    const TempDir dir;
-    const std::string path = WriteRaster(
-        dir, {.width = width, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}, .value = [](int col, int row) {
-                return col + row;
-              }});
-    const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(path).has_value()); });
-    EXPECT_EQ(log.find("its last 180 columns") != std::string::npos, width == 540) << log;
-    EXPECT_EQ(log.find("more than once around the Earth") != std::string::npos, width == 540) << log;
-  }
-}
-
-// A collar of voids to the east; a hole has samples around it, from which it is filled.
-TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
-  const TempDir dir;
-  RasterSpec spec;
-  spec.width = 1200, spec.height = 600;
-  spec.geo_transform = {10, 0.001, 0, 20, 0, -0.001};
-  spec.nodata = -9999;
-  spec.value = [](int column, int row) {
-    const bool is_hole = column > 100 && column < 400 && row > 100 && row < 400;
-    return column >= 600 || is_hole ? -9999 : 100 + column;
-  };
-  const std::string path = WriteRaster(dir, spec);
-  std::vector<GridPlan> plans = PlanGrids({OpenRasterOrFail(path)});
-  const auto grid = RasterGrid::Make(std::move(plans.front()), {.max_void_gap = 8});
-  ASSERT_TRUE(grid);
-  const geo::Lattice lattice{11, 64};
-  const auto key_at = [&](double longitude, double latitude) {
-    const double tile = 180.0 / (1 << lattice.level);
-    return geo::TileKey{lattice.level, static_cast<std::int64_t>((longitude + 180) / tile),
-                        static_cast<std::int64_t>((latitude + 90) / tile)};
-  };
-  const auto read = [&](const geo::TileKey& key, std::vector<float>& smooth) {
-    const NodeWindow window = WindowOfTile(lattice, key);
-    std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
-                               SampleRules::kVoid);
-    GridTrace trace;
-    auto filled = grid->Fill(lattice, window, HeightDatum::kEllipsoid,
-                             {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
-    EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
-    return filled ? Result<GridTrace>(std::move(trace)) : tl::unexpected(filled.error());
-  };
-  std::vector<float> smooth;
-  const auto collar = read(key_at(11, 19.7), smooth);
-  ASSERT_TRUE(collar) << collar.error().message;
-  EXPECT_TRUE(collar->samples.empty());
-  EXPECT_TRUE(smooth.empty());
-  const auto hole = read(key_at(10.25, 19.75), smooth);
-  ASSERT_TRUE(hole) << hole.error().message;
-  EXPECT_FALSE(hole->samples.empty());
-  EXPECT_FALSE(smooth.empty());
-  // What was not read may not outlive its file either.
-  std::filesystem::remove(path);
-  EXPECT_FALSE(read(key_at(11, 19.7), smooth));
 }
 
 }  // namespace
