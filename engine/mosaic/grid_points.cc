@@ -96,7 +96,6 @@ Result<PointBlock> RasterGrid::ReadPointBlock(const GridWindow& window, const st
   if (!bridged) return tl::unexpected(bridged.error());
   auto smoothed = FillHoles(1, window, *bridged, stop);
   if (!smoothed) return tl::unexpected(smoothed.error());
-  if (bridged->voids == 0) block.measured = {};
   block.bridged = std::move(bridged->heights);
   block.smooth = *std::move(smoothed);
   return block;

@@ -247,9 +247,9 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
                                                     std::vector<float>* measured) const {
   auto core = ReadBlocks(factor, window, stop);
   if (!core) return tl::unexpected(core.error());
-  if (measured != nullptr) *measured = *core;
   Bridged bridged{*std::move(core), 0};
   bridged.voids = CountVoids(bridged.heights);
+  if (measured != nullptr && bridged.voids > 0) *measured = bridged.heights;
   const int gap = options_.max_void_gap / factor;
   if (gap < 2 || bridged.voids == 0) return bridged;
   const GridWindow voids = HullOfVoids(bridged.heights, window), wide = Grown(voids, gap, factor);
@@ -342,7 +342,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   // Samples between the outermost nodes and the rim are needed, too.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
-  const auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
+  auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
   if (!bridged) return tl::unexpected(bridged.error());
   const auto smoothed = FillHoles(factor, window, *bridged, stop);
   if (!smoothed) return tl::unexpected(smoothed.error());
@@ -353,7 +353,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
   counts_->filled += bridged->voids - left;
   counts_->voids += left;
   if (traces_others && factor == 1) {
-    trace->samples = bridged->heights;
+    if (bridged->voids > 0) trace->samples = bridged->heights;
     trace->includes_filled = true;
   }
   std::vector<float> counts;
@@ -408,6 +408,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     for (std::size_t n = 0; n < others.size(); ++n) others[n] = inside[n] & (wanted[n] ^ std::uint8_t{1});
     TraceOthers(others, bridged->heights, samples, undulations, *trace);
   }
+  if (bridged->voids == 0) trace->samples = std::move(bridged->heights);  // not copied: nothing was filled
   return {};
 }
 

@@ -177,7 +177,8 @@ class RasterGrid {
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
   Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
-  // A window with small voids filled. `measured`: becomes the window before filling, unless it is null.
+  // A window with small voids filled. `measured`, unless it is null: becomes the window before filling; is not
+  // changed if there are no voids.
   struct Bridged {
     std::vector<float> heights;
     std::uint64_t voids = 0;  // before
