@@ -27,7 +27,7 @@ proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, const geo::Ti
   const BakedDataset& dataset = manifest.dataset;
   return {manifest.kind.normals, manifest.kind.water_mask,
           manifest.kind.metadata &&
-              proto::CarriesMetadata(key, dataset.metadata_levels, dataset.finest_level, manifest.available)};
+              proto::CarriesMetadata(key, dataset.metadata_levels, dataset.max_source_level, manifest.available)};
 }
 
 // Whether the archive's tiles are what the request asks for, except for their coding and for extensions that can be
@@ -129,7 +129,7 @@ class Baked final : public tiler::BakedTiles {
     extent_.floor_m = dataset.floor_m;
     extent_.has_datum = dataset.has_datum;
     extent_.sources = static_cast<std::size_t>(dataset.sources);
-    extent_.finest_level = dataset.finest_level;
+    extent_.max_source_level = dataset.max_source_level;
     if (manifest.kind.format == TileFormat::kHeightPng) {
       extent_.max_mercator_depth = manifest.max_level + (manifest.kind.side_px == 512 ? 1 : 0);
       return;

@@ -69,7 +69,7 @@ constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
 Json DatasetJson(const BakedDataset& dataset) {
   const auto& [name, attribution, generation, error_fraction, glb_compression, bounds, heights, floor_m, has_datum,
-               metadata_levels, max_level, finest_level, sources] = dataset;
+               metadata_levels, max_level, max_source_level, sources] = dataset;
   Json json;
   json["name"] = name;
   json["attribution"] = attribution;
@@ -83,7 +83,7 @@ Json DatasetJson(const BakedDataset& dataset) {
   json["has_datum"] = has_datum;
   json["metadata_levels"] = metadata_levels;
   json["max_level"] = max_level;
-  if (finest_level != max_level) json["finest_level"] = finest_level;
+  if (max_source_level != max_level) json["finest_level"] = max_source_level;
   json["sources"] = sources;
   return json;
 }
@@ -103,7 +103,7 @@ BakedDataset ReadDataset(const Json& json) {
   dataset.has_datum = json.at("has_datum").get<bool>();
   dataset.metadata_levels = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
   dataset.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
-  dataset.finest_level =
+  dataset.max_source_level =
       json.contains("finest_level") ? WholeOf<int>(json.at("finest_level"), 0, dataset.max_level) : dataset.max_level;
   dataset.sources = WholeOf<std::uint64_t>(json.at("sources"), 0, kAnyCount);
   return dataset;

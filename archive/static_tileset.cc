@@ -12,7 +12,7 @@
 #include "engine/geo/tile_key.h"
 #include "proto/documents/implicit_tree.h"
 #include "tiler/encoder_version.h"
-#include "tiler/tile_tree.h"
+#include "tiler/tileset_documents.h"
 
 namespace terrace::archive {
 namespace {
@@ -30,7 +30,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           manifest.available,
           dataset.bounds,
           dataset.error_fraction,
-          dataset.finest_level,
+          dataset.max_source_level,
           [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all); },
           [&manifest](int level) { return manifest.StepAt(level); }};
 }

@@ -121,7 +121,7 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.has_datum = dataset.source->has_datum();
   baked.metadata_levels = dataset.metadata_levels;
   baked.max_level = info.max_level;
-  baked.finest_level = info.finest_level;
+  baked.max_source_level = info.max_source_level;
   baked.sources = info.sources.size();
   return baked;
 }
@@ -196,7 +196,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
       manifest.error_steps.push_back(
-          tiler::ErrorStep(request.requested, level, level >= source.finest_level(), dataset.error_fraction));
+          tiler::ErrorStep(request.requested, level, level >= source.max_source_level(), dataset.error_fraction));
     }
   }
   return manifests;
@@ -207,7 +207,7 @@ tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileK
   request.key = key;
   if (!manifest.error_steps.empty()) request.error_step = manifest.error_steps[static_cast<std::size_t>(key.level)];
   request.metadata = request.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_levels,
-                                                                manifest.dataset.finest_level, manifest.available);
+                                                                manifest.dataset.max_source_level, manifest.available);
   return request;
 }
 

@@ -61,7 +61,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   AddKind(hasher, manifest.kind);
   // Without the levels that edits added elsewhere.
   int last = static_cast<int>(unit.tiles.size()) - 1;
-  while (last > source.finest_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
+  while (last > source.max_source_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
   for (int level = 0; level <= last; ++level) {
     const auto& ranges = unit.tiles[static_cast<std::size_t>(level)];
     AddRanges(hasher, ranges);

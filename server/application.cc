@@ -220,7 +220,7 @@ std::vector<PendingDataset> TerrainApplication::PendingOf(const Catalog& catalog
   const std::map<std::string, std::string> known_problems = problems();
   std::vector<PendingDataset> pending;
   for (const std::string& name : catalog.pending) {
-    const double share = parts_.share_done ? parts_.share_done(name) : 0;
+    const double share = parts_.progress_of ? parts_.progress_of(name) : 0;
     pending.push_back({name, std::clamp(static_cast<int>(100 * share), 0, kMaxPercent), known_problems.contains(name)});
   }
   return pending;

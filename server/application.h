@@ -36,8 +36,8 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  std::function<std::string()> cache_problem;            // the problem kCacheProblem; "": there is none; may be empty
-  std::function<double(const std::string&)> share_done;  // of a pending dataset; may be empty
+  std::function<std::string()> cache_problem;             // the problem kCacheProblem; "": there is none; may be empty
+  std::function<double(const std::string&)> progress_of;  // of a pending dataset; may be empty
 };
 
 class TerrainApplication final : public Application, public ProcessState {

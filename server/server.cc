@@ -76,7 +76,7 @@ class RunningServer final : public Server {
         metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
         application_({*frontend_, tiles_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
-                      options_.cache_problem, options_.share_done},
+                      options_.cache_problem, options_.progress_of},
                      std::move(catalog), options_.config),
         admin_({tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
                 [this] { return application_.catalog(); }, application_.deadline()}),

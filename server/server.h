@@ -30,7 +30,7 @@ struct ServerOptions {
   std::shared_ptr<tiler::RefinementCache> refinements = nullptr;  // for metrics, purges and the stop; may be null
   std::function<std::string()> cache_problem = {};                // why cache_dir is not used; "": it is; thread-safe
   // The share done of the pending datasets of a catalog, 0 .. 1; thread-safe; empty: unknown.
-  std::function<double(const std::string& dataset)> share_done = {};
+  std::function<double(const std::string& dataset)> progress_of = {};
   std::chrono::milliseconds metrics_age{1'000};  // how long a text of /metrics is reused
   // How long new requests are still served after a stop and drain_delay; part of drain_timeout.
   std::chrono::milliseconds drain_grace{500};

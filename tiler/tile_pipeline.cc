@@ -72,13 +72,13 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 
 }  // namespace
 
-std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request) {
+std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request) {
   int size = request.side_px, margin = 0;
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
-      return request.metadata ? Mixed(source.EditsOf(request.key), source.DeeperTilesOf(request.key))
-                              : source.EditsOf(request.key);
+      return request.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
+                              : source.EditsHash(request.key);
     case TileFormat::kImagery:
     case TileFormat::kGeodeticImagery:
       return 0;
@@ -95,7 +95,7 @@ std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request
   }
   const MapWindow window(request.key, size, margin);
   if (window.depth > source.info().max_mercator_depth) return 0;
-  return source.EditsOfMercator(window.depth, window.nodes);
+  return source.MercatorEditsHash(window.depth, window.nodes);
 }
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
@@ -109,7 +109,7 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<Refine
 // Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
-  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.source->EditsOf(key)};
+  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.source->EditsHash(key)};
   const RefinedTilePtr known = refinements_->Find(cache_key);
   if (known) encoded.refinement = RefinementUse::kContinued;
   if (known && known->error_m <= error_m) {
@@ -230,7 +230,7 @@ MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& sur
     TileRequest request;
     request.dataset = dataset;
     request.key = key;
-    const int finest = of.source ? of.source->finest_level() : of.baked->extent().finest_level;
+    const int finest = of.source ? of.source->max_source_level() : of.baked->extent().max_source_level;
     request.error_step = ErrorStep(surface.requested, key.level, key.level >= finest, of.error_fraction);
     if (!of.source && !surface.requested.error_m && !surface.requested.fraction) {
       const std::vector<int>& steps = of.baked->extent().error_steps;

@@ -61,7 +61,7 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
   std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
-  // The same without edits; 0: there are none. Caches are keyed by it and by TileEdits: tiles that no edit touches
+  // The same without edits; 0: there are none. Caches are keyed by it and by TileEditsHash: tiles that no edit touches
   // stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
@@ -69,7 +69,7 @@ struct Dataset {
 };
 
 // A hash of the edits that the tile of a request depends on; 0: none.
-std::uint64_t TileEdits(const dem::DemSource& source, const TileRequest& request);
+std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request);
 
 // What an encoder (encoders.h) makes a tile from.
 struct EncoderInput {

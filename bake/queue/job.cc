@@ -20,7 +20,7 @@ int NumberOf(std::string_view text) {
 }
 
 // XAUTOCLAIM came with 6.2.
-Result<void> CheckVersion(redis::Connection& connection, const JobPlace& place) {
+Result<void> CheckVersion(redis::Connection& connection, const JobConnection& place) {
   const auto info = connection.Call({"INFO", "server"});
   if (!info) return tl::unexpected(info.error());
   constexpr std::string_view kField = "redis_version:";
@@ -41,7 +41,7 @@ Result<void> CheckVersion(redis::Connection& connection, const JobPlace& place) 
 
 }  // namespace
 
-std::string JobPlace::Key(const std::string& what) const { return fmt::format("terrace:{{{}}}:{}", name, what); }
+std::string JobConnection::Key(const std::string& what) const { return fmt::format("terrace:{{{}}}:{}", name, what); }
 
 Result<void> CheckJobName(const std::string& name) {
   constexpr std::size_t kMaxSize = 64;
@@ -55,7 +55,7 @@ Result<void> CheckJobName(const std::string& name) {
                    kMaxSize);
 }
 
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place) {
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobConnection& place) {
   redis::ConnectionOptions options;
   options.connect_timeout = options.command_timeout = place.timeout;
   options.ca_file = place.ca_file;
@@ -66,14 +66,14 @@ Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place) {
   return connection;
 }
 
-redis::Command ScriptCommand(const JobPlace& place, const char* script, std::vector<std::string> arguments) {
+redis::Command ScriptCommand(const JobConnection& place, const char* script, std::vector<std::string> arguments) {
   redis::Command command = {"EVAL", std::string(scripts::kPrelude) + script, std::to_string(kKeys.size())};
   for (const char* const key : kKeys) command.push_back(place.Key(key));
   std::ranges::move(arguments, std::back_inserter(command));
   return command;
 }
 
-Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobPlace& place) {
+Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobConnection& place) {
   const auto reply = connection.Call({"XRANGE", place.Key("dead"), "-", "+"});
   if (!reply) return tl::unexpected(reply.error());
   std::vector<DeadUnit> dead;
@@ -85,7 +85,8 @@ Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobP
   return dead;
 }
 
-Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection, const JobPlace& place) {
+Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection,
+                                                                 const JobConnection& place) {
   const auto reply = connection.Call({"HGETALL", place.Key("job")});
   if (!reply) return tl::unexpected(reply.error());
   std::vector<std::pair<std::string, std::string>> fields;
@@ -100,7 +101,7 @@ std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fiel
   return found == fields.end() ? std::string() : found->second;
 }
 
-Result<void> RemoveJob(redis::Connection& connection, const JobPlace& place) {
+Result<void> RemoveJob(redis::Connection& connection, const JobConnection& place) {
   redis::Command command = {"DEL"};
   for (const char* const key : kKeys) command.push_back(place.Key(key));
   const auto reply = connection.Call(command);

@@ -14,7 +14,7 @@
 
 namespace terrace::bake {
 
-struct JobPlace {
+struct JobConnection {
   redis::Address address;
   std::string ca_file = {};  // as in redis::ConnectionOptions
   std::string name;
@@ -30,27 +30,28 @@ Result<void> CheckJobName(const std::string& name);
 
 // Connects, and checks that the server has what the queue needs. Errors: as redis::Connection::Open; kInvalidArgument:
 // a Redis before 6.2.
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobPlace& place);
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobConnection& place);
 
 // What all workers of a job must agree on: names and values.
 using JobIdentity = std::vector<std::pair<std::string, std::string>>;
 
 // A script of job_scripts.h with its keys and arguments.
-redis::Command ScriptCommand(const JobPlace& place, const char* script, std::vector<std::string> arguments);
+redis::Command ScriptCommand(const JobConnection& place, const char* script, std::vector<std::string> arguments);
 
 // A unit that was given up.
 struct DeadUnit {
   std::string unit, why, worker;
   int deliveries = 0;
 };
-Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobPlace& place);
+Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobConnection& place);
 
 // The fields of the hash of the job; empty: there is none.
-Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection, const JobPlace& place);
+Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection,
+                                                                 const JobConnection& place);
 // The value of a field; empty: it has none.
 std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fields, const std::string& name);
 
 // Removes a job with all its keys from Redis. The files of the bake stay.
-Result<void> RemoveJob(redis::Connection& connection, const JobPlace& place);
+Result<void> RemoveJob(redis::Connection& connection, const JobConnection& place);
 
 }  // namespace terrace::bake

@@ -75,7 +75,7 @@ std::vector<JobStatus::Running> RunningUnits(const redis::ReplyView& pending, co
 
 }  // namespace
 
-Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobPlace& place) {
+Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobConnection& place) {
   const auto job = ReadJob(connection, place);
   if (!job) return tl::unexpected(job.error());
   if (job->empty()) {

@@ -360,7 +360,7 @@ void RedisQueue::Beat() {
   // A call that takes longer is abandoned, so that the next one comes in time. Take notes whether Redis is away.
   constexpr milliseconds kMinTimeout{500};
   if (!beat_connection_ || beat_connection_->HasEnded()) {
-    JobPlace place = options_.place;
+    JobConnection place = options_.place;
     place.timeout = std::min(place.timeout, std::max(Lease() / 3, kMinTimeout));
     auto connection = ConnectToJob(place);
     if (!connection) return;

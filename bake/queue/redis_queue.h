@@ -25,7 +25,7 @@
 namespace terrace::bake {
 
 struct RedisQueueOptions {
-  JobPlace place;
+  JobConnection place;
   JobIdentity identity;
   std::string worker;              // the name of this process among the workers of the job
   std::vector<std::string> units;  // the names of the units of the plan, by index

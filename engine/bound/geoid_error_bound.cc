@@ -33,7 +33,7 @@ GeoidErrorBound::GeoidErrorBound(const TileNodes& tile, const Undulations* geoid
   if (geoid_ == nullptr || geoid_->geoid().grid() == nullptr) return;
   const UndulationGrid& grid = *geoid_->geoid().grid();
   if (tile_.lattice.StepDegrees() > kDense * std::min(grid.column_step(), grid.row_step())) return;
-  std::vector<NodePlace> columns, rows;
+  std::vector<AxisPosition> columns, rows;
   for (int k = 0; k <= tile_.cells(); ++k) {
     columns_.push_back(grid.ColumnOf(tile_.lattice.Longitude(tile_.window.column + 1 + k)));
     rows_.push_back(grid.RowOf(tile_.lattice.Latitude(tile_.window.row + 1 + k)));

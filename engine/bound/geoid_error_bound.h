@@ -34,7 +34,7 @@ class GeoidErrorBound {
   // the geoid's grid lines between them, in grid steps.
   struct Steps {
     std::vector<double> stops;
-    std::vector<NodePlace> places;
+    std::vector<AxisPosition> places;
     std::vector<std::size_t> first = {0};
     std::vector<int> crossed;  // by a line, or beside a pole, ascending
 

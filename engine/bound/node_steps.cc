@@ -55,7 +55,7 @@ HWY_INLINE void MeasureColumns(D d, const double* place, std::size_t stride, int
 
 // `is_last`: the eastern steps of these columns lead out of the box.
 template <class D>
-HWY_INLINE bool MeasureVector(D d, const NodePlaces& places, std::size_t column, int rows, bool is_last,
+HWY_INLINE bool MeasureVector(D d, const NodeCoordinates& places, std::size_t column, int rows, bool is_last,
                               NodeSteps& steps, PixelBounds& at) {
   AxisSteps<D> x(d), y(d);
   auto known = hn::Zero(d);
@@ -78,7 +78,7 @@ HWY_INLINE bool MeasureVector(D d, const NodePlaces& places, std::size_t column,
 }
 
 template <class D>
-HWY_INLINE bool MeasureBox(D d, const NodePlaces& places, std::size_t columns, int rows, NodeSteps& steps,
+HWY_INLINE bool MeasureBox(D d, const NodeCoordinates& places, std::size_t columns, int rows, NodeSteps& steps,
                            PixelBounds& at) {
   const std::size_t lanes = hn::Lanes(d);
   for (std::size_t i = 0; i + lanes <= columns; i += lanes) {
@@ -89,7 +89,7 @@ HWY_INLINE bool MeasureBox(D d, const NodePlaces& places, std::size_t columns, i
   return MeasureVector(d, places, columns + 1 - lanes, rows, true, steps, at);
 }
 
-bool Measure(const NodePlaces& places, std::size_t columns, int rows, NodeSteps& steps, PixelBounds& at) {
+bool Measure(const NodeCoordinates& places, std::size_t columns, int rows, NodeSteps& steps, PixelBounds& at) {
   const hn::CappedTag<double, 8> wide;
   if (columns >= hn::Lanes(wide)) return MeasureBox(wide, places, columns, rows, steps, at);
   const hn::CappedTag<double, 2> narrow;
@@ -110,7 +110,7 @@ HWY_EXPORT(Measure);
 
 }  // namespace
 
-bool MeasureSteps(const NodePlaces& places, int columns, int rows, NodeSteps& steps, PixelBounds& at) {
+bool MeasureSteps(const NodeCoordinates& places, int columns, int rows, NodeSteps& steps, PixelBounds& at) {
   return HWY_DYNAMIC_DISPATCH(Measure)(places, static_cast<std::size_t>(columns), rows, steps, at);
 }
 

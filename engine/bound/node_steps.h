@@ -14,13 +14,13 @@ struct NodeSteps {
 };
 
 // Places by node, row by row from the south.
-struct NodePlaces {
+struct NodeCoordinates {
   const double *x, *y;  // of the south-western node of the box
   std::size_t stride;
 };
 
 // Measures a box of columns x rows cells and adds its nodes to `at`. Returns false if a node or a neighbour of one has
 // no place (NaN).
-bool MeasureSteps(const NodePlaces& places, int columns, int rows, NodeSteps& steps, PixelBounds& at);
+bool MeasureSteps(const NodeCoordinates& places, int columns, int rows, NodeSteps& steps, PixelBounds& at);
 
 }  // namespace terrace::dem

@@ -161,7 +161,7 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
     if (!MeasureAxes(box, steps, at)) return false;
   } else {
     const std::size_t n = tile_.NodeOf(box.west, box.south);
-    const NodePlaces places{x_.get() + n, y_.get() + n, tile_.stride()};
+    const NodeCoordinates places{x_.get() + n, y_.get() + n, tile_.stride()};
     if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
   }
   // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
@@ -231,7 +231,7 @@ bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) {
   if (in.empty()) return false;
   const bool is_in_band = in.top == band_.top && in.bottom == band_.bottom;
   if (!is_in_band) MeasureColumns(in, box_);
-  const ColumnBends& of_column = is_in_band ? band_ : box_;
+  const ColumnDifferences& of_column = is_in_band ? band_ : box_;
   const auto first = static_cast<std::size_t>(is_in_band ? in.left - trace_.window.column : 0);
   const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
   const auto largest = [&](const std::vector<float>& values, std::size_t count) {
@@ -244,7 +244,7 @@ bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) {
   return std::isfinite(Sum(of_column.sum.data() + first, columns));
 }
 
-void SmoothErrorBound::MeasureColumns(const SampleRange& range, ColumnBends& bends) const {
+void SmoothErrorBound::MeasureColumns(const SampleRange& range, ColumnDifferences& bends) const {
   const GridWindow& window = trace_.window;
   bends.Resize(static_cast<std::size_t>(range.right - range.left + 1));
   MeasureBends(trace_.samples.data() + (range.top - window.row) * window.columns + (range.left - window.column),

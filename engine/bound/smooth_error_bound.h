@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include "engine/bound/column_bends.h"
+#include "engine/bound/column_differences.h"
 #include "engine/bound/geoid_error_bound.h"
 #include "engine/bound/grid_statistics.h"
 #include "engine/bound/node_steps.h"
@@ -51,7 +51,7 @@ class SmoothErrorBound {
   SampleRange Clipped(SampleRange range) const;
   // Returns false if one of the averages is void, or none was read.
   bool Measure(const SampleRange& range, Bends& bends);
-  void MeasureColumns(const SampleRange& range, ColumnBends& bends) const;
+  void MeasureColumns(const SampleRange& range, ColumnDifferences& bends) const;
   static double Largest(const Bends& bends, const NodeSteps& steps);
   double LargestBlend(const CellBox& box) const;
 
@@ -68,11 +68,11 @@ class SmoothErrorBound {
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
   // By column of the trace's window, over rows `top` to `bottom` of the averages.
-  struct Band : ColumnBends {
+  struct Band : ColumnDifferences {
     std::int64_t top = 0, bottom = -1;
   };
   Band band_;
-  ColumnBends box_;  // of the box that was measured last
+  ColumnDifferences box_;  // of the box that was measured last
 };
 
 }  // namespace terrace::dem

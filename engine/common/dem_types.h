@@ -140,7 +140,7 @@ struct RasterInfo {
   std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool needs_averages = false;   // large, and without overviews
   int min_kept_factor = 0;       // smallest factor of stored averages; 0: none
-  bool is_in_folder = false;     // averages are in the statistics cache; false: in memory
+  bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;
 };
 
@@ -151,7 +151,7 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
-  int finest_level = 0;  // the deepest one without edits, which may add levels (edits/deeper_tiles.h)
+  int max_source_level = 0;  // the deepest one without edits, which may add levels (edits/deeper_tiles.h)
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.
@@ -200,9 +200,11 @@ struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
   std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  std::vector<std::uint8_t> hole;    // 1: in a hole; triangles whose nodes are all in a hole or forced are left out
+  // 1: in an edit `hole` (EditOp::kHole; not a void). Triangles whose nodes are all in such a hole or forced are left
+  // out.
+  std::vector<std::uint8_t> no_triangles;
 
-  bool any() const { return !weights.empty() || !forced.empty() || !hole.empty(); }
+  bool any() const { return !weights.empty() || !forced.empty() || !no_triangles.empty(); }
 };
 
 }  // namespace terrace::dem

@@ -108,7 +108,7 @@ Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, c
                    around.north);
 }
 
-std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level) {
+std::vector<geo::TileRange> TilesOverlapping(const Footprint& footprint, int level) {
   const std::int64_t columns = geo::TileColumns(level), rows = geo::TileRows(level);
   const double tile = 180.0 / static_cast<double>(rows);
   const auto first = [&](double degrees, std::int64_t count) {

@@ -42,6 +42,6 @@ Result<void> CheckOverlap(const Footprint& footprint, const GeoBounds& around, c
 
 // Returns the tiles of a level that overlap the footprint, as one range, or two across the antimeridian. Tiles that
 // share only an edge with it do not overlap it.
-std::vector<geo::TileRange> TilesTouching(const Footprint& footprint, int level);
+std::vector<geo::TileRange> TilesOverlapping(const Footprint& footprint, int level);
 
 }  // namespace terrace::dem

@@ -127,7 +127,7 @@ bool Agrees(const UndulationGrid& grid, const ProjOperation& operation) {
     };
     const int cells = grid.wraps() ? grid.columns() : grid.columns() - 1;
     const double column = pick(cells, i % 4) + 0.3, row = pick(grid.rows() - 1, i / 4 % 4) + 0.6;
-    const NodePlace x = grid.AtColumn(column), y = grid.AtRow(row);
+    const AxisPosition x = grid.AtColumn(column), y = grid.AtRow(row);
     const auto patch = UndulationPatch::Read(grid, {&x, 1}, {&y, 1});
     if (!patch) return false;
     const double here = patch->At(x, y), there = HeightAt(operation, grid.DegreesOf(column, row), 0);

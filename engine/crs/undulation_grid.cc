@@ -30,9 +30,9 @@ int BandOfUndulations(GDALDataset& dataset) {
 }
 
 // The first and the last node around places.
-std::pair<int, int> FirstAndLast(std::span<const NodePlace> places) {
+std::pair<int, int> FirstAndLast(std::span<const AxisPosition> places) {
   std::pair<int, int> ends{std::numeric_limits<int>::max(), -1};
-  for (const NodePlace& place : places) {
+  for (const AxisPosition& place : places) {
     if (!place.is_inside()) continue;
     ends.first = std::min({ends.first, place.node, place.next});
     ends.second = std::max({ends.second, place.node, place.next});
@@ -83,7 +83,7 @@ double UndulationGrid::ColumnOf(double longitude) const {
   return wrapped < columns_ ? wrapped : 0;
 }
 
-NodePlace UndulationGrid::AtColumn(double column) const {
+AxisPosition UndulationGrid::AtColumn(double column) const {
   if (!wraps_) {
     if (!(column >= -kGridEdgeTolerance && column <= columns_ - 1 + kGridEdgeTolerance)) return {};
     column = std::clamp(column, 0.0, columns_ - 1.0);
@@ -94,7 +94,7 @@ NodePlace UndulationGrid::AtColumn(double column) const {
   return {(node % columns_ + columns_) % columns_, ((node + 1) % columns_ + columns_) % columns_, column - floor};
 }
 
-NodePlace UndulationGrid::AtRow(double row) const {
+AxisPosition UndulationGrid::AtRow(double row) const {
   if (!(row >= -kGridEdgeTolerance && row <= rows_ - 1 + kGridEdgeTolerance)) return {};
   row = std::clamp(row, 0.0, rows_ - 1.0);
   const double floor = std::floor(row);
@@ -122,14 +122,14 @@ Result<std::vector<float>> UndulationGrid::Read(int column, int row, int columns
   return heights;
 }
 
-std::int64_t UndulationPatch::CountNodes(std::span<const NodePlace> columns, std::span<const NodePlace> rows) {
+std::int64_t UndulationPatch::CountNodes(std::span<const AxisPosition> columns, std::span<const AxisPosition> rows) {
   const auto [west, east] = FirstAndLast(columns);
   const auto [north, south] = FirstAndLast(rows);
   return east < 0 || south < 0 ? 0 : std::int64_t{east - west + 1} * (south - north + 1);
 }
 
-Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::span<const NodePlace> columns,
-                                              std::span<const NodePlace> rows) {
+Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::span<const AxisPosition> columns,
+                                              std::span<const AxisPosition> rows) {
   const auto [west, east] = FirstAndLast(columns);
   const auto [north, south] = FirstAndLast(rows);
   UndulationPatch patch;
@@ -144,7 +144,7 @@ Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::s
   return patch;
 }
 
-std::array<double, 4> UndulationPatch::Around(const NodePlace& column, const NodePlace& row) const {
+std::array<double, 4> UndulationPatch::Around(const AxisPosition& column, const AxisPosition& row) const {
   const auto node = [&](int c, int r) {
     return double{heights_[Area(r - first_row_, columns_) + static_cast<std::size_t>(c - first_column_)]};
   };
@@ -152,13 +152,13 @@ std::array<double, 4> UndulationPatch::Around(const NodePlace& column, const Nod
           node(column.next, row.next)};
 }
 
-bool UndulationPatch::IsWhole(const NodePlace& column, const NodePlace& row) const {
+bool UndulationPatch::IsWhole(const AxisPosition& column, const AxisPosition& row) const {
   if (!column.is_inside() || !row.is_inside()) return false;
   const std::array<double, 4> nodes = Around(column, row);
   return !std::isnan(nodes[0] + nodes[1] + nodes[2] + nodes[3]);
 }
 
-double UndulationPatch::At(const NodePlace& column, const NodePlace& row) const {
+double UndulationPatch::At(const AxisPosition& column, const AxisPosition& row) const {
   if (!column.is_inside() || !row.is_inside()) return kNoUndulation;
   const double x = column.weight, y = row.weight;
   const std::array<double, 4> nodes = Around(column, row);
@@ -175,9 +175,9 @@ double UndulationPatch::At(const NodePlace& column, const NodePlace& row) const 
 }
 
 // Columns between the same nodes share them: a run of columns takes the same sums as At, without looking nodes up.
-void UndulationPatch::At(std::span<const NodePlace> columns, const NodePlace& row, std::span<double> out) const {
+void UndulationPatch::At(std::span<const AxisPosition> columns, const AxisPosition& row, std::span<double> out) const {
   for (std::size_t i = 0; i < columns.size();) {
-    const NodePlace& first = columns[i];
+    const AxisPosition& first = columns[i];
     std::size_t end = i + 1;
     while (end < columns.size() && columns[end].node == first.node && columns[end].next == first.next) ++end;
     if (!is_whole_ || !first.is_inside() || !row.is_inside()) {

@@ -19,7 +19,7 @@
 namespace terrace::dem {
 
 // A position along one axis of a grid, between two nodes; no nodes outside the grid.
-struct NodePlace {
+struct AxisPosition {
   int node = -1, next = -1;
   double weight = 0;  // of `next`, 0 .. 1
 
@@ -47,8 +47,8 @@ class UndulationGrid {
   Position DegreesOf(double column, double row) const {
     return {west_ + column * column_step_, north_ - row * row_step_};
   }
-  NodePlace AtColumn(double column) const;
-  NodePlace AtRow(double row) const;
+  AxisPosition AtColumn(double column) const;
+  AxisPosition AtRow(double row) const;
 
   // Metres, NaN where the grid has none. Precondition: the window lies in the grid.
   Result<std::vector<float>> Read(int column, int row, int columns, int rows) const;
@@ -74,22 +74,22 @@ class UndulationPatch {
  public:
   // Reads the nodes around the given places; places outside the grid are ignored. Reads all columns if the grid wraps
   // and the places lie on both sides of its seam.
-  static Result<UndulationPatch> Read(const UndulationGrid& grid, std::span<const NodePlace> columns,
-                                      std::span<const NodePlace> rows);
+  static Result<UndulationPatch> Read(const UndulationGrid& grid, std::span<const AxisPosition> columns,
+                                      std::span<const AxisPosition> rows);
   // Returns the number of nodes that Read would read.
-  static std::int64_t CountNodes(std::span<const NodePlace> columns, std::span<const NodePlace> rows);
+  static std::int64_t CountNodes(std::span<const AxisPosition> columns, std::span<const AxisPosition> rows);
 
   // Interpolates bilinearly between the nodes that have values, as PROJ does; NaN if none has, or outside the grid.
-  double At(const NodePlace& column, const NodePlace& row) const;
+  double At(const AxisPosition& column, const AxisPosition& row) const;
   // Interpolates along one row, for each column.
-  void At(std::span<const NodePlace> columns, const NodePlace& row, std::span<double> out) const;
+  void At(std::span<const AxisPosition> columns, const AxisPosition& row, std::span<double> out) const;
   // Whether all nodes of the patch have values.
   bool is_whole() const { return is_whole_; }
   // Whether all four nodes around the place have values.
-  bool IsWhole(const NodePlace& column, const NodePlace& row) const;
+  bool IsWhole(const AxisPosition& column, const AxisPosition& row) const;
 
  private:
-  std::array<double, 4> Around(const NodePlace& column, const NodePlace& row) const;
+  std::array<double, 4> Around(const AxisPosition& column, const AxisPosition& row) const;
 
   int first_column_ = 0, first_row_ = 0, columns_ = 0;
   std::vector<float> heights_;

@@ -200,7 +200,7 @@ Result<void> Undulations::FindPoles() {
       poles_[pole] = geoid_->Undulation(degrees);
       continue;
     }
-    const NodePlace column = grid->AtColumn(grid->ColumnOf(degrees.x)), row = grid->AtRow(grid->RowOf(degrees.y));
+    const AxisPosition column = grid->AtColumn(grid->ColumnOf(degrees.x)), row = grid->AtRow(grid->RowOf(degrees.y));
     const auto patch = UndulationPatch::Read(*grid, {&column, 1}, {&row, 1});
     if (!patch) return tl::unexpected(patch.error());
     poles_[pole] = patch->At(column, row);
@@ -304,16 +304,16 @@ template <typename Grid>
 Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
   constexpr std::int64_t kMaxNodes = 1 << 18;
   const UndulationGrid& nodes = *geoid_->grid();
-  std::vector<NodePlace> columns, rows;
+  std::vector<AxisPosition> columns, rows;
   for (std::int64_t c = window.column; c < window.column + window.columns; ++c) {
     const double longitude = grid.Longitude(FloorMod(c, grid.columns()));
     const bool is_inside = EastOfArea(longitude) <= area_.east - area_.west;
-    columns.push_back(is_inside ? nodes.AtColumn(nodes.ColumnOf(longitude)) : NodePlace{});
+    columns.push_back(is_inside ? nodes.AtColumn(nodes.ColumnOf(longitude)) : AxisPosition{});
   }
   for (std::int64_t r = window.row; r < window.row + window.rows; ++r) {
     const double latitude = grid.Latitude(r);
     const bool is_inside = r >= 0 && r < grid.rows() && latitude >= area_.south && latitude <= area_.north;
-    rows.push_back(is_inside ? nodes.AtRow(nodes.RowOf(latitude)) : NodePlace{});
+    rows.push_back(is_inside ? nodes.AtRow(nodes.RowOf(latitude)) : AxisPosition{});
   }
   for (std::size_t first = 0; first < rows.size();) {
     // All rows that are left, unless that is too much.
@@ -323,7 +323,7 @@ Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window
     const auto patch = UndulationPatch::Read(nodes, columns, strip());
     if (!patch) return tl::unexpected(patch.error());
     double* to = out.data() + first * columns.size();
-    for (const NodePlace& row : strip()) {
+    for (const AxisPosition& row : strip()) {
       patch->At(columns, row, {to, columns.size()});
       to += columns.size();
     }

@@ -53,7 +53,7 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
   TERRACE_CHECK(geo::IsValid(top) && top.level <= deepest && deepest <= geo::kMaxLevel);
   ContentHasher hasher;
   hasher.Add(impl_->floor);
-  hasher.Add(finest_level());
+  hasher.Add(max_source_level());
   for (int level = top.level; level <= deepest; ++level) hasher.Add(impl_->LatticeOf(level).cells);
   for (const std::size_t i : impl_->GridsNear(top)) {
     const RasterGrid& grid = impl_->grids[i];
@@ -105,7 +105,7 @@ ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const 
     const int down = level - top.level;
     const std::int64_t side = std::int64_t{1} << down;
     const geo::TileKey first{level, top.x << down, top.y << down};
-    if (level > finest_level()) {
+    if (level > max_source_level()) {
       for (const auto& [dx, dy] : RimOf(Available(level), first, side)) {
         hasher.Add(dx);
         hasher.Add(dy);

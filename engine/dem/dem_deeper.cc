@@ -27,7 +27,7 @@ std::vector<geo::TileRange> Below(const std::vector<geo::TileRange>& ranges, con
 // Lattices of deeper levels have as many cells as the deepest level of the sources, so that each is twice as fine as
 // the one above it.
 void DemSource::Impl::AddDeeperLevels(double error_fraction) {
-  const int deepest = std::min(info.finest_level + kMaxDeeperLevels, geo::kMaxLevel);
+  const int deepest = std::min(info.max_source_level + kMaxDeeperLevels, geo::kMaxLevel);
   std::vector<FinerTiles> finer;
   for (const Edit& edit : edits->edits()) {
     const int level = LevelFor(edit, error_fraction, deepest);
@@ -47,12 +47,12 @@ void DemSource::Impl::AddDeeperLevels(double error_fraction) {
     parents = geo::Disjoint(std::move(parents));
   }
   info.max_level = static_cast<int>(available.size()) - 1;
-  for (int level = info.finest_level + 1; level <= info.max_level; ++level) {
-    lattices[static_cast<std::size_t>(level)].cells = lattices[static_cast<std::size_t>(info.finest_level)].cells;
+  for (int level = info.max_source_level + 1; level <= info.max_level; ++level) {
+    lattices[static_cast<std::size_t>(level)].cells = lattices[static_cast<std::size_t>(info.max_source_level)].cells;
   }
 }
 
-std::uint64_t DemSource::DeeperTilesOf(const geo::TileKey& key) const {
+std::uint64_t DemSource::DeeperTilesHash(const geo::TileKey& key) const {
   if (!geo::IsValid(key) || key.level >= static_cast<int>(impl_->above_added.size())) return 0;
   const auto& touched = impl_->above_added[static_cast<std::size_t>(key.level)];
   if (!geo::Contains(touched, key)) return 0;
@@ -75,7 +75,7 @@ std::uint64_t DemSource::DeeperTilesOf(const geo::TileKey& key) const {
 std::span<const std::vector<geo::TileRange>> DemSource::AvailabilityBelow(const geo::TileKey& key) const {
   const std::span<const std::vector<geo::TileRange>> all = impl_->available;
   std::size_t levels = all.size();
-  const auto least = static_cast<std::size_t>(finest_level()) + 1;
+  const auto least = static_cast<std::size_t>(max_source_level()) + 1;
   const auto has_none = [&](std::size_t level) {
     return static_cast<int>(level) > key.level && std::ranges::none_of(all[level], [&](const geo::TileRange& range) {
              return !geo::IsEmpty(geo::Intersection(range, geo::TilesBelow(key, static_cast<int>(level))));

@@ -331,12 +331,12 @@ std::array<std::vector<MeshDemands>, 4> DemSource::DemandsBeyondCorners(const ge
 
 std::uint64_t DemSource::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
 
-std::uint64_t DemSource::EditsOf(const geo::TileKey& key) const {
+std::uint64_t DemSource::EditsHash(const geo::TileKey& key) const {
   if (impl_->edits == nullptr || !geo::IsValid(key) || key.level > geo::kMaxLevel) return 0;
-  return impl_->HashEditsOf(key);
+  return impl_->ComputeEditsHash(key);
 }
 
-std::uint64_t DemSource::EditsOfMercator(int depth, const NodeWindow& window) const {
+std::uint64_t DemSource::MercatorEditsHash(int depth, const NodeWindow& window) const {
   if (impl_->edits == nullptr) return 0;
   const geo::MercatorGrid grid{depth};
   if (!impl_->edits->Any(BoxOf(grid, window))) return 0;
@@ -377,7 +377,7 @@ void DemSource::Impl::AddPrecisionBeyondCorners(const geo::TileKey& key, std::se
 // The edits that reach the tile's samples or their halo. The height steps of common edges and corners depend on the
 // ranges of neighbours that edits have changed, and on the precision on edges beyond the corners
 // (proto/mesh/edge_steps.h).
-std::uint64_t DemSource::Impl::HashEditsOf(const geo::TileKey& key) const {
+std::uint64_t DemSource::Impl::ComputeEditsHash(const geo::TileKey& key) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   const bool is_polar = key.y == 0 || key.y == geo::TileRows(key.level) - 1;
   const bool is_range_edited = unedited_heights.min != info.heights.min || unedited_heights.max != info.heights.max;

@@ -80,7 +80,7 @@ class DemSource::Impl {
                                             const std::stop_token& stop, std::span<std::uint8_t> filled = {}) const;
   HeightRange UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const;
   HeightRange RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice, const geo::TileKey& key) const;
-  std::uint64_t HashEditsOf(const geo::TileKey& key) const;
+  std::uint64_t ComputeEditsHash(const geo::TileKey& key) const;
   // The numbers of the edits that ask for precision on edges beyond a tile's corners.
   void AddPrecisionBeyondCorners(const geo::TileKey& key, std::set<std::size_t>& found) const;
 

@@ -250,7 +250,7 @@ Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files,
   impl->info.left_out = std::move(left_out);
   impl->available = AvailableTiles(SourceExtentsOf(impl->grids, options));
   impl->info.max_level = static_cast<int>(impl->available.size()) - 1;
-  impl->info.finest_level = impl->info.max_level;
+  impl->info.max_source_level = impl->info.max_level;
   impl->lattices = PlanLattices(finest->spacing(), impl->info.max_level);
   impl->floor = static_cast<float>(impl->info.floor);
   for (const RasterGrid& grid : impl->grids) {
@@ -272,7 +272,7 @@ Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files,
 
 const DemInfo& DemSource::info() const { return impl_->info; }
 int DemSource::max_level() const { return impl_->info.max_level; }
-int DemSource::finest_level() const { return impl_->info.finest_level; }
+int DemSource::max_source_level() const { return impl_->info.max_source_level; }
 geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
 std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
 

@@ -40,7 +40,7 @@ class DemSource {
   // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
   // The deepest level without edits. Levels below it have tiles only around edits.
-  int finest_level() const;
+  int max_source_level() const;
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
@@ -105,13 +105,13 @@ class DemSource {
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
   // The same for the edges beyond a tile's corners (corner_edges.h).
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
-  // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `EditsOfMercator`: for pixels
-  // as ReadMercator has them. Cheap after the first call for a tile.
-  std::uint64_t EditsOf(const geo::TileKey& key) const;
-  std::uint64_t EditsOfMercator(int depth, const NodeWindow& window) const;
+  // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
+  // pixels as ReadMercator has them. Cheap after the first call for a tile.
+  std::uint64_t EditsHash(const geo::TileKey& key) const;
+  std::uint64_t MercatorEditsHash(int depth, const NodeWindow& window) const;
   // A hash of the tiles below a tile that exist because of edits; 0: there are none.
-  std::uint64_t DeeperTilesOf(const geo::TileKey& key) const;
-  // Availability() without its last levels that are below finest_level() and have no tile below `key`.
+  std::uint64_t DeeperTilesHash(const geo::TileKey& key) const;
+  // Availability() without its last levels that are below max_source_level() and have no tile below `key`.
   std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
@@ -128,8 +128,8 @@ class DemSource {
   // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
   // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
   // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours.
-  // Below finest_level() this holds for available tiles only. A change of a source near the tiles may change the hash
-  // although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
+  // Below max_source_level() this holds for available tiles only. A change of a source near the tiles may change the
+  // hash although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
   ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.

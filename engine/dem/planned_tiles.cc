@@ -9,7 +9,7 @@
 namespace terrace::dem {
 
 std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level) {
-  return TilesTouching(Footprint::Of(box), level);
+  return TilesOverlapping(Footprint::Of(box), level);
 }
 
 std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {

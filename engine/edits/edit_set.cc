@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "engine/edits/edit_error.h"
+#include "engine/edits/edit_error_bound.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/edit_window.h"
 #include "engine/geo/mercator_grid.h"
@@ -241,7 +241,7 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
         }
       }
       if (edit.op == EditOp::kBreakline) continue;
-      if (demands.hole.empty()) demands.hole.assign(nodes, 0);
+      if (demands.no_triangles.empty()) demands.no_triangles.assign(nodes, 0);
     }
     for (const auto& part : axes->PartsOf(edit.reach)) {
       for (int j = part.first_row; j <= part.last_row; ++j) {
@@ -251,7 +251,7 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
           if (weight <= 0) continue;
           const std::size_t at = static_cast<std::size_t>(j) * stride + static_cast<std::size_t>(i);
           if (edit.op == EditOp::kHole) {
-            demands.hole[at] = 1;
+            demands.no_triangles[at] = 1;
             continue;
           }
           if (demands.weights.empty()) {
@@ -271,7 +271,8 @@ MeshDemands EditSet::DemandsOf(const geo::Lattice& lattice, const NodeWindow& wi
   }
   if (std::ranges::all_of(demands.forced, [](std::uint8_t is_forced) { return is_forced == 0; }))
     demands.forced.clear();
-  if (std::ranges::all_of(demands.hole, [](std::uint8_t is_hole) { return is_hole == 0; })) demands.hole.clear();
+  if (std::ranges::all_of(demands.no_triangles, [](std::uint8_t is_hole) { return is_hole == 0; }))
+    demands.no_triangles.clear();
   return demands;
 }
 

@@ -16,7 +16,7 @@ namespace terrace::dem {
 class ImageBins {
  public:
   // The largest side of a square in pixels: sums of its levels stay below 2^32.
-  static constexpr int kMaxPixels = 4096;
+  static constexpr int kMaxSide = 4096;
 
   // Reads the squares that interpolation at these pixel positions needs. Squares are `side` pixels wide and aligned to
   // the image's first pixel. NaN positions are ignored. kInvalidArgument: too many squares for the memory.

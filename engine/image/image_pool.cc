@@ -26,7 +26,7 @@ ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()),
   sizes_[0]->idle.Take().Set(std::make_shared<ImageFile>(std::move(image)));
 }
 
-int ImagePool::LargestFactor() const { return sizes_.back()->factor * ImageBins::kMaxPixels; }
+int ImagePool::LargestFactor() const { return sizes_.back()->factor * ImageBins::kMaxSide; }
 
 Result<ImagePool::Borrowed> ImagePool::Borrow(int factor) {
   std::size_t i = 0;

@@ -107,7 +107,7 @@ int PixelsPerSample(const ImagePlacement& placement, const RasterHeights& dem) {
   const double pixels =
       std::min(std::hypot(right.x - middle.x, right.y - middle.y), std::hypot(below.x - middle.x, below.y - middle.y));
   if (!(pixels > 1)) return 1;
-  return static_cast<int>(std::min(pixels + 1e-6, static_cast<double>(ImageBins::kMaxPixels)));
+  return static_cast<int>(std::min(pixels + 1e-6, static_cast<double>(ImageBins::kMaxSide)));
 }
 
 bool Covers(const ImageFile& image, const Position& p) {

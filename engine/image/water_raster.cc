@@ -9,7 +9,7 @@
 #include "engine/crs/georeference.h"
 #include "engine/crs/level_plan.h"
 #include "engine/crs/node_positions.h"
-#include "engine/gdal/gdal_handle.h"
+#include "engine/gdal/handle_pool.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/sample_grid.h"

@@ -88,7 +88,7 @@ std::vector<Ranges> AvailableTiles(std::span<const SourceExtent> sources) {
   // Every level is derived from the tiles of the deepest one, so that rounding cannot lose an ancestor.
   std::vector<Ranges> worth(levels.size());  // of the deepest level, by the depth of their source
   for (const SourceExtent& source : sources) {
-    const Ranges tiles = TilesTouching(source.footprint, deepest);
+    const Ranges tiles = TilesOverlapping(source.footprint, deepest);
     Ranges& those = worth[static_cast<std::size_t>(source.depth)];
     those.insert(those.end(), tiles.begin(), tiles.end());
   }

@@ -241,13 +241,13 @@ HeightRange RasterGrid::EllipsoidalRange() const {
   constexpr int kDeepest = 12;
   const auto count = [&](int level) {
     std::int64_t sum = 0;
-    for (const geo::TileRange& range : TilesTouching(reach_, level)) sum += geo::Cells(range);
+    for (const geo::TileRange& range : TilesOverlapping(reach_, level)) sum += geo::Cells(range);
     return sum;
   };
   int level = 0;
   while (level < kDeepest && count(level + 1) <= kMaxTiles) ++level;
   BlockRange blocks;
-  for (const geo::TileRange& range : TilesTouching(reach_, level)) {
+  for (const geo::TileRange& range : TilesOverlapping(reach_, level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
         blocks.Add(RangeOf(geo::Lattice{level, 64}, {level, x, y}).blocks);

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "engine/common/recent_blocks.h"
+#include "engine/common/lru_block_cache.h"
 #include "engine/raster/grid_cells.h"
 
 namespace terrace::dem {
@@ -76,7 +76,7 @@ class PointBlockCache {
     std::size_t operator()(const PointBlockKey& key) const noexcept;
   };
 
-  RecentBlocks<PointBlockKey, PointBlock, Hash> blocks_;
+  LruBlockCache<PointBlockKey, PointBlock, Hash> blocks_;
   std::mutex mutex_;
   std::vector<PointBlockKey> noted_;  // by hash
 };

@@ -142,7 +142,7 @@ Result<std::vector<float>> SightBlocks::UndulationsOf(const GridWindow& window) 
   std::vector<double> known;
   known.reserve(positions.size());
   if (const UndulationGrid* const grid = geoid_->grid()) {
-    std::vector<NodePlace> x, y;
+    std::vector<AxisPosition> x, y;
     for (const Position& degrees : positions) {
       x.push_back(grid->AtColumn(grid->ColumnOf(degrees.x)));
       y.push_back(grid->AtRow(grid->RowOf(degrees.y)));

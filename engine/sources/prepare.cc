@@ -149,7 +149,7 @@ class Preparer {
     if (options_.progress && done > 0) options_.progress(static_cast<double>(done) / chunks_.count());
     averages_are_whole_ = done == 0;
     // One thread at a time reads samples, because the dataset cannot be shared. Computing takes most of the time.
-    const std::size_t threads = NeedsSamplesAlone(layout) ? options_.threads : 1;
+    const std::size_t threads = CanShareDataset(layout) ? options_.threads : 1;
     // Without a thread to be had, this one computes.
     const std::launch where = threads > 1 ? std::launch::async | std::launch::deferred : std::launch::deferred;
     std::mutex turn;

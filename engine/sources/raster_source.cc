@@ -260,7 +260,7 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   const RasterStatistics& statistics = prepared.statistics;
   info_ = Describe(dataset, path, georeference_, layout_);
   info_.needs_averages = NeedsAverages(layout_);
-  info_.is_in_folder = averages_ != nullptr;
+  info_.has_averages_in_cache_folder = averages_ != nullptr;
   if (averages_) info_.min_kept_factor = averages_->min_factor();
   if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
   info_.found_voids = prepared.detected.text;
@@ -397,7 +397,7 @@ void RasterSource::LoseCache(const Error& error) const {
 Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
                                                     const std::stop_token& stop) const {
   // Uses memory and the cache file only if the files have not changed since they were prepared.
-  if (factor >= kLargestDirect && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
+  if (factor >= kLargestDirectFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     if (const StatisticsPages::Statistics known = statistics(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);

@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "engine/common/dem_types.h"
-#include "engine/common/recent_blocks.h"
+#include "engine/common/lru_block_cache.h"
 #include "engine/core/errno_text.h"
 #include "engine/raster/node_rows.h"
 
@@ -104,7 +104,7 @@ Result<std::shared_ptr<const CachedAverages::ChunkAverages>> CachedAverages::Rea
                                                                                        int index, std::uint64_t offset,
                                                                                        std::size_t size) const {
   // Never destroyed: worker threads may outlive static objects.
-  static auto* const recent = new RecentBlocks<ChunkKey, ChunkAverages, ChunkKeyHash>(kMaxBytesInMemory);
+  static auto* const recent = new LruBlockCache<ChunkKey, ChunkAverages, ChunkKeyHash>(kMaxBytesInMemory);
   const ChunkKey key{id_, factor, index};
   if (auto known = recent->Find(key)) return known;
   const std::size_t size_with_checksum = sizeof(std::uint64_t) + size * sizeof(float);

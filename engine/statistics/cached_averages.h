@@ -25,7 +25,9 @@ class CachedAverages {
   // `file`: the open cache file at `path`.
   CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
 
-  bool Has(int factor) const { return factor < kLargestDirect && (factors_ & static_cast<unsigned>(factor)) != 0; }
+  bool Has(int factor) const {
+    return factor < kLargestDirectFactor && (factors_ & static_cast<unsigned>(factor)) != 0;
+  }
   // The same values as ReadGrid. kInvalidArgument: the file is damaged. kNotFound: it was removed, or is no longer
   // accessible. kUnavailable: it cannot be opened now, because descriptors or memory have run out. Precondition:
   // Has(factor).

@@ -16,7 +16,7 @@ namespace terrace::dem {
 namespace {
 
 // How far averages of the largest directly compared factor extend beyond a chunk.
-constexpr int kHalo = kLargestDirect;
+constexpr int kHalo = kLargestDirectFactor;
 
 // The raster's factors from `least` to `most`.
 template <typename Visit>
@@ -288,7 +288,7 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
   statistics.averages.clear();
   const unsigned kept = KeptFactors(layout);
   Result<void> result;
-  ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
+  ForEachFactor(layout, 2, kLargestDirectFactor, [&](int factor) {
     if (!result) return;
     const auto averages = AverageAround(dataset, layout, samples, chunk, factor, stop);
     if (!averages) {
@@ -361,11 +361,11 @@ ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
   BlockRange voids;
   voids.has_voids = true;
   statistics.ranges.assign(blocks(RangeTable::kBlock), voids);
-  ForEachFactor(layout, 2, kLargestDirect, [&](int factor) {
+  ForEachFactor(layout, 2, kLargestDirectFactor, [&](int factor) {
     statistics.errors.emplace_back(blocks(AveragingErrors::BlockPixels(factor)));
     statistics.averages.emplace_back();
   });
-  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
+  ForEachFactor(layout, 2 * kLargestDirectFactor, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
   return statistics;
 }
 
@@ -376,7 +376,7 @@ std::size_t AveragesIn(const Chunk& chunk, const RasterLayout& layout, int facto
          static_cast<std::size_t>(DivideUp(chunk.rows, factor));
 }
 
-bool NeedsSamplesAlone(const RasterLayout& layout) { return layout.overview_factors.empty() && !layout.wraps; }
+bool CanShareDataset(const RasterLayout& layout) { return layout.overview_factors.empty() && !layout.wraps; }
 
 Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLayout& layout, const Chunk& chunk,
                                             std::int64_t& read, const std::stop_token& stop,
@@ -404,7 +404,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   Chunk used = chunk;
   used.cols = std::min(chunk.cols, layout.columns - chunk.col);
   statistics.sums.clear();
-  ForEachFactor(layout, 2 * kLargestDirect, ChunkGrid::kSide, [&](int factor) {
+  ForEachFactor(layout, 2 * kLargestDirectFactor, ChunkGrid::kSide, [&](int factor) {
     statistics.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
                                                                                    : std::vector<BlockSum>());
   });

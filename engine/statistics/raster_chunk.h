@@ -43,8 +43,8 @@ class ChunkGrid {
   int width_ = 0, height_ = 0, columns_ = 0, rows_ = 0;
 };
 
-// Averages of factors 2, 4, .. kLargestDirect are compared with the samples directly.
-inline constexpr int kLargestDirect = 64;
+// Averages of factors 2, 4, .. kLargestDirectFactor are compared with the samples directly.
+inline constexpr int kLargestDirectFactor = 64;
 
 // Voids first .. last of a row, relative to the chunk's first sample.
 struct VoidRun {
@@ -60,8 +60,8 @@ struct ChunkStatistics {
   BlockSum first_row, last_row;    // of the raster's first and last row within the chunk
   std::vector<BlockRange> ranges;  // by RangeTable block, row by row
   std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
-  // One entry per factor 2, 4, .. kLargestDirect, up to the raster's largest factor. Errors are in metres, one per
-  // AveragingErrors block; a block of factor 64 is larger than a chunk, so its error is of the part in this chunk.
+  // One entry per factor 2, 4, .. kLargestDirectFactor, up to the raster's largest factor. Errors are in metres, one
+  // per AveragingErrors block; a block of factor 64 is larger than a chunk, so its error is of the part in this chunk.
   std::vector<std::vector<float>> errors;
   std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not stored
   std::vector<std::vector<BlockSum>> sums;   // one entry per factor 128 .. 1024; row by row
@@ -86,6 +86,6 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
 
 // Whether statistics need the dataset only for their samples. Otherwise threads must not share it: overviews, and the
 // averages beyond the antimeridian, are read in between.
-bool NeedsSamplesAlone(const RasterLayout& layout);
+bool CanShareDataset(const RasterLayout& layout);
 
 }  // namespace terrace::dem

@@ -30,8 +30,8 @@ struct AveragesGrid {
   std::vector<float> Read(const GridWindow& window) const;
 };
 
-// All averages of factors kLargestDirect and above: at most a 4096th of the raster's samples. Empty for a raster whose
-// overviews have them (KeepsCoarse).
+// All averages of factors kLargestDirectFactor and above: at most a 4096th of the raster's samples. Empty for a raster
+// whose overviews have them (KeepsCoarse).
 class CoarseAverages {
  public:
   using Grid = AveragesGrid;
@@ -43,7 +43,7 @@ class CoarseAverages {
   // The result of ReadGrid. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
 
-  std::vector<Grid> grids;  // of factor kLargestDirect, twice that, ..
+  std::vector<Grid> grids;  // of factor kLargestDirectFactor, twice that, ..
 };
 
 struct RasterStatistics {

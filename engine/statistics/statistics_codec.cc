@@ -149,7 +149,7 @@ std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& 
     chunk_statistics.averages.back().resize(AveragesIn(chunk, layout, 1 << chunk_statistics.averages.size()));
   }
   for (std::size_t k = 0; k < chunk_statistics.sums.size(); ++k) {
-    chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestDirect << (k + 1)));
+    chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestDirectFactor << (k + 1)));
   }
   Reader reader(bytes);
   ChunkFields(reader, chunk_statistics);

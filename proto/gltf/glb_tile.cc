@@ -9,7 +9,7 @@
 
 #include "engine/core/bytes.h"
 #include "engine/core/check.h"
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "proto/gltf/gltf.h"
 #include "proto/gltf/meshopt.h"
 

@@ -24,10 +24,10 @@ Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, i
 
 }  // namespace
 
-bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int finest_level,
+bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int max_source_level,
                      std::span<const std::vector<geo::TileRange>> available) {
   if (metadata_levels <= 0 || key.level % metadata_levels != 0) return false;
-  if (key.level < finest_level) return true;
+  if (key.level < max_source_level) return true;
   const int below = key.level + 1;
   return below < static_cast<int>(available.size()) &&
          std::ranges::any_of(available[static_cast<std::size_t>(below)], [&](const geo::TileRange& range) {

@@ -13,7 +13,7 @@
 #include "engine/core/check.h"
 #include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "proto/mesh/tile_metadata.h"
 #include "server/api/map_parameters.h"
 #include "server/http/text.h"
@@ -46,8 +46,8 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
   tile.normals = wanted.octvertexnormals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
   tile.water_mask = wanted.watermask && dataset.has_water;
-  tile.metadata = wanted.metadata &&
-                  proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.finest_level(), dataset.available);
+  tile.metadata = wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels,
+                                                            dataset.max_source_level(), dataset.available);
   return {};
 }
 
@@ -265,7 +265,7 @@ int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& d
     const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
     return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
   }
-  return ErrorStep(requested, level, level >= dataset.finest_level(), dataset.error_fraction);
+  return ErrorStep(requested, level, level >= dataset.max_source_level(), dataset.error_fraction);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {

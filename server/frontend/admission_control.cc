@@ -19,7 +19,7 @@ bool IsHash(std::string_view text) {
 
 bool RevealsDatasets(const RequestContext& context) { return context.route.row->scope != DatasetScope::kNothing; }
 
-bool NeedsGrant(const Route& route, const Grant& grant) {
+bool IsOutside(const Grant& grant, const Route& route) {
   switch (route.row->scope) {
     case DatasetScope::kOneDataset:
       return !grant.Sees(route.dataset);
@@ -153,7 +153,7 @@ Response AdmissionControl::TooManyRequests(const RateLimiter::Turn& turn, const 
 std::optional<Response> AdmissionControl::Refuse(const RequestContext& context) const {
   if (!options_.access.has_tokens() || !RevealsDatasets(context)) return std::nullopt;
   if (context.has_bad_token) return Unauthorized(true, context.request->id);
-  if (!NeedsGrant(context.route, *context.grant)) return std::nullopt;
+  if (!IsOutside(*context.grant, context.route)) return std::nullopt;
   // The reply must not reveal whether the dataset exists.
   if (context.grant->name.empty()) return Unauthorized(false, context.request->id);
   return ProblemResponse(403, "this token is for other datasets", context.request->id);
@@ -163,7 +163,7 @@ bool AdmissionControl::DependsOnToken(const RequestContext& context) const {
   const RouteRow& row = *context.route.row;
   if (!options_.access.has_tokens() || !RevealsDatasets(context)) return false;
   return row.scope == DatasetScope::kVisibleDatasets || (row.has_templates && context.token_in_query) ||
-         NeedsGrant(context.route, *options_.access.anonymous());
+         IsOutside(*options_.access.anonymous(), context.route);
 }
 
 }  // namespace terrace::server

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "engine/core/elapsed_time.h"
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"

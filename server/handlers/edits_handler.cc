@@ -59,7 +59,7 @@ DocumentAnswer DescribeEdits(const Handlers& handlers, const RequestContext& con
     return ClientErrorResponse(none.error(), context.request->id);
   }
   const tiler::Dataset& dataset = handlers.catalog->pipeline->datasets()[*index];
-  if (!handlers.catalog->datasets[*index].edits_of) {
+  if (!handlers.catalog->datasets[*index].edits_hash) {
     return ProblemResponse(404, "this dataset has no edits; /datasets lists the URLs of each dataset",
                            context.request->id);
   }

@@ -15,7 +15,7 @@
 
 #include "engine/core/elapsed_time.h"
 #include "engine/geo/ellipsoid.h"
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"

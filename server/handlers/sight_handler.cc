@@ -23,7 +23,7 @@ namespace {
 // From this number of rays on, looking along them is long work, which never occupies all workers.
 constexpr std::size_t kFewRays = 16;
 // A query of at most this many bytes has one ray and is parsed in microseconds.
-constexpr std::size_t kQuickRays = 512;
+constexpr std::size_t kQuickQuery = 512;
 // Rays written between two checks of the stop token.
 constexpr std::size_t kRayStopPeriod = 1024;
 
@@ -115,7 +115,7 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
   const Request& request = *context.request;
   const DatasetView& view = handlers.catalog->datasets[dataset];
   const auto deadline = handlers.Deadline();
-  const bool is_quick = context.route.query.size() <= kQuickRays;
+  const bool is_quick = context.route.query.size() <= kQuickQuery;
   Result<SightQuery> parsed = co_await ParsePoints(handlers, context, ParseSight, is_quick, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
   if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes

@@ -11,7 +11,7 @@
 #include "server/http/http_error.h"
 #include "server/http/text.h"
 #include "server/tiles/catalog.h"
-#include "tiler/tile_tree.h"
+#include "tiler/tileset_documents.h"
 
 namespace terrace::server {
 namespace {
@@ -39,7 +39,7 @@ tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested) {
           dataset.available,
           dataset.bounds,
           dataset.error_fraction,
-          dataset.finest_level(),
+          dataset.max_source_level(),
           [&dataset](const geo::TileKey& key) { return RangeOf(dataset, key); },
           [&dataset, requested](int level) { return ErrorStepOf(requested, level, dataset); }};
 }

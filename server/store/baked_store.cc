@@ -26,7 +26,7 @@ std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {
     const auto [first, last] = baked_.equal_range(key.generation);
     const auto found = std::find_if(first, last, [&](const auto& entry) {
       const auto& source = entry.second.source;
-      return (source ? tiler::TileEdits(*source, key.request) : 0) == key.edits;
+      return (source ? tiler::TileEditsHash(*source, key.request) : 0) == key.edits;
     });
     if (found == last) return std::nullopt;
     baked = found->second.tiles;

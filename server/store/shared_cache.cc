@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "server/store/look_up_gate.h"
-#include "server/store/shared_tier.h"
+#include "server/store/shared_store.h"
 #include "tiler/store/tile_record.h"
 #include "tiler/tile/build_id.h"
 
@@ -35,7 +35,7 @@ std::size_t ClassOf(const tiler::TileRequest& request) {
 
 class SharedCache final : public tiler::TileStore {
  public:
-  SharedCache(const config::SharedCacheConfig& config, SharedTierOptions options)
+  SharedCache(const config::SharedCacheConfig& config, SharedStoreOptions options)
       : min_build_(static_cast<std::int64_t>(config.min_build_ms * 1000)),
         max_bytes_(config.max_bytes_per_tile),
         lease_(config.lease_ms),
@@ -124,9 +124,9 @@ class SharedCache final : public tiler::TileStore {
     const auto end = Clock::now() + lease_;
     milliseconds pause{1};
     while (true) {
-      const SharedTier::Lease lease = tier_.Take(record_key, lease_);
-      if (lease == SharedTier::Lease::kNone) return std::nullopt;
-      if (lease == SharedTier::Lease::kTaken) {
+      const SharedStore::Lease lease = tier_.Take(record_key, lease_);
+      if (lease == SharedStore::Lease::kNone) return std::nullopt;
+      if (lease == SharedStore::Lease::kTaken) {
         // The last owner of the lease may have written the tile since the look-up.
         std::optional<tiler::EncodedTile> tile = Read(record_key);
         if (tile) tier_.Release(record_key);
@@ -151,10 +151,10 @@ class SharedCache final : public tiler::TileStore {
   std::atomic<bool> is_abandoned_{false};
   std::atomic<std::chrono::steady_clock::rep> no_leases_until_{
       std::chrono::steady_clock::time_point::min().time_since_epoch().count()};
-  SharedTier tier_;
+  SharedStore tier_;
 };
 
-Result<SharedTierOptions> OptionsOf(const config::SharedCacheConfig& config, std::size_t readers) {
+Result<SharedStoreOptions> OptionsOf(const config::SharedCacheConfig& config, std::size_t readers) {
   const auto wrong = [](std::string_view what) {
     return MakeError(ErrorCode::kInvalidArgument, "shared_cache: {}", what);
   };
@@ -173,7 +173,7 @@ Result<SharedTierOptions> OptionsOf(const config::SharedCacheConfig& config, std
   if (!config.ca_file.empty() && !std::ifstream(config.ca_file)) {
     return wrong(fmt::format("{} cannot be read; it must have certificates in PEM", config.ca_file));
   }
-  SharedTierOptions options;
+  SharedStoreOptions options;
   options.address = *std::move(address);
   options.ca_file = config.ca_file;
   options.timeout = milliseconds(config.timeout_ms);
@@ -186,14 +186,14 @@ Result<SharedTierOptions> OptionsOf(const config::SharedCacheConfig& config, std
 }  // namespace
 
 Result<void> CheckSharedCache(const config::SharedCacheConfig& config) {
-  const Result<SharedTierOptions> options = OptionsOf(config, 1);
+  const Result<SharedStoreOptions> options = OptionsOf(config, 1);
   if (!options) return tl::unexpected(options.error());
   return {};
 }
 
 Result<std::shared_ptr<tiler::TileStore>> OpenSharedCache(const config::SharedCacheConfig& config,
                                                           std::size_t readers) {
-  Result<SharedTierOptions> options = OptionsOf(config, readers);
+  Result<SharedStoreOptions> options = OptionsOf(config, readers);
   if (!options) return tl::unexpected(options.error());
   return std::make_shared<SharedCache>(config, *std::move(options));
 }

@@ -70,8 +70,8 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.heights = info.heights;
   view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
   if (info.edits > 0) {
-    view.edits_of = [pipeline, &source = *dataset.source](const tiler::TileRequest& request) {
-      return tiler::TileEdits(source, request);
+    view.edits_hash = [pipeline, &source = *dataset.source](const tiler::TileRequest& request) {
+      return tiler::TileEditsHash(source, request);
     };
   }
   view.has_datum = dataset.source->has_datum();
@@ -82,7 +82,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
     view.imagery = dataset.imagery.image->extent();
     view.imagery_attribution = dataset.imagery.attribution;
   }
-  view.sources_finest_level = info.finest_level;
+  view.source_max_level = info.max_source_level;
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;
@@ -102,7 +102,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const dem::GeoBounds& all = dataset.bounds;
   // Levels that edits add have no finer data.
-  const int level = std::min(dataset.finest_level(), dataset.max_level());
+  const int level = std::min(dataset.max_source_level(), dataset.max_level());
   if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
   const std::vector<geo::TileRange>& ranges = dataset.available[static_cast<std::size_t>(level)];
   const auto size = [](const geo::TileRange& range) {

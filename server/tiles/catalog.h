@@ -32,8 +32,8 @@ struct DatasetView {
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   std::uint64_t generation = 0;           // changes whenever the bytes of its tiles may change
   std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
-  // tiler::TileEdits. Empty: there are no edits.
-  std::function<std::uint64_t(const tiler::TileRequest&)> edits_of = {};
+  // tiler::TileEditsHash. Empty: there are no edits.
+  std::function<std::uint64_t(const tiler::TileRequest&)> edits_hash = {};
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
   dem::GeoBounds bounds;
   dem::HeightRange heights;  // of the data
@@ -47,7 +47,7 @@ struct DatasetView {
   std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};
-  std::optional<int> sources_finest_level;    // DemSource::finest_level; nothing: the deepest level
+  std::optional<int> source_max_level;        // DemSource::max_source_level; nothing: the deepest level
   int metadata_levels = 0;                    // tiles at multiples of this level have metadata; 0: none
   int max_mercator_depth = 1;                 // the deepest geo::MercatorGrid of height tiles
   std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
@@ -60,8 +60,8 @@ struct DatasetView {
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
   // The deepest level of the sources, without edits, as of dem::DemSource. An archive may end above it.
-  int finest_level() const {
-    return baked_alone ? baked_alone->extent().finest_level : sources_finest_level.value_or(max_level());
+  int max_source_level() const {
+    return baked_alone ? baked_alone->extent().max_source_level : source_max_level.value_or(max_level());
   }
 };
 

@@ -27,7 +27,7 @@ std::string NameOf(const tiler::TileRequest& request) { return "tile " + geo::To
 // The generation identifies the dataset, because its index may differ in the next catalog.
 tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
   const DatasetView& dataset = catalog.datasets[request.dataset];
-  const std::uint64_t edits = dataset.edits_of ? dataset.edits_of(request) : 0;
+  const std::uint64_t edits = dataset.edits_hash ? dataset.edits_hash(request) : 0;
   request.dataset = 0;
   return {request, dataset.cache_generation(), edits};
 }
@@ -98,7 +98,7 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
   bool has_edits = false;
   for (const DatasetView& dataset : catalog.datasets) {
     generations.push_back(dataset.cache_generation());
-    has_edits |= static_cast<bool>(dataset.edits_of) || had_edits_;
+    has_edits |= static_cast<bool>(dataset.edits_hash) || had_edits_;
   }
   tiers_.memory().Retain(generations);
   // In datasets that stay: erases the tiles whose edits have changed.
@@ -106,12 +106,12 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
     tiers_.memory().EraseIf([&](const tiler::CacheKey& key) {
       return std::ranges::none_of(catalog.datasets, [&](const DatasetView& dataset) {
         return dataset.cache_generation() == key.generation &&
-               key.edits == (dataset.edits_of ? dataset.edits_of(key.request) : 0);
+               key.edits == (dataset.edits_hash ? dataset.edits_hash(key.request) : 0);
       });
     });
   }
   had_edits_ = std::ranges::any_of(catalog.datasets,
-                                   [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_of); });
+                                   [](const DatasetView& dataset) { return static_cast<bool>(dataset.edits_hash); });
 }
 
 TileService::Stats TileService::stats() const {

@@ -21,7 +21,7 @@ Manifest FullManifest() {
   manifest.dataset.heights = {-12.3456789, 4634.1};
   manifest.dataset.floor_m = 0.1;
   manifest.dataset.metadata_levels = 5;
-  manifest.dataset.max_level = manifest.dataset.finest_level = 13;
+  manifest.dataset.max_level = manifest.dataset.max_source_level = 13;
   manifest.dataset.sources = 4;
   manifest.kind.coding = tiler::Coding::kGzip;
   manifest.kind.normals = manifest.kind.metadata = true;

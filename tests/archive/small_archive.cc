@@ -52,7 +52,7 @@ Manifest WriteUnits(const std::string& place, const std::vector<geo::TileKey>& k
   manifest.dataset.generation = 0x0123456789abcdef;
   manifest.kind.coding = tiler::Coding::kGzip;
   manifest.identity = R"({"bbox":[1,2,3,4]})";
-  manifest.max_level = manifest.dataset.max_level = manifest.dataset.finest_level = 9;
+  manifest.max_level = manifest.dataset.max_level = manifest.dataset.max_source_level = 9;
   manifest.available.resize(10);
   std::map<std::string, std::unique_ptr<TileWriter>> writers;
   for (const geo::TileKey& key : keys) {

@@ -30,7 +30,7 @@ IS_LONG = os.environ.get("TERRACE_LONG_TESTS") == "1"
 TILES = 60
 ROUNDS = 10_000 // TILES if IS_LONG else 20
 WORKERS = 2
-RETRY_SECONDS = 1  # SharedTierOptions::retry_after
+RETRY_SECONDS = 1  # SharedStoreOptions::retry_after
 PASSWORD = "a-password-that-no-log-may-have"
 
 

@@ -75,7 +75,7 @@ class Pending : public ServerFixture {
 
   ServerOptions WithShares() {
     ServerOptions options;
-    options.share_done = [this](const std::string& dataset) { return dataset == "alps" ? share_.load() : 0; };
+    options.progress_of = [this](const std::string& dataset) { return dataset == "alps" ? share_.load() : 0; };
     return options;
   }
 

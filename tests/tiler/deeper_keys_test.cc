@@ -29,20 +29,20 @@ TEST(DeeperKeys, AreOfTheEditsAndOfTheTilesBelow) {
   };
   const auto offset = open(inside), precise = open(beside), both = open(inside + "," + beside);
   ASSERT_TRUE(offset && precise && both);
-  ASSERT_EQ(both->finest_level(), kKey.level);
-  ASSERT_NE(offset->EditsOf(kKey), 0u);
-  ASSERT_EQ(both->EditsOf(kKey), offset->EditsOf(kKey));
-  ASSERT_EQ(precise->EditsOf(kKey), 0u);
+  ASSERT_EQ(both->max_source_level(), kKey.level);
+  ASSERT_NE(offset->EditsHash(kKey), 0u);
+  ASSERT_EQ(both->EditsHash(kKey), offset->EditsHash(kKey));
+  ASSERT_EQ(precise->EditsHash(kKey), 0u);
   ASSERT_NE(both->AvailabilityBelow(kKey).size(), offset->AvailabilityBelow(kKey).size());
   TileRequest request;
   request.key = kKey;
-  EXPECT_EQ(TileEdits(*offset, request), TileEdits(*both, request));
-  EXPECT_EQ(TileEdits(*precise, request), 0u);
+  EXPECT_EQ(TileEditsHash(*offset, request), TileEditsHash(*both, request));
+  EXPECT_EQ(TileEditsHash(*precise, request), 0u);
   request.metadata = true;
-  EXPECT_EQ(TileEdits(*offset, request), offset->EditsOf(kKey));
-  EXPECT_NE(TileEdits(*both, request), TileEdits(*offset, request));
-  EXPECT_EQ(TileEdits(*precise, request), precise->DeeperTilesOf(kKey));
-  EXPECT_NE(TileEdits(*both, request), TileEdits(*precise, request));
+  EXPECT_EQ(TileEditsHash(*offset, request), offset->EditsHash(kKey));
+  EXPECT_NE(TileEditsHash(*both, request), TileEditsHash(*offset, request));
+  EXPECT_EQ(TileEditsHash(*precise, request), precise->DeeperTilesHash(kKey));
+  EXPECT_NE(TileEditsHash(*both, request), TileEditsHash(*precise, request));
 }
 
 }  // namespace

@@ -252,7 +252,7 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   const TilePipeline plain = Open({}), pipeline = Open(features);
   const dem::DemSource& source = SourceOf(pipeline);
   const int finest = SourceOf(plain).max_level(), deepest = source.max_level();
-  ASSERT_EQ(source.finest_level(), finest);
+  ASSERT_EQ(source.max_source_level(), finest);
   ASSERT_GT(deepest, finest + 1);
   for (const MeshOptions& mesh : kMeshes) {
     const TilePipeline meshed = Open(features, mesh);
@@ -262,14 +262,14 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   }
   // Elsewhere the deepest tiles stay as they are, whatever a request asks for.
   const geo::TileKey beside = TileAt(finest, -4, 3);
-  ASSERT_EQ(source.EditsOf(beside), 0u);
+  ASSERT_EQ(source.EditsHash(beside), 0u);
   for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
     for (const bool metadata : {false, true}) {
       for (const int step : kSteps) {
         TileRequest request = RequestFor(beside, step);
         request.format = format;
         request.metadata = metadata;
-        EXPECT_EQ(TileEdits(source, request), 0u);
+        EXPECT_EQ(TileEditsHash(source, request), 0u);
         const auto a = plain.Build(request, {}), b = pipeline.Build(request, {});
         ASSERT_TRUE(a.has_value() && b.has_value());
         EXPECT_EQ(a->bytes, b->bytes) << step;
@@ -293,7 +293,7 @@ TEST_F(Edits, LeaveTheBytesOfTilesThatTheyDoNotTouch) {
             request.format = format;
             const auto a = plain.Build(request, {}), b = edited.Build(request, {});
             ASSERT_TRUE(a.has_value() && b.has_value());
-            const bool is_touched = SourceOf(edited).EditsOf(key) != 0;
+            const bool is_touched = SourceOf(edited).EditsHash(key) != 0;
             if (is_touched) {
               ++touched;
               differ += a->bytes != b->bytes ? 1 : 0;

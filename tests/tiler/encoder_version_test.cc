@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/tiler/fetched_tile.h"
 #include "tiler/area/area_mesh.h"

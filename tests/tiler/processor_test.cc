@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/tiler/fetched_tile.h"
 

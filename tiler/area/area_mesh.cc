@@ -212,7 +212,7 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
   }
   AreaPlan plan;
   const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };
-  while (plan.level < source.finest_level() && is_coarse()) ++plan.level;
+  while (plan.level < source.max_source_level() && is_coarse()) ++plan.level;
   const auto nodes_at = [&](int level) { return NodesAt(source.LatticeOf(level), *clipped); };
   // Deeper levels exist around edits alone. An edit must not make an area too large.
   while (plan.level < source.max_level() && is_coarse() &&

@@ -112,7 +112,7 @@ Result<void> AddTexture(const ImageryOptions& imagery, const TileRequest& reques
 
 Result<MeshedGlb> MeshGlb(const EncoderInput& input, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
-  const bool is_deepest = request.key.level >= dataset.source->finest_level();
+  const bool is_deepest = request.key.level >= dataset.source->max_source_level();
   const double skirt_error_m =
       proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
   proto::LatticeView lattice = input.lattice();

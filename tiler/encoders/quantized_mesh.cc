@@ -45,8 +45,8 @@ Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const 
   options.normals = request.normals;
   options.water_mask = request.water_mask && dataset.water.any();
   options.metadata =
-      request.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels, dataset.source->finest_level(),
-                                                 dataset.source->Availability());
+      request.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels,
+                                                 dataset.source->max_source_level(), dataset.source->Availability());
   if (options.water_mask) {
     Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());

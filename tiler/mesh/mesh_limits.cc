@@ -58,7 +58,7 @@ void AddOwnErrors(const tin::SampleLimits& limits, int cells, double error_m, pr
 proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
                                double error_m) {
   proto::EdgeErrors errors(error_m);
-  if (source.EditsOf(key) == 0) return errors;
+  if (source.EditsHash(key) == 0) return errors;
   AddOwnErrors(limits, source.LatticeOf(key.level).cells, error_m, errors);
   const auto beyond = source.DemandsBeyondCorners(key);
   for (std::size_t corner = 0; corner < 4; ++corner) {
@@ -82,7 +82,7 @@ std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const g
 }
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh) {
-  if (demands.hole.empty()) return {};
+  if (demands.no_triangles.empty()) return {};
   const auto side = static_cast<std::size_t>(width);
   std::vector<std::uint8_t> in_hole(mesh.triangles.size(), 0);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -92,8 +92,8 @@ std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int 
       for (int x = first; x <= last && is_inside; ++x) {
         const std::size_t k = static_cast<std::size_t>(y) * side + static_cast<std::size_t>(x);
         const bool is_forced = !demands.forced.empty() && demands.forced[k] != 0;
-        is_inside = demands.hole[k] != 0 || is_forced;
-        is_outline = is_outline && demands.hole[k] == 0;
+        is_inside = demands.no_triangles[k] != 0 || is_forced;
+        is_outline = is_outline && demands.no_triangles[k] == 0;
       }
     });
     // A triangle between nodes of the outline alone may be outside.

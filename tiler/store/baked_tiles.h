@@ -24,7 +24,7 @@ struct BakedExtent {
   double floor_m = 0;
   bool has_datum = true;
   std::size_t sources = 0;                      // number of sources of the baked dataset
-  int finest_level = 0;                         // of the baked dataset without edits (dem::DemSource::finest_level)
+  int max_source_level = 0;                     // of the baked dataset without edits (dem::DemSource::max_source_level)
   int max_mercator_depth = 0;                   // of the height tiles in the archive
   bool normals = false, water_mask = false;     // extensions of quantized-mesh tiles
   int metadata_levels = 0;                      // tiles at multiples of it have metadata; 0: none

@@ -23,7 +23,7 @@ namespace terrace::tiler {
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
   std::uint64_t generation = 0;  // Dataset::cache_generation
-  std::uint64_t edits = 0;       // TileEdits: tiles that an edit does not touch stay valid when it changes
+  std::uint64_t edits = 0;       // TileEditsHash: tiles that an edit does not touch stay valid when it changes
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;
 };

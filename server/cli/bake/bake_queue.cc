@@ -124,8 +124,8 @@ int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
 
 }  // namespace
 
-Result<bake::JobPlace> JobPlaceOf(const BakeArguments& arguments) {
-  bake::JobPlace place;
+Result<bake::JobConnection> JobPlaceOf(const BakeArguments& arguments) {
+  bake::JobConnection place;
   if (auto checked = bake::CheckJobName(arguments.job); !checked) return tl::unexpected(checked.error());
   auto address = redis::ParseAddress(arguments.queue);
   if (!address) return MakeError(ErrorCode::kInvalidArgument, "--queue: {}", address.error().message);

@@ -36,7 +36,7 @@ struct Seed {
 
   // The key under which a server looks the tile up.
   CacheKey KeyOf(const tiler::TileRequest& request) const {
-    return {request, dataset.cache_generation(), tiler::TileEdits(*dataset.source, request)};
+    return {request, dataset.cache_generation(), tiler::TileEditsHash(*dataset.source, request)};
   }
   // A full cache deletes a whole file of its oldest records: the margin keeps it from that.
   bool is_full() const { return bytes >= capacity_bytes - capacity_bytes / 8; }

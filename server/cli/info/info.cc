@@ -41,7 +41,7 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
   constexpr int kQuick = 4;
   const std::string what =
       info.overviews_unused.empty() ? "no overviews" : fmt::format("overviews not used: {}", info.overviews_unused);
-  if (info.is_in_folder) return what + "; their place is taken by averages in the cache folder";
+  if (info.has_averages_in_cache_folder) return what + "; their place is taken by averages in the cache folder";
   if (info.min_kept_factor > 0 && info.min_kept_factor <= kQuick) {
     return what + "; their place is taken by averages in memory, made at every start: a cache_dir would keep them";
   }

@@ -62,7 +62,7 @@ void LowerPriority() {
 
 // Called by the threads that read.
 Result<tiler::Dataset> Prepare(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
-                               const std::stop_token& stop, PreparedShares& shares) {
+                               const std::stop_token& stop, PreparationProgress& shares) {
   Progress progress((cache.folder ? "preparing " : "reading ") + NameOf(wanted), FileCount(wanted.sources));
   shares.Begin(wanted.name);
   const auto tell = [&](double share) {
@@ -87,7 +87,7 @@ struct Opening {
 
 // Ends early if `stop` or the opening's own source asks for it.
 Opening Begin(const config::DatasetConfig& wanted, const dem::RasterCache& cache, const std::stop_token& stop,
-              const std::shared_ptr<PreparedShares>& shares) {
+              const std::shared_ptr<PreparationProgress>& shares) {
   Opening opening;
   opening.dataset = std::async(std::launch::async, [wanted, cache, stop, shares, source = opening.stop]() mutable {
     const std::stop_callback linked(stop, [&source] { source.request_stop(); });
@@ -102,36 +102,36 @@ void PrintFault(const std::string& dataset, const std::string& message) {
   std::fprintf(stderr, "terrace: dataset %s: %s\n", dataset.c_str(), message.c_str());
 }
 
-double PreparedShares::Of(const std::string& dataset) const {
+double PreparationProgress::Of(const std::string& dataset) const {
   const std::lock_guard lock(mutex_);
   const auto known = shares_.find(dataset);
   return known == shares_.end() ? 0 : known->second;
 }
 
-void PreparedShares::Begin(const std::string& dataset) {
+void PreparationProgress::Begin(const std::string& dataset) {
   const std::lock_guard lock(mutex_);
   shares_[dataset] = 0;
 }
 
-void PreparedShares::Raise(const std::string& dataset, double share) {
+void PreparationProgress::Raise(const std::string& dataset, double share) {
   const std::lock_guard lock(mutex_);
   double& known = shares_[dataset];
   known = std::max(known, share);
 }
 
-void PreparedShares::GoToBackground() {
+void PreparationProgress::GoToBackground() {
   const std::lock_guard lock(mutex_);
   is_in_background_ = true;
 }
 
-bool PreparedShares::is_in_background() const {
+bool PreparationProgress::is_in_background() const {
   const std::lock_guard lock(mutex_);
   return is_in_background_;
 }
 
 std::optional<FirstDatasets> OpenFirstDatasets(const config::Config& config, const dem::RasterCache& cache,
                                                const std::stop_token& stop,
-                                               const std::shared_ptr<PreparedShares>& shares) {
+                                               const std::shared_ptr<PreparationProgress>& shares) {
   const std::vector<config::DatasetConfig>& wanted = config.datasets;
   std::vector<std::optional<tiler::Dataset>> open(wanted.size());
   std::vector<std::size_t> lacking;

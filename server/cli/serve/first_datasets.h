@@ -19,7 +19,7 @@
 namespace terrace::cli {
 
 // How far the preparation of each dataset is. Thread-safe.
-class PreparedShares {
+class PreparationProgress {
  public:
   // The share done of a dataset, 0 .. 1; never decreases during a preparation. 0 if nothing is known.
   double Of(const std::string& dataset) const;
@@ -52,6 +52,6 @@ void PrintFault(const std::string& dataset, const std::string& message);
 // printed, or after a stop.
 std::optional<FirstDatasets> OpenFirstDatasets(const config::Config& config, const dem::RasterCache& cache,
                                                const std::stop_token& stop,
-                                               const std::shared_ptr<PreparedShares>& shares);
+                                               const std::shared_ptr<PreparationProgress>& shares);
 
 }  // namespace terrace::cli

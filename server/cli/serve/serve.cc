@@ -99,8 +99,8 @@ int Serve(const ServeArguments& arguments) {
   if (arguments.check_config) return CheckConfig(arguments, config);
   const Result<std::optional<int>> passed = TakeListenSocket();
   if (!passed) return FailToStart(passed.error());
-  BlockAnsweredSignals();  // log rotation may send them while sources are being opened
-  tiler::BuildId();        // before GDAL or the system's resolver loads further libraries
+  BlockHandledSignals();  // log rotation may send them while sources are being opened
+  tiler::BuildId();       // before GDAL or the system's resolver loads further libraries
   server::ServerOptions options;
   options.config = WithViewer(config);
   options.listen_socket = passed->value_or(-1);

@@ -44,7 +44,7 @@ std::vector<std::string> PendingOf(const config::Config& config, const std::vect
 constexpr std::chrono::seconds kStopTime{1};
 
 // Signals that the running server handles, except those that end it.
-const std::vector<int> kAnsweredSignals = {SIGUSR1, SIGUSR2, SIGHUP};
+const std::vector<int> kHandledSignals = {SIGUSR1, SIGUSR2, SIGHUP};
 
 // `how`: SIG_BLOCK or SIG_UNBLOCK. For this thread and threads that it starts.
 void MaskSignals(int how, const std::vector<int>& signals) {
@@ -70,7 +70,7 @@ void ShutdownWatchdog::Begin(std::chrono::milliseconds limit) {
   });
 }
 
-void BlockAnsweredSignals() { MaskSignals(SIG_BLOCK, kAnsweredSignals); }
+void BlockHandledSignals() { MaskSignals(SIG_BLOCK, kHandledSignals); }
 
 int FailToStart(const Error& error) {
   std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
@@ -83,14 +83,14 @@ ServeRun::ServeRun(const ServeArguments& arguments, const config::Config& config
       is_read_once_(is_read_once),
       baked_(std::make_shared<server::BakedStore>()),
       level_(config.log_level),
-      shares_(std::make_shared<PreparedShares>()),
+      shares_(std::make_shared<PreparationProgress>()),
       watch_(arguments.config_path, [this] { return LoadAgain(); }) {}
 
 Result<void> ServeRun::Start(server::ServerOptions options, std::size_t store_files) {
   if (auto opened = OpenTiers(store_files, options); !opened) return opened;
   cache_ = OpenCache(config_);
   options.cache_problem = [folder = cache_.folder] { return folder ? folder->problem() : std::string(); };
-  options.share_done = [shares = shares_](const std::string& dataset) { return shares->Of(dataset); };
+  options.progress_of = [shares = shares_](const std::string& dataset) { return shares->Of(dataset); };
   HandleEvents(options);
   auto started = server::Server::Start(nullptr, std::move(options));
   if (!started) return tl::unexpected(started.error());
@@ -140,7 +140,7 @@ int ServeRun::ServeDatasets() {
   count_ = first->open.size();
   pending_ = first->pending.size();
   is_announced_ = first->pending.empty();
-  is_untouched_ = first->open.empty();
+  has_served_nothing_ = first->open.empty();
   reloader_ = std::make_unique<server::Reloader>(config_, std::move(first->slots), MakeHooks());
   if (const Result<void> served = server_->Replace(CatalogOf(first->open, first->pending), config_); !served) {
     return FailToStart(served.error());
@@ -159,7 +159,7 @@ int ServeRun::ServeDatasets() {
   }
   NotifyReady(ServedText());  // before the reloader's thread may notify newer texts
   reloader_->Start(config_.watch);
-  MaskSignals(SIG_UNBLOCK, kAnsweredSignals);
+  MaskSignals(SIG_UNBLOCK, kHandledSignals);
   const server::MemoryTrimmer trimmer;
   const bool drained = server_->Wait();
   reloader_->Stop();
@@ -213,7 +213,7 @@ void ServeRun::Publish(const std::vector<tiler::Dataset>& served, const config::
     count_ = served.size();
     pending_ = pending.size();
   }
-  is_untouched_ = false;
+  has_served_nothing_ = false;
   baked_->Use(served);
   std::vector<std::uint64_t> generations;
   for (const tiler::Dataset& dataset : served) generations.push_back(dataset.cache_generation());
@@ -226,7 +226,7 @@ void ServeRun::Publish(const std::vector<tiler::Dataset>& served, const config::
 // A start of which no dataset can be opened ends the server.
 void ServeRun::ReportProblems(const std::map<std::string, std::string>& problems) {
   server_->SetProblems(problems);
-  const bool has_nothing = is_untouched_ && std::ranges::all_of(config_.datasets, [&](const auto& dataset) {
+  const bool has_nothing = has_served_nothing_ && std::ranges::all_of(config_.datasets, [&](const auto& dataset) {
                              return problems.contains(dataset.name);
                            });
   if (!has_nothing) return;

@@ -39,7 +39,7 @@ class ShutdownWatchdog {
 
 // Blocks the signals that the running server handles, except those that end it, in this thread and in threads that it
 // starts. Before ServeRun installs handlers they would end the process.
-void BlockAnsweredSignals();
+void BlockHandledSignals();
 
 // Prints the error. Returns exit code 1, also for kInvalidArgument: the command line was accepted.
 int FailToStart(const Error& error);
@@ -78,11 +78,11 @@ class ServeRun {
   std::shared_ptr<tiler::RefinementCache> refinements_;
   dem::RasterCache cache_;
   std::atomic<config::LogLevel> level_;  // the configured one
-  const std::shared_ptr<PreparedShares> shares_;
+  const std::shared_ptr<PreparationProgress> shares_;
   std::atomic<std::size_t> count_{0}, pending_{0};  // of datasets
   // These belong to the reloader's thread once it runs.
   bool is_announced_ = false;
-  bool is_untouched_ = false;  // nothing was served yet, and the configuration is the first
+  bool has_served_nothing_ = false;  // nothing was served yet, and the configuration is the first
   std::atomic<bool> has_failed_{false};
   config::ConfigWatch watch_;
   std::unique_ptr<server::Reloader> reloader_;  // once there are datasets to watch

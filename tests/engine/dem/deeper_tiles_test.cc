@@ -21,9 +21,9 @@ TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
   const auto coarse = Open(Rectangle(R"({"op":"precision","error_m":50})", 10.35, 50.35, 10.36, 50.352));
   ASSERT_TRUE(plain && edited && coarse);
   const int finest = plain->max_level();
-  EXPECT_EQ(plain->finest_level(), finest);
+  EXPECT_EQ(plain->max_source_level(), finest);
   EXPECT_EQ(coarse->Availability(), plain->Availability());
-  EXPECT_EQ(edited->finest_level(), finest);
+  EXPECT_EQ(edited->max_source_level(), finest);
   EXPECT_GT(edited->max_level(), finest + 2);
   EXPECT_LE(geo::DefaultError(edited->max_level()), 0.5);
   EXPECT_GT(geo::DefaultError(edited->max_level() - 1), 0.5);
@@ -67,8 +67,8 @@ TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
   const geo::TileKey here{finest, static_cast<std::int64_t>((10.355 + 180) / 180 * double(geo::TileRows(finest))),
                           static_cast<std::int64_t>((50.351 + 90) / 180 * double(geo::TileRows(finest)))};
   const geo::TileKey there{finest, here.x - 4, here.y};
-  EXPECT_NE(edited->DeeperTilesOf(here), 0u);
-  EXPECT_EQ(edited->DeeperTilesOf(there), 0u);
+  EXPECT_NE(edited->DeeperTilesHash(here), 0u);
+  EXPECT_EQ(edited->DeeperTilesHash(there), 0u);
   EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(here).size()), edited->max_level() + 1);
   EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(there).size()), finest + 1);
   EXPECT_EQ(plain->ContentBelow(there, finest), edited->ContentBelow(there, finest));
@@ -121,10 +121,10 @@ TEST_F(TerrainEdits, HashTheTilesBelowATile) {
               is_deeper |= !geo::IsEmpty(common) && !plain->IsAvailable({below, common.start_x, common.start_y});
             }
           }
-          const std::uint64_t edits = edited->EditsOf(key), deeper = edited->DeeperTilesOf(key);
+          const std::uint64_t edits = edited->EditsHash(key), deeper = edited->DeeperTilesHash(key);
           EXPECT_EQ(deeper != 0, is_deeper) << geo::ToString(key);
-          EXPECT_EQ(edited->DeeperTilesOf(key), deeper);
-          EXPECT_EQ(edited->EditsOf(key), edits);
+          EXPECT_EQ(edited->DeeperTilesHash(key), deeper);
+          EXPECT_EQ(edited->EditsHash(key), edits);
           if (deeper != 0) {
             EXPECT_NE(deeper, edits);
           }
@@ -204,7 +204,7 @@ TEST_F(TerrainEdits, GoDeeperOnBothSidesOfTheAntimeridian) {
                           parts))};
     const auto source = OpenOrFail(slope, options);
     std::int64_t tiles = 0;
-    for (int level = source->finest_level() + 1; level <= source->max_level(); ++level) {
+    for (int level = source->max_source_level() + 1; level <= source->max_level(); ++level) {
       for (const geo::TileRange& range : source->Available(level)) tiles += geo::Cells(range);
     }
     return tiles;
@@ -218,7 +218,7 @@ TEST_F(TerrainEdits, GoDeeperOnBothSidesOfTheAntimeridian) {
 TEST_F(TerrainEdits, GoNoDeeperThanSixLevels) {
   const auto edited = Open(Rectangle(R"({"op":"precision","error_m":0.001})", 10.35, 50.35, 10.3502, 50.3502));
   ASSERT_NE(edited, nullptr);
-  EXPECT_EQ(edited->max_level(), edited->finest_level() + 6);
+  EXPECT_EQ(edited->max_level(), edited->max_source_level() + 6);
 }
 
 }  // namespace

@@ -281,10 +281,10 @@ TEST_F(TerrainEdits, MeetAtTheAntimeridian) {
     return geo::TileKey{kLevel, static_cast<std::int64_t>((longitude + 180) * tiles),
                         static_cast<std::int64_t>((50.2 + 90) * tiles)};
   };
-  EXPECT_NE(carved->EditsOf(key(179.99)), 0u);
-  EXPECT_NE(carved->EditsOf(key(-179.99)), 0u);
-  for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(carved->EditsOf(key(far)), 0u) << far;
-  const int finest = carved->finest_level();
+  EXPECT_NE(carved->EditsHash(key(179.99)), 0u);
+  EXPECT_NE(carved->EditsHash(key(-179.99)), 0u);
+  for (const double far : {-170.0, -10.0, 10.0, 170.0}) EXPECT_EQ(carved->EditsHash(key(far)), 0u) << far;
+  const int finest = carved->max_source_level();
   const auto row = static_cast<std::int64_t>((50.2 + 90) * std::ldexp(1, finest) / 180);
   const auto east = carved->Read({finest, 0, row}), west = carved->Read({finest, geo::TileColumns(finest) - 1, row});
   ASSERT_TRUE(east && west);
@@ -373,7 +373,7 @@ TEST_F(TerrainEdits, ChangeTheContentOfTheTilesThatTheyTouch) {
         const bool is_same =
             plain->ContentBelow({level, x, y}, level + 2) == edited->ContentBelow({level, x, y}, level + 2);
         ++(is_same ? same : changed);
-        EXPECT_FALSE(is_same && edited->EditsOf({level, x, y}) != 0);
+        EXPECT_FALSE(is_same && edited->EditsHash({level, x, y}) != 0);
       }
     }
   }
@@ -473,12 +473,12 @@ TEST_F(TerrainEdits, HaveAnotherHashIfTheMeanChanges) {
   ASSERT_NE(low, nullptr);
   const geo::TileKey in_the_east{12, static_cast<std::int64_t>((10.24 + 180) / 180 * 4096),
                                  static_cast<std::int64_t>((50.2 + 90) / 180 * 4096)};
-  const std::uint64_t before = low->EditsOf(in_the_east);
+  const std::uint64_t before = low->EditsHash(in_the_east);
   const ContentHash content = low->ContentBelow(in_the_east, 12);
   const auto high = open(130);
   ASSERT_NE(high, nullptr);
   EXPECT_NE(before, 0u);
-  EXPECT_NE(high->EditsOf(in_the_east), before);
+  EXPECT_NE(high->EditsHash(in_the_east), before);
   EXPECT_FALSE(high->ContentBelow(in_the_east, 12) == content);
   EXPECT_NE(high->fingerprint(), low->fingerprint());
 }

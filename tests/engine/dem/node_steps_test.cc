@@ -27,7 +27,7 @@ struct Measured {
 };
 
 // Node by node.
-Measured Expected(const NodePlaces& places, int columns, int rows) {
+Measured Expected(const NodeCoordinates& places, int columns, int rows) {
   Measured one;
   double sum = 0;
   const auto axis = [&](const double* place, double& east, double& north, double& bend) {
@@ -73,7 +73,7 @@ TEST(NodeSteps, AreThoseOfSingleNodes) {
     }
     const int columns = 1 + pick(16), rows = 1 + pick(16);
     const std::size_t first = kStride * (1 + random() % 3) + 1 + random() % 3;
-    const NodePlaces places{x.data() + first, y.data() + first, kStride};
+    const NodeCoordinates places{x.data() + first, y.data() + first, kStride};
     const Measured expected = Expected(places, columns, rows);
     (expected.is_known ? known : unknown) += 1;
     tin::ForEachInstructionSet([&] {

@@ -155,7 +155,7 @@ TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
     const auto catalog = CatalogOf(BuildEmpty);
     catalog->datasets[0].generation = generation;
     catalog->datasets[0].unedited_generation = 1;
-    catalog->datasets[0].edits_of = [of_touched](const tiler::TileRequest& request) {
+    catalog->datasets[0].edits_hash = [of_touched](const tiler::TileRequest& request) {
       return request.key.x == 1 ? of_touched : std::uint64_t{0};
     };
     return catalog;

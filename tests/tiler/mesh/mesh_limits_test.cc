@@ -32,7 +32,7 @@ TEST(EdgeErrors, AreThoseOfTheTileOnAPole) {
                     8 * kSide, nearest, furthest))};
     const auto source = dem::OpenOrFail(raster, options);
     ASSERT_NE(source, nullptr);
-    ASSERT_GE(source->finest_level(), kLevel);
+    ASSERT_GE(source->max_source_level(), kLevel);
     const std::int64_t column = (1 << kLevel) + 8, row = is_north ? geo::TileRows(kLevel) - 1 : 0;
     for (const std::int64_t dx : {-1, 0}) {
       const geo::TileKey key{kLevel, column + dx, row};

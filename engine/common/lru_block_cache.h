@@ -13,11 +13,11 @@ namespace terrace::dem {
 
 // Blocks by key, up to a number of bytes; the least recently used ones are dropped first. Thread-safe.
 template <typename Key, typename Block, typename Hash>
-class RecentBlocks {
+class LruBlockCache {
  public:
   using BlockPtr = std::shared_ptr<const Block>;
 
-  explicit RecentBlocks(std::size_t capacity_bytes) : capacity_bytes_(capacity_bytes) {}
+  explicit LruBlockCache(std::size_t capacity_bytes) : capacity_bytes_(capacity_bytes) {}
 
   BlockPtr Find(const Key& key) {  // null: not kept
     const std::lock_guard lock(mutex_);

@@ -1,7 +1,7 @@
-#include "engine/bound/column_bends.h"
+#include "engine/bound/column_differences.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/bound/column_bends.cc"
+#define HWY_TARGET_INCLUDE "engine/bound/column_differences.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each set of instructions
 #include <hwy/highway.h>
 
@@ -15,7 +15,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Measures columns `c` and beyond, as many as the tag has lanes. `kEast`: the number of columns to the east, up to 2.
 template <int kEast, class D>
 HWY_INLINE void MeasureColumns(D d, const float* samples, std::size_t stride, std::size_t rows, std::size_t c,
-                               ColumnBends& bends) {
+                               ColumnDifferences& bends) {
   using V = hn::Vec<D>;
   const auto raise = [&](V& largest, V value) HWY_ATTR {
     const V size = hn::Abs(value);
@@ -51,7 +51,8 @@ HWY_INLINE void MeasureColumns(D d, const float* samples, std::size_t stride, st
 
 // Measures all columns but the last two; returns false if they are fewer than the tag has lanes.
 template <class D>
-HWY_INLINE bool MeasureInner(D d, const float* samples, std::size_t stride, std::size_t rows, ColumnBends& bends) {
+HWY_INLINE bool MeasureInner(D d, const float* samples, std::size_t stride, std::size_t rows,
+                             ColumnDifferences& bends) {
   const std::size_t lanes = hn::Lanes(d), inner = bends.columns() < 2 ? 0 : bends.columns() - 2;
   if (inner < lanes) return inner == 0;
   for (std::size_t c = 0; c + lanes <= inner; c += lanes) MeasureColumns<2>(d, samples, stride, rows, c, bends);
@@ -60,7 +61,7 @@ HWY_INLINE bool MeasureInner(D d, const float* samples, std::size_t stride, std:
   return true;
 }
 
-void Measure(const float* samples, std::size_t stride, std::size_t rows, ColumnBends& bends) {
+void Measure(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends) {
   const hn::CappedTag<float, 16> wide;
   const hn::CappedTag<float, 4> narrow;
   const hn::CappedTag<float, 1> single;
@@ -85,11 +86,11 @@ HWY_EXPORT(Measure);
 
 }  // namespace
 
-void ColumnBends::Resize(std::size_t columns) {
+void ColumnDifferences::Resize(std::size_t columns) {
   for (std::vector<float>* of_column : {&x, &y, &xx, &yy, &xy, &sum}) of_column->resize(columns);
 }
 
-void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnBends& bends) {
+void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends) {
   HWY_DYNAMIC_DISPATCH(Measure)(samples, stride, rows, bends);
 }
 

@@ -1,4 +1,4 @@
-#include "engine/gdal/gdal_handle.h"
+#include "engine/gdal/handle_pool.h"
 
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"

@@ -1,4 +1,4 @@
-#include "proto/error_text.h"
+#include "proto/format_error_up.h"
 
 #include <gtest/gtest.h>
 

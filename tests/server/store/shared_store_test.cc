@@ -1,6 +1,6 @@
 // The store behind the shared cache, with a Redis that this file plays. What is counted: look-ups that waited, and
 // commands that reached the server.
-#include "server/store/shared_tier.h"
+#include "server/store/shared_store.h"
 
 #include <gtest/gtest.h>
 
@@ -19,8 +19,8 @@ using std::chrono::hours;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-SharedTierOptions OptionsOf(const FakeRedis& redis, std::size_t readers) {
-  SharedTierOptions options;
+SharedStoreOptions OptionsOf(const FakeRedis& redis, std::size_t readers) {
+  SharedStoreOptions options;
   options.address = redis.address();
   options.timeout = seconds(5);
   options.max_value_bytes = 1000;
@@ -38,10 +38,10 @@ void Await(const std::function<bool()>& condition) {
   }
 }
 
-TEST(SharedTier, FindsWhatRedisHas) {
+TEST(SharedStore, FindsWhatRedisHas) {
   FakeRedis redis;
   redis.SetValue(tiler::AddChecksum("key", "value"));
-  SharedTier tier(OptionsOf(redis, 1));
+  SharedStore tier(OptionsOf(redis, 1));
   Await([&] { return redis.pings() >= 2; });  // one of the greeting, one that switches the store on
   Await([&] { return tier.stats().on; });
   EXPECT_EQ(tier.Find("key"), "value");
@@ -50,11 +50,11 @@ TEST(SharedTier, FindsWhatRedisHas) {
   EXPECT_EQ(tier.stats().damaged, 1U);
 }
 
-TEST(SharedTier, SilenceCostsOneTimeOutAndNoFurtherCommand) {
+TEST(SharedStore, SilenceCostsOneTimeOutAndNoFurtherCommand) {
   FakeRedis redis;
-  SharedTierOptions options = OptionsOf(redis, 1);
+  SharedStoreOptions options = OptionsOf(redis, 1);
   options.timeout = seconds(1);
-  SharedTier tier(options);
+  SharedStore tier(options);
   Await([&] { return tier.stats().on; });
   redis.FallSilent();
   constexpr std::uint64_t kLookUps = 1000;
@@ -68,10 +68,10 @@ TEST(SharedTier, SilenceCostsOneTimeOutAndNoFurtherCommand) {
   EXPECT_EQ(redis.look_ups(), 1U) << "while it is switched off, no look-up sends a byte";
 }
 
-TEST(SharedTier, AnErrorSwitchesOffAsSilenceDoes) {
+TEST(SharedStore, AnErrorSwitchesOffAsSilenceDoes) {
   FakeRedis redis;
   redis.SetReply("-LOADING Redis is loading\r\n");
-  SharedTier tier(OptionsOf(redis, 1));
+  SharedStore tier(OptionsOf(redis, 1));
   Await([&] { return tier.stats().on; });
   for (int i = 0; i < 100; ++i) EXPECT_EQ(tier.Find("key"), std::nullopt);
   EXPECT_EQ(tier.stats().timeouts, 0U);
@@ -80,11 +80,11 @@ TEST(SharedTier, AnErrorSwitchesOffAsSilenceDoes) {
   EXPECT_EQ(redis.look_ups(), 1U);
 }
 
-TEST(SharedTier, TheFirstFailureEndsAllLookUps) {
+TEST(SharedStore, TheFirstFailureEndsAllLookUps) {
   FakeRedis redis;
-  SharedTierOptions options = OptionsOf(redis, 8);
+  SharedStoreOptions options = OptionsOf(redis, 8);
   options.timeout = hours(1);  // nobody waits for it
-  SharedTier tier(options);
+  SharedStore tier(options);
   Await([&] { return redis.pings() >= 16; });
   Await([&] { return tier.stats().on; });
   redis.FallSilent();
@@ -111,12 +111,12 @@ TEST(SharedTier, TheFirstFailureEndsAllLookUps) {
   EXPECT_EQ(tier.stats().errors, 1U);
 }
 
-TEST(SharedTier, ConnectionsThatAreSilentlyGoneAreFoundWithoutALookUp) {
+TEST(SharedStore, ConnectionsThatAreSilentlyGoneAreFoundWithoutALookUp) {
   FakeRedis redis;
-  SharedTierOptions options = OptionsOf(redis, 4);
+  SharedStoreOptions options = OptionsOf(redis, 4);
   options.timeout = seconds(1);
   options.test_after = milliseconds(100);
-  SharedTier tier(options);
+  SharedStore tier(options);
   Await([&] { return redis.pings() >= 12; });  // all four have been tested
   EXPECT_TRUE(tier.stats().on);
   redis.FallSilent();
@@ -127,11 +127,11 @@ TEST(SharedTier, ConnectionsThatAreSilentlyGoneAreFoundWithoutALookUp) {
   EXPECT_EQ(redis.look_ups(), 0U);
 }
 
-TEST(SharedTier, ConnectionsThatRedisHasClosedAreReplacedWithoutAFailure) {
+TEST(SharedStore, ConnectionsThatRedisHasClosedAreReplacedWithoutAFailure) {
   FakeRedis redis;
   redis.SetValue(tiler::AddChecksum("key", "value"));
-  SharedTierOptions options = OptionsOf(redis, 2);
-  SharedTier tier(options);
+  SharedStoreOptions options = OptionsOf(redis, 2);
+  SharedStore tier(options);
   Await([&] { return redis.pings() >= 4; });
   Await([&] { return tier.stats().on; });
   redis.CloseAll();
@@ -141,11 +141,11 @@ TEST(SharedTier, ConnectionsThatRedisHasClosedAreReplacedWithoutAFailure) {
   EXPECT_EQ(tier.stats().errors, 0U);
 }
 
-TEST(SharedTier, DoesNotWriteOnAConnectionThatWasIdle) {
+TEST(SharedStore, DoesNotWriteOnAConnectionThatWasIdle) {
   FakeRedis redis;
-  SharedTierOptions options = OptionsOf(redis, 1);
+  SharedStoreOptions options = OptionsOf(redis, 1);
   options.test_after = milliseconds(20);
-  SharedTier tier(options);
+  SharedStore tier(options);
   Await([&] { return tier.stats().on; });
   const auto value = [] { return std::string("value"); };
   tier.Keep("key", value, 5);
@@ -158,13 +158,13 @@ TEST(SharedTier, DoesNotWriteOnAConnectionThatWasIdle) {
   EXPECT_EQ(tier.stats().switched_off, 0U);
 }
 
-TEST(SharedTier, ComesBackWhenRedisAnswers) {
+TEST(SharedStore, ComesBackWhenRedisAnswers) {
   FakeRedis redis;
   redis.SetValue(tiler::AddChecksum("key", "value"));
-  SharedTierOptions options = OptionsOf(redis, 1);
+  SharedStoreOptions options = OptionsOf(redis, 1);
   options.timeout = seconds(1);
   options.retry_after = milliseconds(20);
-  SharedTier tier(options);
+  SharedStore tier(options);
   Await([&] { return tier.stats().on; });
   redis.FallSilent();
   EXPECT_EQ(tier.Find("key"), std::nullopt);

@@ -1,4 +1,4 @@
-#include "tiler/tile_tree.h"
+#include "tiler/tileset_documents.h"
 
 #include <algorithm>
 #include <cmath>

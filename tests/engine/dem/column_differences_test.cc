@@ -1,5 +1,5 @@
 // Differences of samples are measured in vectors; what comes out is what each sample gives on its own.
-#include "engine/bound/column_bends.h"
+#include "engine/bound/column_differences.h"
 
 #include <gtest/gtest.h>
 
@@ -19,8 +19,8 @@ void Raise(float& largest, float value) {
 }
 
 // Sample by sample.
-ColumnBends Expected(const std::vector<std::vector<float>>& rows) {
-  ColumnBends bends;
+ColumnDifferences Expected(const std::vector<std::vector<float>>& rows) {
+  ColumnDifferences bends;
   const std::size_t columns = rows.front().size();
   bends.Resize(columns);
   for (std::size_t j = 0; j < rows.size(); ++j) {
@@ -38,14 +38,14 @@ ColumnBends Expected(const std::vector<std::vector<float>>& rows) {
   return bends;
 }
 
-TEST(ColumnBends, AreThoseOfSingleSamples) {
+TEST(ColumnDifferences, AreThoseOfSingleSamples) {
   std::mt19937 random(4);
   std::uniform_real_distribution<float> metres(-500, 3000);
   for (std::size_t columns = 1; columns <= 50; ++columns) {
     std::vector<std::vector<float>> rows(4, std::vector<float>(columns));
     for (auto& row : rows) std::ranges::generate(row, [&] { return metres(random); });
     if (columns % 5 == 0) rows[2][columns / 2] = std::numeric_limits<float>::quiet_NaN();
-    const ColumnBends expected = Expected(rows);
+    const ColumnDifferences expected = Expected(rows);
     const std::size_t stride = columns + 3;
     std::vector<float> samples;
     for (const auto& row : rows) {
@@ -54,7 +54,7 @@ TEST(ColumnBends, AreThoseOfSingleSamples) {
     }
     samples.resize(samples.size() - (stride - columns));
     tin::ForEachInstructionSet([&] {
-      ColumnBends bends;
+      ColumnDifferences bends;
       bends.Resize(columns);
       MeasureBends(samples.data(), stride, rows.size(), bends);
       EXPECT_EQ(bends.x, expected.x) << columns;

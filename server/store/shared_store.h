@@ -34,7 +34,7 @@
 
 namespace terrace::server {
 
-struct SharedTierOptions {
+struct SharedStoreOptions {
   redis::Address address;
   std::string ca_file;                             // redis::ConnectionOptions
   std::chrono::milliseconds timeout{25};           // of a look-up
@@ -46,12 +46,12 @@ struct SharedTierOptions {
   std::chrono::milliseconds test_after{5'000};     // a connection that was not used
 };
 
-class SharedTier {
+class SharedStore {
  public:
   // Returns at once. A Redis that cannot be reached is no error: the store is switched off until it can.
-  explicit SharedTier(SharedTierOptions options);
+  explicit SharedStore(SharedStoreOptions options);
   // Writes waiting values, unless Redis fails or this takes longer than half a second.
-  ~SharedTier();
+  ~SharedStore();
 
   // From now on no value is accepted, and waiting values are dropped. For callers that have no time to wait for Redis.
   void Abandon();
@@ -113,7 +113,7 @@ class SharedTier {
   void RefuseWrites(const std::string& why);
   void Report(const std::string& why, bool is_off);
 
-  const SharedTierOptions options_;
+  const SharedStoreOptions options_;
   mutable std::mutex mutex_;  // guards what follows, up to the counters; never held while Redis is waited for
   std::condition_variable changed_;
   bool on_ = false;

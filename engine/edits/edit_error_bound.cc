@@ -1,4 +1,4 @@
-#include "engine/edits/edit_error.h"
+#include "engine/edits/edit_error_bound.h"
 
 #include <algorithm>
 #include <array>

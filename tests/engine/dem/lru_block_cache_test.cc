@@ -1,4 +1,4 @@
-#include "engine/common/recent_blocks.h"
+#include "engine/common/lru_block_cache.h"
 
 #include <gtest/gtest.h>
 
@@ -8,9 +8,9 @@
 namespace terrace::dem {
 namespace {
 
-using Blocks = RecentBlocks<int, int, std::hash<int>>;
+using Blocks = LruBlockCache<int, int, std::hash<int>>;
 
-TEST(RecentBlocks, TheLeastRecentlyUsedOnesAreDropped) {
+TEST(LruBlockCache, TheLeastRecentlyUsedOnesAreDropped) {
   Blocks blocks(30);
   for (int key = 1; key <= 3; ++key) blocks.Insert(key, std::make_shared<int>(10 * key), 10);
   EXPECT_EQ(*blocks.Find(1), 10);
@@ -21,7 +21,7 @@ TEST(RecentBlocks, TheLeastRecentlyUsedOnesAreDropped) {
   EXPECT_EQ(blocks.count(), 3U);
 }
 
-TEST(RecentBlocks, TheFirstBlockOfAKeyStays) {
+TEST(LruBlockCache, TheFirstBlockOfAKeyStays) {
   Blocks blocks(30);
   blocks.Insert(1, std::make_shared<int>(10), 10);
   blocks.Insert(1, std::make_shared<int>(11), 20);
@@ -29,7 +29,7 @@ TEST(RecentBlocks, TheFirstBlockOfAKeyStays) {
   EXPECT_EQ(blocks.bytes(), 10U);
 }
 
-TEST(RecentBlocks, ABlockOfMoreThanTheCapacityIsNotKept) {
+TEST(LruBlockCache, ABlockOfMoreThanTheCapacityIsNotKept) {
   Blocks blocks(30);
   blocks.Insert(1, std::make_shared<int>(10), 10);
   blocks.Insert(2, std::make_shared<int>(20), 31);
@@ -37,7 +37,7 @@ TEST(RecentBlocks, ABlockOfMoreThanTheCapacityIsNotKept) {
   EXPECT_NE(blocks.Find(1), nullptr);
 }
 
-TEST(RecentBlocks, ADroppedBlockLivesAsLongAsSomebodyUsesIt) {
+TEST(LruBlockCache, ADroppedBlockLivesAsLongAsSomebodyUsesIt) {
   Blocks blocks(10);
   blocks.Insert(1, std::make_shared<int>(10), 10);
   const Blocks::BlockPtr block = blocks.Find(1);

@@ -1,4 +1,4 @@
-#include "server/store/shared_tier.h"
+#include "server/store/shared_store.h"
 
 #include <spdlog/spdlog.h>
 
@@ -39,9 +39,9 @@ std::string LeaseOf(std::string_view key) { return "terrace:lease:" + std::strin
 
 }  // namespace
 
-SharedTier::SharedTier(SharedTierOptions options) : options_(std::move(options)), thread_([this] { Run(); }) {}
+SharedStore::SharedStore(SharedStoreOptions options) : options_(std::move(options)), thread_([this] { Run(); }) {}
 
-SharedTier::~SharedTier() {
+SharedStore::~SharedStore() {
   {
     const std::lock_guard lock(mutex_);
     stop_ = true;
@@ -50,7 +50,7 @@ SharedTier::~SharedTier() {
   thread_.join();
 }
 
-void SharedTier::Abandon() {
+void SharedStore::Abandon() {
   const std::lock_guard lock(mutex_);
   abandoned_ = true;
   dropped_ += queue_.size();
@@ -58,7 +58,7 @@ void SharedTier::Abandon() {
   queued_bytes_ = 0;
 }
 
-Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout, std::size_t max_reply_bytes) const {
+Result<SharedStore::ConnectionPtr> SharedStore::Open(milliseconds command_timeout, std::size_t max_reply_bytes) const {
   redis::ConnectionOptions options;
   options.connect_timeout = kWriteTimeout;
   options.command_timeout = command_timeout;
@@ -67,7 +67,7 @@ Result<SharedTier::ConnectionPtr> SharedTier::Open(milliseconds command_timeout,
   return redis::Connection::Open(options_.address, options);
 }
 
-SharedTier::Loan SharedTier::Borrow() {
+SharedStore::Loan SharedStore::Borrow() {
   const std::lock_guard lock(mutex_);
   while (on_ && !idle_.empty()) {
     ConnectionPtr connection = std::move(idle_.back().connection);
@@ -82,19 +82,19 @@ SharedTier::Loan SharedTier::Borrow() {
   return {nullptr, epoch_};
 }
 
-void SharedTier::GiveBack(Loan loan) {
+void SharedStore::GiveBack(Loan loan) {
   const std::lock_guard lock(mutex_);
   borrowed_.erase(loan.connection.get());
   if (loan.epoch == epoch_) idle_.push_back({std::move(loan.connection), Clock::now()});
 }
 
-void SharedTier::Drop(Loan loan) {
+void SharedStore::Drop(Loan loan) {
   const std::lock_guard lock(mutex_);
   borrowed_.erase(loan.connection.get());
 }
 
 // A failure of an earlier epoch has no effect: the failure that began this one caused it.
-void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
+void SharedStore::SwitchOff(const Error& why, std::uint64_t epoch) {
   if (IsTimeout(why)) ++timeouts_;  // of everybody who has waited for it
   std::deque<Idle> gone;            // closed after the lock is released
   const std::lock_guard lock(mutex_);
@@ -113,7 +113,7 @@ void SharedTier::SwitchOff(const Error& why, std::uint64_t epoch) {
 }
 
 // `mutex_` is held. A Redis that fails every second for one reason makes a line a minute.
-void SharedTier::Report(const std::string& why, bool is_off) {
+void SharedStore::Report(const std::string& why, bool is_off) {
   const auto now = Clock::now();
   if (now - reported_at_ >= kReportAgain) {
     reported_.clear();
@@ -128,7 +128,7 @@ void SharedTier::Report(const std::string& why, bool is_off) {
   }
 }
 
-std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
+std::optional<redis::Reply> SharedStore::Ask(const redis::Command& command) {
   Loan loan = Borrow();
   if (!loan.connection) {
     ++skipped_;
@@ -160,7 +160,7 @@ std::optional<redis::Reply> SharedTier::Ask(const redis::Command& command) {
   return reply;
 }
 
-std::optional<std::string> SharedTier::Find(const std::string& key) {
+std::optional<std::string> SharedStore::Find(const std::string& key) {
   // A value of any length is answered with at most this many bytes; a longer one fails its checksum.
   const std::optional<redis::Reply> reply =
       Ask({"GETRANGE", NameOf(key), "0", std::to_string(options_.max_value_bytes + kChecksumBytes)});
@@ -179,17 +179,17 @@ std::optional<std::string> SharedTier::Find(const std::string& key) {
   return std::nullopt;
 }
 
-void SharedTier::Forget(const std::string& key) {
+void SharedStore::Forget(const std::string& key) {
   ++damaged_;
   Enqueue({NameOf(key), nullptr, {}, 0});
 }
 
-void SharedTier::Keep(std::string key, std::function<std::string()> value, std::size_t charge) {
+void SharedStore::Keep(std::string key, std::function<std::string()> value, std::size_t charge) {
   std::string name = NameOf(key);
   Enqueue({std::move(name), std::move(value), std::move(key), charge});
 }
 
-void SharedTier::Enqueue(Job job) {
+void SharedStore::Enqueue(Job job) {
   job.charge += job.name.size() + job.key.size() + sizeof(Job);
   const std::lock_guard lock(mutex_);
   if (abandoned_ || stop_ || !on_ || queued_bytes_ + job.charge > options_.queue_bytes) {
@@ -201,17 +201,17 @@ void SharedTier::Enqueue(Job job) {
   changed_.notify_all();
 }
 
-SharedTier::Lease SharedTier::Take(const std::string& key, milliseconds time) {
+SharedStore::Lease SharedStore::Take(const std::string& key, milliseconds time) {
   const auto reply = Ask({"SET", LeaseOf(key), "1", "NX", "PX", std::to_string(time.count())});
   if (!reply) return Lease::kNone;
   return reply->is_nil() ? Lease::kHeld : Lease::kTaken;
 }
 
-void SharedTier::Release(const std::string& key) { Enqueue({LeaseOf(key), nullptr, {}, 0}); }
+void SharedStore::Release(const std::string& key) { Enqueue({LeaseOf(key), nullptr, {}, 0}); }
 
-Result<std::size_t> SharedTier::Erase(const std::string& prefix,
-                                      const std::function<bool(std::string_view key)>& is_chosen,
-                                      const std::stop_token& stop) {
+Result<std::size_t> SharedStore::Erase(const std::string& prefix,
+                                       const std::function<bool(std::string_view key)>& is_chosen,
+                                       const std::stop_token& stop) {
   std::size_t erased = 0;
   {
     std::unique_lock lock(mutex_);
@@ -246,7 +246,7 @@ Result<std::size_t> SharedTier::Erase(const std::string& prefix,
   return erased;
 }
 
-void SharedTier::Run() {
+void SharedStore::Run() {
   std::unique_lock lock(mutex_);
   Clock::time_point end = Clock::time_point::max();
   while (true) {
@@ -276,7 +276,7 @@ void SharedTier::Run() {
 }
 
 // Opens one connection for look-ups. If it answers in time, the store is switched on.
-void SharedTier::Connect() {
+void SharedStore::Connect() {
   std::uint64_t epoch = 0;
   {
     const std::lock_guard lock(mutex_);
@@ -305,12 +305,12 @@ void SharedTier::Connect() {
 }
 
 // `mutex_` is held.
-SharedTier::Clock::time_point SharedTier::NextTest() const {
+SharedStore::Clock::time_point SharedStore::NextTest() const {
   return idle_.empty() ? Clock::time_point::max() : idle_.front().since + options_.test_after;
 }
 
 // Tests the connection that was not used for longest. A fire wall or a failover may have dropped it silently.
-void SharedTier::Test() {
+void SharedStore::Test() {
   Loan loan;
   {
     const std::lock_guard lock(mutex_);
@@ -332,14 +332,14 @@ void SharedTier::Test() {
   SwitchOff(pong.error(), epoch);
 }
 
-void SharedTier::RefuseWrites(const std::string& why) {
+void SharedStore::RefuseWrites(const std::string& why) {
   const std::lock_guard lock(mutex_);
   write_at_ = Clock::now() + options_.retry_after;
   Report(why, /*is_off=*/false);
 }
 
 // One batch, in one round trip.
-void SharedTier::Write() {
+void SharedStore::Write() {
   std::list<Job> jobs;
   std::uint64_t epoch = 0;
   {
@@ -394,7 +394,7 @@ void SharedTier::Write() {
   if (!refused.empty()) RefuseWrites(refused);
 }
 
-tiler::StoreStats SharedTier::stats() const {
+tiler::StoreStats SharedStore::stats() const {
   tiler::StoreStats stats;
   stats.hits = hits_;
   stats.misses = misses_;

@@ -12,7 +12,7 @@ namespace terrace::dem {
 //   xx(i, j) = x(i + 1, j) - x(i, j)   yy(i, j) = y(i, j + 1) - y(i, j)   xy(i, j) = x(i, j + 1) - x(i, j)
 // Differences that are NaN do not count. Samples without the neighbours have no such difference. `sum`: of the samples,
 // NaN if one is.
-struct ColumnBends {
+struct ColumnDifferences {
   std::vector<float> x, y, xx, yy, xy, sum;
 
   void Resize(std::size_t columns);
@@ -20,6 +20,6 @@ struct ColumnBends {
 };
 
 // Measures `rows` rows of bends.columns() samples; the rows begin `stride` samples apart.
-void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnBends& bends);
+void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends);
 
 }  // namespace terrace::dem
