@@ -206,7 +206,7 @@ class Run {
       unit_file = CopyUnit(to.old_place, to.place, old->second);
     }
     if (!unit_file) return false;
-    counters_.passed += unit_file->tiles;
+    counters_.skipped += unit_file->tiles;
     Report(
         index,
         {target, {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3}, outcome, SecondsSince(start), {}});
@@ -228,7 +228,7 @@ class Run {
       const Target& to = targets_[output.target];
       const tiler::TileRequest request = RequestOf(to.manifest, key);
       if (to.has && to.has(request)) {
-        ++counters_.passed;
+        ++counters_.skipped;
         continue;
       }
       const Result<tiler::EncodedTile> tile = pipeline_.Build(request, options_.stop);

@@ -60,10 +60,10 @@ struct UnitReport {
 
 // The progress over all archives, for displays.
 struct Counters {
-  std::atomic<std::uint64_t> tiles{0};   // built by this process
-  std::atomic<std::uint64_t> bytes{0};   // of these tiles
-  std::atomic<std::uint64_t> passed{0};  // not built: in kept or copied units, or `Target::has` is true
-  std::atomic<std::uint64_t> units{0};   // done or given up
+  std::atomic<std::uint64_t> tiles{0};    // built by this process
+  std::atomic<std::uint64_t> bytes{0};    // of these tiles
+  std::atomic<std::uint64_t> skipped{0};  // not built: in kept or copied units, or `Target::has` is true
+  std::atomic<std::uint64_t> units{0};    // done or given up
   // Microseconds of all threads, by stage.
   std::atomic<std::uint64_t> read{0}, refine{0}, encode{0}, compress{0};
 };

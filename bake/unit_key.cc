@@ -57,7 +57,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   hasher.Add(kKeyVersion);
   hasher.Add(archive::kFormatVersion);
   hasher.AddText(manifest.encoder);
-  hasher.Add(dataset.options);
+  hasher.Add(dataset.options_hash);
   AddKind(hasher, manifest.kind);
   // Without the levels that edits added elsewhere.
   int last = static_cast<int>(unit.tiles.size()) - 1;

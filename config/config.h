@@ -174,7 +174,7 @@ struct Config {
   std::size_t transfer_bytes = std::size_t{32} << 20;  // memory for bodies in transfer
   double requests_per_second = 0;                      // of each client or token; 0: no limit
   double request_burst = 0;                            // 0: two seconds' worth
-  std::size_t max_mesh_samples = 1025 * 1025;          // nodes of a terrain of Unity
+  std::size_t max_mesh_samples = 1025 * 1025;          // a height map of a Unity terrain
   std::size_t max_locations = 10'000;                  // in one request for heights
 
   std::vector<TokenConfig> tokens;  // none: all datasets are public

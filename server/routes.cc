@@ -76,8 +76,7 @@ bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
   return true;
 }
 
-// RouteRow::read of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on; of implicit tiles and subtrees:
-// /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb and .{levels}.subtree, counted from the root; of the viewer's files.
+// The following functions are RouteRow::read. Of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on.
 bool ReadTile(const Segments& segments, Route& route) {
   std::string_view row = segments[3];
   route.format = CutSuffix(row);
@@ -88,7 +87,7 @@ bool ReadTile(const Segments& segments, Route& route) {
   return true;
 }
 
-// RouteRow::read of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
+// Of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
 template <std::size_t kAt>
 bool ReadTileInFolder(const Segments& segments, Route& route) {
   std::string_view row = segments[kAt + 2];
@@ -106,6 +105,7 @@ bool ReadMapLayer(const Segments& segments, Route& route) {
   return route.format != nullptr;
 }
 
+// Of implicit tiles: /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb, counted from the root.
 bool ReadImplicitTile(const Segments& segments, Route& route) {
   std::string_view row = segments[5];
   route.format = CutSuffix(row);

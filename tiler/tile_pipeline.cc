@@ -35,8 +35,8 @@ Result<EncodedTile> TakeBaked(const Dataset& dataset, const TileRequest& request
 
 tl::unexpected<Error> NoSources() {
   return MakeError(ErrorCode::kNotFound,
-                   "the dataset is an archive of finished tiles alone, and has the heights of these tiles alone: "
-                   "ask for surface=served; other heights and meshes need its sources");
+                   "the dataset is an archive of finished tiles without its sources, which this needs; heights of the "
+                   "tiles themselves are available with surface=served");
 }
 
 // Whether an archive has the tiles that a drawn surface is read from. GLB tiles of archives are not decoded.

@@ -65,7 +65,7 @@ struct Dataset {
   // stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
-  std::uint64_t options = 0;  // `generation` without the contents and options that DemSource::fingerprint covers
+  std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
 };
 
 // A hash of the edits that the tile of a request depends on; 0: none.
@@ -102,7 +102,7 @@ class TilePipeline {
   // lacks. kUnavailable: the source cannot be read now. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // DemSource::ReadPoints. kNotFound, here and below: the dataset has no sources.
+  // DemSource::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 

@@ -14,6 +14,7 @@
 
 namespace terrace::bake {
 
+// Where a job's queue is, and how to reach it.
 struct JobConnection {
   redis::Address address;
   std::string ca_file = {};  // as in redis::ConnectionOptions

@@ -8,7 +8,7 @@
 //   terrace:{JOB}:done    stream: the last units that were done: unit, worker, seconds; for people
 //   terrace:{JOB}:errors  hash: unit -> why it failed last
 //
-// What is for people, and the errors, are read and written by pcall: they may hold something else.
+// The keys that are for people, and the errors, are accessed by pcall, because they may hold a value of another type.
 // A unit that is done is acknowledged and deleted from the stream. The braces keep the keys on one node of a cluster.
 // The incarnation is a random number that is made whenever the queue is filled. A worker that took its unit from an
 // earlier filling must not acknowledge it in a later one.

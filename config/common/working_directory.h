@@ -12,8 +12,8 @@ inline constexpr const char* kNoWorkingDirectory =
     "is relative to the working directory, which cannot be named; give the path in full";
 
 // `directory`: the working directory as the system names it, without symbolic links; empty: `path` is returned
-// unchanged. Each ".." in `path` removes a folder from the name, so the result stays valid even if that folder is
-// removed.
+// unchanged. Each ".." at the start of `path` removes a folder from the name, so the result stays valid even if that
+// folder is removed.
 std::string FromWorkingDirectory(std::filesystem::path directory, const std::filesystem::path& path);
 
 }  // namespace terrace::config

@@ -80,7 +80,7 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   bool key(std::string& key) {
     // The value keeps the order of keys, so each look-up takes linear time.
     if (seen_.back().size() >= kMaxKeys) {
-      return Refuse(fmt::format("an object with more than {} keys, which none of a configuration has", kMaxKeys));
+      return Refuse(fmt::format("more than {} keys in one object; no configuration has that many", kMaxKeys));
     }
     // Named by its position, because the key may be any text.
     if (!seen_.back().insert(key).second && errors_.size() < kMaxConfigErrors) {
@@ -108,7 +108,7 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   // Each level takes more memory than text.
   bool Descend() {
     if (++depth_ <= kMaxDepth) return true;
-    return Refuse(fmt::format("lists or objects more than {} deep, which none of a configuration are", kMaxDepth));
+    return Refuse(fmt::format("lists or objects nested more than {} deep; no configuration is that deep", kMaxDepth));
   }
   bool Refuse(std::string why) {
     fault_at_ = at_ - 1;

@@ -81,9 +81,10 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .other_words = "max_error"},
       {.key = "finest_error",
        .value = "METRES",
-       .help = "Largest default error of the deepest level; by default a tenth of the source's sample spacing",
-       .details = "The deepest level is the first whose default error is at most this. The spacing is that of the "
-                  "finest source",
+       .help = "The deepest level is the first whose default error is at most this; by default a tenth of the source's "
+               "sample "
+               "spacing",
+       .details = "The spacing is that of the finest source",
        .codec = Number(&DatasetConfig::finest_error, 0.001, 100'000),
        .other_words = "max_error tolerance resolution"},
       {.key = "floor",
@@ -166,7 +167,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .other_words = "open anonymous"},
       {.key = "metadata_availability",
        .value = "LEVELS",
-       .help = "Interval of levels at which tiles list the tiles below them; 0 is none",
+       .help = "Every so many levels, tiles list the tiles below them; 0 is none",
        .details = "With 0, only `layer.json` tells clients which tiles exist. [More](#where-tiles-are)",
        .codec = Integer(&DatasetConfig::metadata_availability, 0, 24)},
   };

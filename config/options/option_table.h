@@ -27,7 +27,7 @@ struct Option {
   Codec<Target> codec;
   std::string_view other_words = {};  // names that other programs use, for "did you mean": "port host"
   std::string_view missing = {};      // for required keys: the text after `"key" is missing` in the error
-  std::string_view unless = {};       // a required key is not required beside this other key
+  std::string_view unless = {};       // the key is required unless this other key is present
   bool is_live = false;               // a change needs no restart; only for options at the top level of the file
 };
 

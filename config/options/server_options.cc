@@ -379,9 +379,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "data_roots",
        .value = "DIR[,DIR]",
        .section = "sources",
-       .help = "Folders that must contain every source; by default sources may be anywhere",
+       .help = "Every source must lie in one of these folders; by default sources may be anywhere",
        .details =
-           "They must also contain every water mask, image and grid of undulations. A source must be a regular file; "
+           "So must every water mask, image and grid of undulations. A source must be a regular file; "
            "for a symbolic link its target counts. Relative to the folder of the file; as a flag, separated by commas",
        .codec = TextList(&Config::data_roots, "a list of folders", true),
        .other_words = "root data_dir"},

@@ -81,7 +81,7 @@ struct DemFile {
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres above the ellipsoid, or in the source's datum where that is unknown.
+// Metres above the ellipsoid; if the source's vertical datum is unknown, as the source has them.
 struct HeightRange {
   double min = 0;
   double max = 0;
@@ -138,8 +138,8 @@ struct RasterInfo {
   std::vector<int> overview_factors;
   std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
   std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  bool needs_averages = false;   // large, and without overviews
-  int min_kept_factor = 0;       // smallest factor of stored averages; 0: none
+  bool is_large_without_overviews = false;    // kMaxSamplesWithoutAverages (statistics/kept_factors.h)
+  int min_kept_factor = 0;                    // smallest factor of stored averages; 0: none
   bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;
 };

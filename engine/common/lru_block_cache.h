@@ -1,4 +1,4 @@
-// The blocks of something large that were used last, in memory.
+// An LRU cache of blocks with a limit in bytes.
 #pragma once
 
 #include <cstddef>

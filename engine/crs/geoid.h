@@ -56,7 +56,8 @@ class Geoid {
   Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
   // The grid, if the operation is only bilinear interpolation in one grid; else null.
   const UndulationGrid* grid() const { return grid_.get(); }
-  // Degrees: the smaller side of a cell of the finest grid that the operation reads; 0 if not known.
+  // Degrees: the smaller side of a cell of the finest grid that the operation reads; 0: not known;
+  // infinite: it reads no grid.
   double finest_cell() const { return finest_cell_; }
 
  private:

@@ -63,7 +63,7 @@ class Georeference {
 
   // Whether pixel positions are an affine function of degrees; then neither PROJ nor interpolation is needed.
   bool is_affine() const { return projector_ == nullptr; }
-  // Whether the CRS is in degrees, north is up and columns follow meridians.
+  // Whether the CRS is geographic and the raster is not rotated: columns follow meridians. Rows may run either way.
   bool is_geographic_grid() const { return period_ > 0; }
   bool columns_run_east() const { return to_crs_[1] > 0; }
   // The number of columns in 360 degrees; 0 if this is not a geographic grid.

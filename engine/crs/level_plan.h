@@ -40,7 +40,8 @@ int DeepestMercator(const SourceSpacing& spacing);
 // Returns the averaging factor for a depth of Web Mercator.
 int MercatorFactor(int depth, const SourceSpacing& spacing);
 
-// Returns the first level whose default error is at most a tenth of the finer spacing, or at most `finest_error`.
+// Returns the first level whose default error is at most `finest_error`; without it, at most a tenth of the finer
+// spacing.
 int DeepestLevel(const SourceSpacing& spacing, double error_fraction, std::optional<double> finest_error);
 
 }  // namespace terrace::dem

@@ -77,8 +77,9 @@ class NodeCell {
       return (sw * (1 - u) + se * u) * (1 - v) + (nw * (1 - u) + ne * u) * v;
     };
     // A cell that is not larger than the grid's cells crosses at most one of its meridians and one of its parallels,
-    // and deviates by tent functions. Along an edge a tent is at most twice its value d in the middle. In the cell,
-    // where the middle takes at least a quarter from the grid's node, it is at most 4 (d + 2 d / 2) = 8 d.
+    // and deviates by tent functions. Let d be the largest deviation at the five tested points. Along an edge the
+    // deviation is a tent, at most 2 d. Inside, it is largest at the grid's own node. At least a quarter of that node's
+    // deviation reaches the middle of the cell, beside at most half of the 2 d of the edges: it is at most 4 (d + d).
     const int half = size / 2;
     constexpr std::array<std::pair<int, int>, 5> kMiddles = {{{1, 0}, {0, 1}, {1, 1}, {2, 1}, {1, 2}}};
     for (const auto& [i, j] : kMiddles) {

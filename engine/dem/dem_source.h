@@ -36,15 +36,15 @@ class DemSource {
 
   const DemInfo& info() const;
 
-  // The deepest level served: the first whose default error is at most a tenth of the finest source's spacing, or at
-  // most `finest_error`. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
+  // The deepest level served: the first whose default error is at most `finest_error`; without that option, at most a
+  // tenth of the finest source's spacing. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
   int max_level() const;
   // The deepest level without edits. Levels below it have tiles only around edits.
   int max_source_level() const;
   geo::Lattice LatticeOf(int level) const;
 
-  // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that touch a source fine
-  // enough for the level, and the ancestors of available tiles with their siblings. Level 0 has both roots
+  // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
+  // fine enough for the level, and the ancestors of available tiles with their siblings. Level 0 has both roots
   // (mosaic/availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
@@ -86,9 +86,9 @@ class DemSource {
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
 
-  // Looks along rays over the surface of ReadPoints, without its rounding; one answer for each ray. Heights of rays are
-  // above the ellipsoid. Precondition: finite positions on Earth, rays no longer than kMaxSightLength. Errors: those of
-  // ReadPoints; kInvalidArgument: a ray passes above edits, which this surface does not have.
+  // Looks along rays over the surface of ReadPoints before edits, without its rounding; one answer for each ray.
+  // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit lies below a ray.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 
@@ -109,9 +109,9 @@ class DemSource {
   // pixels as ReadMercator has them. Cheap after the first call for a tile.
   std::uint64_t EditsHash(const geo::TileKey& key) const;
   std::uint64_t MercatorEditsHash(int depth, const NodeWindow& window) const;
-  // A hash of the tiles below a tile that exist because of edits; 0: there are none.
+  // A hash of all available tiles below a tile if edits added some of them; 0: they added none.
   std::uint64_t DeeperTilesHash(const geo::TileKey& key) const;
-  // Availability() without its last levels that are below max_source_level() and have no tile below `key`.
+  // Availability() up to the deepest level that has a tile below `key`, and at least up to max_source_level().
   std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 

@@ -36,7 +36,7 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
       const std::array<const EditedNode*, 4> corners = {&nodes[at], &nodes[at + 1], &nodes[at + stride],
                                                         &nodes[at + stride + 1]};
       double nearest = std::numeric_limits<double>::infinity(), furthest = 0, difference = 0;
-      bool is_above = false, is_below = false;
+      bool is_above = false, is_below = false, is_partial = false;
       for (const EditedNode* node : corners) {
         const double distance = node->place.distance_m;
         nearest = std::min(nearest, distance);
@@ -44,6 +44,7 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
         const double low = std::isnan(node->target) ? edit.low_m : node->target;
         const double high = std::isnan(node->target) ? edit.high_m : node->target;
         const bool is_unknown = edit.op == EditOp::kReplace && std::isnan(node->target);
+        is_partial |= is_unknown;
         if (edit.op == EditOp::kOffset) {
           difference = std::abs(edit.offset_m);
         } else if (!is_unknown) {
@@ -55,7 +56,7 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
       // A distance changes by at most the length of a move, and each point of the cell is within half a diagonal of a
       // node.
       const double high_weight = edit.WeightAt(std::max(nearest - diagonal_m / 2, 0.0));
-      const double low_weight = edit.WeightAt(furthest + diagonal_m / 2);
+      const double low_weight = is_partial ? 0 : edit.WeightAt(furthest + diagonal_m / 2);
       if (high_weight <= 0) continue;
       double& error = cells_[Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i)];
       const double before = error < 0 ? before_ : error;

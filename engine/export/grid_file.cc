@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "engine/export/output_grid.h"
+#include "engine/gdal/driver_list.h"
 #include "engine/gdal/gdal_runtime.h"
 
 namespace terrace::dem {
@@ -61,7 +62,7 @@ CPLErr WriteBand(const OutputGrid& grid, GDALDataset& dataset, std::span<const T
 
 Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights) {
   ForgetGdalError();
-  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+  GDALDriver* const driver = FindDriver("GTiff");
   if (driver == nullptr) return CannotWrite("GTiff");
   const MemoryFile file(".tif");
   CPLStringList options;
@@ -81,8 +82,8 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
 
 Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values) {
   ForgetGdalError();
-  GDALDriver* const memory = GetGDALDriverManager()->GetDriverByName("MEM");
-  GDALDriver* const png = GetGDALDriverManager()->GetDriverByName("PNG");
+  GDALDriver* const memory = FindDriver("MEM");
+  GDALDriver* const png = FindDriver("PNG");
   if (memory == nullptr || png == nullptr) return CannotWrite("PNG");
   const GDALDatasetUniquePtr source(
       memory->Create("", static_cast<int>(grid.columns), static_cast<int>(grid.rows), 1, GDT_UInt16, nullptr));

@@ -14,7 +14,7 @@ namespace terrace::dem {
 namespace {
 
 constexpr int kWgs84 = 4326;
-// Units of a projected CRS, or degrees by 10^-5: a position that comes back farther away has no inverse.
+// A position that comes back farther away than this has no inverse. In units of a projected CRS, or 10^-5 degrees.
 constexpr double kReturn = 1;
 // Nodes between two that are transformed back.
 constexpr std::size_t kCheckPeriod = 61;

@@ -1,4 +1,4 @@
-// Converts raw samples of a band to heights, in vectors. Results have the same bits on every set of instructions.
+// Converts raw samples of a band to heights, with SIMD. Results are bit-equal on all sets of instructions.
 #pragma once
 
 #include <gdal.h>
@@ -7,7 +7,7 @@
 
 namespace terrace::dem {
 
-// Metres. Heights beyond the limits are voids, and those that equal `nodata`; NaN: none.
+// Metres. Heights beyond the limits or equal to `nodata` are voids. `nodata` is NaN if there is no such value.
 struct HeightLimits {
   float nodata = 0, lowest = 0, highest = 0;
 };

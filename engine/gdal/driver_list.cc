@@ -79,12 +79,16 @@ std::optional<std::string> LeftOutDriverOf(const std::string& path) {
   return std::nullopt;
 }
 
-GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path) {
+GDALDriver* FindDriver(const std::string& name) {
   const std::lock_guard lock(RetiredMutex());
-  GDALDriver* driver = GetGDALDriverManager()->GetDriverByName(name.c_str());
   for (GDALDriver* const retired : Retired()) {
-    if (name == retired->GetDescription()) driver = retired;
+    if (name == retired->GetDescription()) return retired;
   }
+  return GetGDALDriverManager()->GetDriverByName(name.c_str());
+}
+
+GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path) {
+  GDALDriver* const driver = FindDriver(name);
   if (driver == nullptr || driver->pfnOpen == nullptr) return nullptr;
   GDALOpenInfo file(path.c_str(), GDAL_OF_RASTER | GDAL_OF_READONLY);
   return GDALDatasetUniquePtr(driver->pfnOpen(&file));

@@ -23,8 +23,12 @@ Result<void> UseDrivers(const std::vector<std::string>& names);
 // and first bytes.
 std::optional<std::string> LeftOutDriverOf(const std::string& path);
 
-// Opens a file of the installation, such as PROJ's grids, with a driver by its short name, even if UseDrivers removed
-// the driver. Null: the file has another format, or GDAL has no such driver.
+// Returns a driver by its short name, even if UseDrivers removed it: for files that this program writes. Null: GDAL has
+// no such driver.
+GDALDriver* FindDriver(const std::string& name);
+
+// Opens a file of the installation, such as PROJ's grids, with FindDriver. Null: the file has another format, or GDAL
+// has no such driver.
 GDALDatasetUniquePtr OpenWithDriver(const std::string& name, const std::string& path);
 
 }  // namespace terrace::dem

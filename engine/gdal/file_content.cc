@@ -96,7 +96,7 @@ class KeptHash {
     out << Encode(hash);
     out.close();
     if (out) std::filesystem::rename(partial, file_, failed);
-    return out && !failed;
+    return Load().has_value();  // another process may have written and renamed the same file
   }
 
  private:

@@ -41,7 +41,8 @@ void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message
   last_error = message;
 }
 
-// File systems for memory and for files within files, which have no other access.
+// File systems that open no file on the disk by themselves: memory, files within files, and the standard output, which
+// GDAL needs to write.
 constexpr std::array<std::string_view, 12> kLocal = {
     "/vsimem/",     "/vsizip/",    "/vsigzip/",   "/vsitar/",   "/vsi7z/",     "/vsirar/",
     "/vsisubfile/", "/vsisparse/", "/vsicached?", "/vsicrypt/", "/vsistdout/", "/vsistdout_redirect/"};

@@ -11,6 +11,9 @@ inline constexpr double kSemiMajorAxis = 6378137.0;
 inline constexpr double kFlattening = 1.0 / 298.257223563;
 inline constexpr double kSemiMinorAxis = 6356752.3142451793;
 inline constexpr double kEccentricitySquared = kFlattening * (2 - kFlattening);
+// Radii of curvature: the smallest is that of a meridian at the equator, the largest is that at the poles.
+inline constexpr double kSmallestRadius = kSemiMinorAxis * kSemiMinorAxis / kSemiMajorAxis;
+inline constexpr double kLargestRadius = kSemiMajorAxis * kSemiMajorAxis / kSemiMinorAxis;
 
 constexpr double ToRadians(double degrees) { return degrees * 0.017453292519943295; }
 constexpr double ToDegrees(double radians) { return radians * 57.295779513082323; }

@@ -92,7 +92,7 @@ Result<std::vector<std::uint8_t>> WaterRaster::Read(const geo::TileKey& key, std
   if (!handle) return tl::unexpected(handle.error());
   if (cells.empty()) return pixels;
   const GridWindow window = MoveTogether(cells, axes);
-  const auto shares = ReadGrid(**handle, layout, factor, window, stop);
+  const auto shares = ReadAverages(**handle, layout, factor, window, stop);
   if (auto unchanged = handles.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!shares) {
     return MakeError(shares.error().code, "{}: tile {}: {}", impl_->path, geo::ToString(key), shares.error().message);

@@ -22,7 +22,7 @@ struct FinerTiles {
 };
 
 // For each level from 0 to the deepest: ranges of tiles without overlap, sorted by row, then column, that contain
-// - every tile that touches a source of at least this depth;
+// - every tile that overlaps a source of at least this depth;
 // - every ancestor of such a tile, and both roots;
 // - all four children of a tile that has any: 3D Tiles clients replace a tile by its children, and a missing child is a
 //   hole.

@@ -87,7 +87,7 @@ Result<void> RasterGrid::Compose(int step, const GridWindow& window, float* out,
       const BlockSpan columns = BlockSpan::Of(members_[i].column + turn * columns_, raster.layout().columns, step);
       const GridWindow wanted = patchwork.Wanted(columns, rows);
       if (wanted.columns == 0) continue;
-      const auto heights = raster.ReadBlocks(
+      const auto heights = raster.ReadAverages(
           step, {wanted.column - columns.first, wanted.row - rows.first, wanted.columns, wanted.rows}, stop);
       if (!heights) return tl::unexpected(heights.error());
       patchwork.Add(wanted, *heights, columns, rows);
@@ -96,9 +96,9 @@ Result<void> RasterGrid::Compose(int step, const GridWindow& window, float* out,
   return {};
 }
 
-Result<std::vector<float>> RasterGrid::ReadBlocks(int factor, const GridWindow& window,
-                                                  const std::stop_token& stop) const {
-  if (members_.size() == 1) return members_.front().raster->ReadBlocks(factor, window, stop);
+Result<std::vector<float>> RasterGrid::ReadAverages(int factor, const GridWindow& window,
+                                                    const std::stop_token& stop) const {
+  if (members_.size() == 1) return members_.front().raster->ReadAverages(factor, window, stop);
   const int step = std::min(alignment_, factor);
   return AverageBlocks(Columns(step), Rows(step), step, factor / step, window,
                        [&](const GridWindow& blocks, const AddRows& add) -> Result<void> {

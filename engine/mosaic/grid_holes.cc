@@ -71,7 +71,7 @@ Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, boo
     return VoidGrid{window, std::move(bridged->heights), std::move(holes)};
   }
   const GridWindow wide = Grown(window, 1, factor);
-  const auto heights = ReadBlocks(factor, wide, stop);
+  const auto heights = ReadAverages(factor, wide, stop);
   if (!heights) return tl::unexpected(heights.error());
   const auto holes = holes_in(wide, *heights);
   const VoidGrid around{wide, {}, {}};

@@ -29,8 +29,8 @@ struct GridLayout {
   int width = 0, height = 0;
 };
 
-// Puts every raster into one layout. Layouts are ordered by their first members. Takes O(n log n) time, unless many
-// rasters overlap or pixel sizes nearly agree (GridFinder). Sets `pairs`, where given, to the number of pairs of
+// Puts each raster into exactly one layout. Layouts are ordered by their first members. Takes O(n log n) time, unless
+// many rasters overlap or pixel sizes nearly agree (GridFinder). Sets `pairs`, where given, to the number of pairs of
 // rasters that were compared; tests count them.
 std::vector<GridLayout> LayOutGrids(std::span<const PlacedRaster> rasters, std::size_t* pairs = nullptr);
 

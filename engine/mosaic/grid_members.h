@@ -31,7 +31,8 @@ struct GridPlan {
   int width = 0, height = 0;
 };
 
-// Puts every raster into one plan. Plans are ordered by their first members.
+// Puts each raster into exactly one plan: LayOutGrids (grid_layout.h) with the rasters themselves. Plans are ordered by
+// their first members.
 std::vector<GridPlan> PlanGrids(const std::vector<std::shared_ptr<const RasterSource>>& rasters);
 
 }  // namespace terrace::dem

@@ -78,6 +78,17 @@ TileBoxes BoxesOf(const Georeference& georeference, const geo::Lattice& lattice,
 }  // namespace
 
 BlockRange RasterGrid::Ranges(const Box& pixels) const {
+  if (!wraps_) return RangesInTurn(pixels);
+  BlockRange range;
+  const double turn = columns_;
+  for (const double shift : {0.0, -turn, turn}) {
+    const Box part{std::max(pixels.west + shift, 0.0), pixels.south, std::min(pixels.east + shift, turn), pixels.north};
+    if (part.west < part.east || (shift == 0 && part.west == part.east)) range.Add(RangesInTurn(part));
+  }
+  return range;
+}
+
+BlockRange RasterGrid::RangesInTurn(const Box& pixels) const {
   if (members_.size() == 1) {
     return members_.front().raster->RangeIn(pixels.west, pixels.south, pixels.east, pixels.north);
   }

@@ -245,7 +245,7 @@ bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
 
 Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
                                                     std::vector<float>* measured) const {
-  auto core = ReadBlocks(factor, window, stop);
+  auto core = ReadAverages(factor, window, stop);
   if (!core) return tl::unexpected(core.error());
   Bridged bridged{*std::move(core), 0};
   bridged.voids = CountVoids(bridged.heights);
@@ -260,7 +260,7 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   return bridged;
 }
 
-// ReadBlocks of `wide`, a part of which was read: `known`, of the window `core`.
+// ReadAverages of `wide`, a part of which was read: `known`, of the window `core`.
 Result<std::vector<float>> RasterGrid::ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
                                                   const std::vector<float>& known, const std::stop_token& stop) const {
   std::vector<float> all(static_cast<std::size_t>(wide.columns * wide.rows));
@@ -277,7 +277,7 @@ Result<std::vector<float>> RasterGrid::ReadAround(int factor, const GridWindow& 
                                  GridWindow{wide.column, north, west - wide.column, south - north},
                                  GridWindow{east, north, wide_east - east, south - north}}) {
     if (rest.columns == 0 || rest.rows == 0) continue;
-    const auto read = ReadBlocks(factor, rest, stop);
+    const auto read = ReadAverages(factor, rest, stop);
     if (!read) return read;
     CopyInto(*read, rest, wide, all);
   }
@@ -356,12 +356,12 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     if (bridged->voids > 0) trace->samples = bridged->heights;
     trace->includes_filled = true;
   }
-  std::vector<float> counts;
+  std::vector<float> sample_weights;
   if (!weights.empty() && options_.feather_m > 0) {
     auto read = ReadWeights(factor, window, stop);
     if (!read) return tl::unexpected(read.error());
-    counts = *std::move(read);
-    if (trace != nullptr && trace->includes_filled) trace->weights = counts;
+    sample_weights = *std::move(read);
+    if (trace != nullptr && trace->includes_filled) trace->weights = sample_weights;
   }
   const auto take = [&](std::size_t node, const GridCell& cell) {
     const auto height = Interpolate(samples, window, cell);
@@ -380,7 +380,7 @@ Result<void> RasterGrid::FillAt(NodePositions positions, std::span<const std::ui
     // All samples have weights, so this is plain bilinear interpolation. Nodes with weight 0 are left to the grids
     // below, because they would hide the floor.
     constexpr double kMinWeight = 0x1p-10;
-    const double weight = counts.empty() ? 1 : Interpolate(counts, window, cell).value_or(1);
+    const double weight = sample_weights.empty() ? 1 : Interpolate(sample_weights, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kMinWeight, std::nearbyint(weight * 1024) / 1024));
   };
   if (!has_holes && weights.empty()) {

@@ -136,7 +136,7 @@ class RasterGrid {
   // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
   // that wraps, columns are taken modulo columns(). Errors: those of Fill.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
-    return ReadBlocks(1, window, stop);
+    return ReadAverages(1, window, stop);
   }
 
   // Returns true if samples in a box of pixels may have a blend weight below 1, averaged by this factor or a smaller
@@ -172,8 +172,10 @@ class RasterGrid {
   void MeasureMembers();
   void FindPoleHeights();
 
+  // Ranges of a box between column 0 and the last one, if columns wrap.
+  BlockRange RangesInTurn(const Box& pixels) const;
   // Averages of the valid samples of each block; NaN where there is none.
-  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  Result<std::vector<float>> ReadAverages(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
   Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;

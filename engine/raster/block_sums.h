@@ -1,5 +1,5 @@
-// Sums of the samples of blocks, and their means, for whole rows of blocks in vectors. Results have the same bits on
-// every set of instructions.
+// Sums of the samples of blocks, and their means, for whole rows of blocks, with SIMD. Results are bit-equal on all
+// sets of instructions.
 #pragma once
 
 #include <cmath>

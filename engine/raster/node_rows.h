@@ -20,9 +20,9 @@ class NodeRows {
   NodeRows(const std::vector<float>& samples, const GridWindow& window, const NodeCells& cells, std::size_t first,
            std::size_t end);
 
-  // Returns one height per node from `first` on. NaN: a sample with a nonzero weight is void, or nodes like this one
-  // are not supported; Interpolate tells which. Undefined if the node's cell lies outside the window. Valid until the
-  // next call. Precondition: if the cells are separable, those of the row lie in the window's rows.
+  // Returns one height per node from `first` on. NaN: a sample with a nonzero weight is void, or this
+  // function does not handle the node; call Interpolate for it. Undefined if the node's cell lies outside the window.
+  // Valid until the next call. Precondition: if the cells are separable, those of the row lie in the window's rows.
   std::span<const double> Row(std::size_t j);
 
  private:
@@ -47,7 +47,7 @@ class NodeRows {
 // one entry per height.
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
 
-// As many NaN.
+// Returns `count` NaNs.
 std::vector<float> VoidHeights(std::size_t count);
 
 // Makes all heights equal to one.
@@ -66,8 +66,8 @@ std::size_t CountVoids(std::span<const float> heights);
 bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted);
 
 // The places of nodes, in samples: column + weight and row + weight of GridAxes::CellAt. NaN if the node's height is
-// NaN, if a place is not between 0 and `limit`, or if it is near the end of an axis or columns wrap. Returns false if a
-// node has the last of these reasons: use CellAt for it. Precondition: all spans have one entry per node.
+// NaN. Returns false if another node got NaN, because a place is not between 0 and `limit` or is near the end of an
+// axis, or because columns wrap: use CellAt for it. Precondition: all spans have one entry per node.
 bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,
                        Position limit, std::span<double> x, std::span<double> y);
 

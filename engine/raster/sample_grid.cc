@@ -190,8 +190,8 @@ std::vector<int> OverviewFactors(GDALRasterBand& band) {
   return factors;
 }
 
-Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
-                                    const GridWindow& window, const std::stop_token& stop) {
+Result<std::vector<float>> ReadAverages(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                        const GridWindow& window, const std::stop_token& stop) {
   const auto level = StartingLevel(dataset, layout, factor);
   if (!level) return tl::unexpected(level.error());
   return AverageBlocks(level->columns, level->rows, level->start, factor / level->start, window,

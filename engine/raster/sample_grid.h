@@ -99,10 +99,10 @@ struct GridWindow {
 // Returns the averages of the valid samples of each block in the window, row by row from the north; NaN for blocks
 // without valid samples. A value depends only on its block. Starts from the coarsest overview whose factor divides
 // `factor`. If the overview's samples do not cover aligned blocks of pixels, blocks are interpolated between them.
-Result<std::vector<float>> ReadGrid(GDALDataset& dataset, const RasterLayout& layout, int factor,
-                                    const GridWindow& window, const std::stop_token& stop);
+Result<std::vector<float>> ReadAverages(GDALDataset& dataset, const RasterLayout& layout, int factor,
+                                        const GridWindow& window, const std::stop_token& stop);
 
-// Returns the factor of the overview that ReadGrid starts from; 1: the full raster.
+// Returns the factor of the overview that ReadAverages starts from; 1: the full raster.
 int StartingFactor(const RasterLayout& layout, int factor);
 
 // Returns true if the overviews are the format's own (JPEG, JPEG 2000) and each sample covers a block of exactly
@@ -116,7 +116,7 @@ double PixelsPerSample(GDALDataset& dataset, int factor, int pixels, int samples
 // gdaladdo, or down, as in cloud-optimized GeoTIFFs. Null: there is none, or it was removed.
 GDALRasterBand* FindOverview(GDALRasterBand& band, int factor);
 
-// Returns the factors of the overviews that ReadGrid can use; all are powers of two.
+// Returns the factors of the overviews that ReadAverages can use; all are powers of two.
 std::vector<int> OverviewFactors(GDALRasterBand& band);
 
 }  // namespace terrace::dem

@@ -71,7 +71,7 @@ class SightBlock {
   Squares SquaresOf(int shift) const;
 };
 
-// Blocks that are kept: of 1 MB each for 256 x 256 samples.
+// The number of blocks that are kept. One of 256 x 256 samples takes about 1 MB.
 inline constexpr std::size_t kMaxSightBlocks = 256;
 
 // The blocks of a raster grid that some rays cross. For one thread.

@@ -111,7 +111,7 @@ class Opening {
       : files_(files),
         options_(options),
         only_cached_(only_cached),
-        threads_(only_cached ? 0 : ThreadsOfEach(files.size())),
+        threads_(ThreadsOfEach(files.size())),
         shares_(files.size()),
         opened_(files.size()) {}
 
@@ -126,7 +126,7 @@ class Opening {
       running_.emplace(i, stop);
     }
     Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache,
-                                       ProgressOf(i), stop.get_token(), pages_, threads_);
+                                       ProgressOf(i), stop.get_token(), pages_, threads_, only_cached_);
     if (options_.progress) AddProgress(i, 1);
     const bool goes_on = opened || IsNothing(i, opened) || LacksStatistics(opened) ||
                          (options_.fault && !options_.stop.stop_requested());

@@ -72,7 +72,7 @@ class Preparer {
     if (!cache_file_.empty()) {
       if (Load()) return std::move(prepared_);
     }
-    if (options_.threads == 0) {
+    if (options_.only_cached) {
       return MakeError(ErrorCode::kCancelled, "{}: its statistics are not in the cache", path_);
     }
     if (!cache_file_.empty()) {

@@ -24,7 +24,8 @@ struct PrepareOptions {
   bool find_voids = true;
   std::function<void(double)> progress = {};  // share done of each pass, 0 .. 1
   std::stop_token stop = {};
-  unsigned threads = 1;  // that compute statistics; 0: where the raster would be read, fails with kCancelled
+  unsigned threads = 1;      // that compute statistics
+  bool only_cached = false;  // fails with kCancelled instead of reading the raster
 };
 
 // How the statistics were made.

@@ -192,7 +192,8 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
                                                          const RasterCache& cache,
                                                          const std::function<void(double)>& progress,
                                                          const std::stop_token& stop,
-                                                         std::shared_ptr<StatisticsPages> pages, unsigned threads) {
+                                                         std::shared_ptr<StatisticsPages> pages, unsigned threads,
+                                                         bool only_cached) {
   const auto start = std::chrono::steady_clock::now();
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: opening it was stopped", path);
   auto located = OpenLocatedRaster(path);
@@ -203,7 +204,7 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
       new RasterSource(path, std::move(located->files), std::move(located->georeference)));
   source->spacing_ = located->spacing;
   if (auto found = source->FindLayout(dataset, path, options); !found) return tl::unexpected(found.error());
-  const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads};
+  const PrepareOptions prepare{cache, options.find_voids, progress, stop, threads, only_cached};
   std::string overviews_unused;
   auto prepared = source->Prepare(dataset, path, prepare, overviews_unused);
   if (!prepared) return tl::unexpected(prepared.error());
@@ -259,7 +260,7 @@ Result<PreparedRaster> RasterSource::Prepare(GDALDataset& dataset, const std::st
 void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared) {
   const RasterStatistics& statistics = prepared.statistics;
   info_ = Describe(dataset, path, georeference_, layout_);
-  info_.needs_averages = NeedsAverages(layout_);
+  info_.is_large_without_overviews = IsLargeWithoutOverviews(layout_);
   info_.has_averages_in_cache_folder = averages_ != nullptr;
   if (averages_) info_.min_kept_factor = averages_->min_factor();
   if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
@@ -394,8 +395,8 @@ void RasterSource::LoseCache(const Error& error) const {
   LogSource(SourceLog::Level::kWarn, info_.path, "{}; it is prepared anew when it is next opened", error.message);
 }
 
-Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow& window,
-                                                    const std::stop_token& stop) const {
+Result<std::vector<float>> RasterSource::ReadAverages(int factor, const GridWindow& window,
+                                                      const std::stop_token& stop) const {
   // Uses memory and the cache file only if the files have not changed since they were prepared.
   if (factor >= kLargestDirectFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
@@ -414,7 +415,7 @@ Result<std::vector<float>> RasterSource::ReadBlocks(int factor, const GridWindow
   }
   auto handle = handles_.Borrow();
   if (!handle) return tl::unexpected(handle.error());
-  auto heights = ReadGrid(**handle, layout_, factor, window, stop);
+  auto heights = dem::ReadAverages(**handle, layout_, factor, window, stop);
   // Files may be overwritten during a read: then both its result and its error are discarded.
   if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   if (!heights) return MakeError(heights.error().code, "{}: {}", info_.path, heights.error().message);

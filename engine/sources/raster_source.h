@@ -69,14 +69,14 @@ class RasterSource {
  public:
   // Opens and checks a raster, and reads it once for its statistics. Errors name the file, the fault and the remedy.
   // Statistics are stored in `cache`, or loaded from it. `pages`: limits the memory of the statistics of this and other
-  // rasters; null: no limit. `threads`: that compute statistics. 0: the raster is not read; if the cache lacks the
-  // statistics, Open returns kCancelled after all other checks. kCancelled: stopped as well.
+  // rasters; null: no limit. `threads`: that compute statistics. `only_cached`: the raster is not read; if the
+  // cache lacks the statistics, Open returns kCancelled after all other checks. kCancelled: stopped as well.
   static Result<std::unique_ptr<RasterSource>> Open(const std::string& path, const SourceOptions& options = {},
                                                     const RasterCache& cache = {},
                                                     const std::function<void(double)>& progress = {},
                                                     const std::stop_token& stop = {},
                                                     std::shared_ptr<StatisticsPages> pages = nullptr,
-                                                    unsigned threads = 1);
+                                                    unsigned threads = 1, bool only_cached = false);
   ~RasterSource();
 
   const RasterInfo& info() const { return info_; }
@@ -109,9 +109,9 @@ class RasterSource {
   // How the statistics were made.
   const Preparation& preparation() const { return preparation_; }
 
-  // ReadGrid of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or removed.
-  // kUnavailable: a file cannot be read. kCancelled: stopped. Errors name the file.
-  Result<std::vector<float>> ReadBlocks(int factor, const GridWindow& window, const std::stop_token& stop) const;
+  // dem::ReadAverages of this raster, from prepared averages where possible. kChanged: a file was changed, replaced or
+  // removed. kUnavailable: a file cannot be read. kCancelled: stopped. Errors name the file.
+  Result<std::vector<float>> ReadAverages(int factor, const GridWindow& window, const std::stop_token& stop) const;
 
   // kChanged: a file was changed, replaced or removed since it was opened.
   Result<void> CheckUnchanged() const { return handles_.CheckUnchanged(); }

@@ -28,7 +28,7 @@ class CachedAverages {
   bool Has(int factor) const {
     return factor < kLargestDirectFactor && (factors_ & static_cast<unsigned>(factor)) != 0;
   }
-  // The same values as ReadGrid. kInvalidArgument: the file is damaged. kNotFound: it was removed, or is no longer
+  // The same values as ReadAverages. kInvalidArgument: the file is damaged. kNotFound: it was removed, or is no longer
   // accessible. kUnavailable: it cannot be opened now, because descriptors or memory have run out. Precondition:
   // Has(factor).
   Result<std::vector<float>> Read(int factor, const GridWindow& window) const;

@@ -5,17 +5,17 @@
 namespace terrace::dem {
 namespace {
 
-// Whether ReadGrid starts from too many samples.
+// Whether ReadAverages starts from too many samples.
 bool IsFarFromItsStart(const RasterLayout& layout, int factor) {
   constexpr std::int64_t kMaxReadWhole = std::int64_t{512} * 512;
   const int start = StartingFactor(layout, factor);
   const std::int64_t samples = std::int64_t{DivideUp(layout.width, start)} * DivideUp(layout.height, start);
-  return samples > kMaxReadWhole && factor / start > (NeedsAverages(layout) ? 1 : 2);
+  return samples > kMaxReadWhole && factor / start > (IsLargeWithoutOverviews(layout) ? 1 : 2);
 }
 
 }  // namespace
 
-bool NeedsAverages(const RasterLayout& layout) {
+bool IsLargeWithoutOverviews(const RasterLayout& layout) {
   return layout.overview_factors.empty() && std::int64_t{layout.width} * layout.height > kMaxSamplesWithoutAverages;
 }
 

@@ -11,13 +11,14 @@ namespace terrace::dem {
 // Whether the raster has no overviews and more samples than kMaxSamplesWithoutAverages. Averages by 2 are stored for
 // such rasters only.
 inline constexpr std::int64_t kMaxSamplesWithoutAverages = std::int64_t{4096} * 4096;
-bool NeedsAverages(const RasterLayout& layout);
+bool IsLargeWithoutOverviews(const RasterLayout& layout);
 
-// Returns a sum: `factor` is a part of it if averages by `factor` (2 .. kLargestDirectFactor / 2, powers of two) are
-// stored; the statistics contain those from kLargestDirectFactor on. They are stored if ReadGrid would otherwise start
-// from more than 512 x 512 samples, and from averages by less than half of the factor (less than the factor if
-// NeedsAverages). So a tile reads at most about four samples per node. Averages by 4 and more take a third of a byte
-// per sample; averages by 2 take four times as much (docs/performance-log.md).
+// Returns a bit mask of the factors (2 .. kLargestDirectFactor / 2, powers of two) whose averages are stored: `factor`
+// is stored if `mask & factor`. The statistics contain those from kLargestDirectFactor on. A factor is stored if
+// ReadAverages would otherwise start from more than 512 x 512 samples, and from averages by less than half of the
+// factor (less than the factor if IsLargeWithoutOverviews). So a tile reads at most about four samples per node.
+// Averages by 4 and more take a third of a byte per sample; averages by 2 take four times as much
+// (docs/performance-log.md).
 unsigned KeptFactors(const RasterLayout& layout);
 
 // Whether the statistics contain averages from kLargestDirectFactor on, by the same rule.

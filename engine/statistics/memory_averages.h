@@ -25,7 +25,7 @@ class MemoryAverages {
   void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
 
   bool Has(int factor) const;
-  // The same values as ReadGrid. Precondition: Has(factor).
+  // The same values as ReadAverages. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
   int min_factor() const { return levels_.front().factor; }
   std::size_t bytes() const { return bytes_; }

@@ -123,13 +123,13 @@ GridWindow AveragesAround(const Chunk& chunk, const RasterLayout& layout, int fa
   return {west, north, east - west + 1, south - north + 1};
 }
 
-// Computed from the samples, or read by ReadGrid if there is an overview.
+// Computed from the samples, or read by ReadAverages if there is an overview.
 Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout, const Samples& samples,
                                const Chunk& chunk, int factor, const std::stop_token& stop) {
   Averages averages{AveragesAround(chunk, layout, factor), {}};
   const GridWindow& window = averages.window;
   if (StartingFactor(layout, factor) > 1) {
-    auto read = ReadGrid(dataset, layout, factor, window, stop);
+    auto read = ReadAverages(dataset, layout, factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     averages.heights = *std::move(read);
     return averages;
@@ -153,7 +153,7 @@ Result<Averages> AverageAround(GDALDataset& dataset, const RasterLayout& layout,
   for (std::int64_t c = 0; c < window.columns; ++c) {
     const std::int64_t column = window.column + c;
     if (column >= west && column < east) continue;
-    auto read = ReadGrid(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
+    auto read = ReadAverages(dataset, layout, factor, {column, window.row, 1, window.rows}, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::int64_t r = 0; r < window.rows; ++r) {
       averages.heights[static_cast<std::size_t>(r * window.columns + c)] = (*read)[static_cast<std::size_t>(r)];
@@ -333,7 +333,7 @@ Result<ChunkStatistics> VoidOrOverviews(GDALDataset& dataset, const RasterLayout
       averages.assign(static_cast<std::size_t>(window.columns * window.rows), SampleRules::kVoid);
       continue;
     }
-    auto read = ReadGrid(dataset, layout, factor, window, stop);
+    auto read = ReadAverages(dataset, layout, factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     averages = *std::move(read);
     has_heights |= !std::ranges::all_of(averages, [](float height) { return std::isnan(height); });

@@ -280,7 +280,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
   CoarseAverages overviews = CoarseAverages::ShapedFor(layout_);
   int factor = kLargestDirectFactor;
   for (CoarseAverages::Grid& grid : overviews.grids) {
-    auto heights = ReadGrid(dataset, layout_, factor, {0, 0, grid.columns, grid.rows}, stop);
+    auto heights = ReadAverages(dataset, layout_, factor, {0, 0, grid.columns, grid.rows}, stop);
     if (!heights) return tl::unexpected(heights.error());
     grid.heights = *std::move(heights);
     factor *= 2;
@@ -297,7 +297,7 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
     for (int row = 0; row < rows; row += kStripRows) {
       for (int column = 0; column < columns; column += kStripColumns) {
         const Chunk box{column, row, std::min(kStripColumns, columns - column), std::min(kStripRows, rows - row)};
-        const auto heights = ReadGrid(dataset, layout_, factor, {box.col, box.row, box.cols, box.rows}, stop);
+        const auto heights = ReadAverages(dataset, layout_, factor, {box.col, box.row, box.cols, box.rows}, stop);
         if (!heights) return tl::unexpected(heights.error());
         content_.AddBytes(heights->data(), heights->size() * sizeof(float));
         statistics_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);

@@ -26,7 +26,7 @@ struct AveragesGrid {
   std::int64_t columns = 0, rows = 0;
   std::vector<float> heights;
 
-  // The same result as ReadGrid: columns may lie around the Earth.
+  // The same result as ReadAverages: columns may lie around the Earth.
   std::vector<float> Read(const GridWindow& window) const;
 };
 
@@ -40,7 +40,7 @@ class CoarseAverages {
   static CoarseAverages ShapedFor(const RasterLayout& layout);
 
   bool Has(int factor) const;
-  // The result of ReadGrid. Precondition: Has(factor).
+  // The result of ReadAverages. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
 
   std::vector<Grid> grids;  // of factor kLargestDirectFactor, twice that, ..

@@ -1,4 +1,4 @@
-// Statistics of rows of samples, in vectors. Results have the same bits on every set of instructions.
+// Statistics of rows of samples, with SIMD. Results are bit-equal on all sets of instructions.
 // Samples are never -0.
 #pragma once
 

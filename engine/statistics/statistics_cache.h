@@ -55,13 +55,15 @@ class StatisticsCacheWriter {
   // Includes the detected nodata of an interrupted run.
   const StatisticsKey& key() const { return key_; }
 
-  // Calls `keep` for every chunk of an interrupted run, in order. Call it once, before the first Add.
+  // Calls `keep` for every chunk of an interrupted run, in order. Call it before the first Add, and again after
+  // Restart.
   Result<void> Resume(const std::function<void(const ChunkStatistics&)>& keep);
 
   // Discards all chunks, which were made without this detected nodata.
   Result<void> Restart(const DetectedNodata& detected);
 
-  // Appends the next chunk. kUnavailable: it cannot be written; the file is removed, and later calls write nothing.
+  // Appends the next chunk. kUnavailable: it cannot be written, and the file is removed. Do not use this
+  // object after that.
   Result<void> Add(const ChunkStatistics& chunk_statistics);
 
   // Renames the file to its final name, under which LoadStatistics finds it.

@@ -259,7 +259,7 @@ Result<DetectedNodata> FindVoids(GDALRasterBand& band, const SampleRules& rules,
     say(fmt::format("{} samples of {}", evidence.at_value[i], PlainNumber(kUsualNodata[i])));
   }
   if (has_collar) {
-    detected.values.push_back((0 / rules.metres_per_unit - rules.offset) / rules.scale);
+    detected.values.push_back((0 - rules.offset) / rules.scale);
     say("a collar of zeros");
   }
 

@@ -12,7 +12,8 @@
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
 // that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
-// Therefore it takes less to keep u-v than to take p-w, and least away from p: there are three thresholds. All of this
+// Therefore u-v is kept more readily than p-w is taken, and most readily at edges further out from p: there are three
+// thresholds. All of this
 // together saves 3 to 6 % of the vertices (docs/decisions/0007).
 //
 // A test depends on its quadrilateral, on which corner of the triangle beyond the edge was inserted last (misfits are

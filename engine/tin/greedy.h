@@ -48,7 +48,7 @@ struct BorderOptions {
   double weight = 1;
   double padding_m = 0;
   double step_m = 0;
-  double rounding = 0;   // samples that a vertex's position may be off along the border
+  double rounding = 0;   // how far, in samples, rounding may move a vertex along the border
   double sagitta_m = 0;  // half the second difference of the curved ground along the border
   double scale = 1;      // factor on the error: in a run to the error E the border is refined to E / scale
 };

@@ -13,8 +13,7 @@ BoundingBox BoxOfLimits(const SampleLimits& limits, int width, int height) {
     for (int x = 0; x < width; ++x) {
       const std::size_t k = static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x);
       const bool is_forced = !limits.forced.empty() && limits.forced[k] != 0;
-      const bool is_limited = !limits.weights.empty() && (limits.weights[k] > 1 || std::isfinite(limits.caps[k]));
-      if (is_forced || is_limited) box.Add(x, y);
+      if (is_forced || limits.HasLimit(k)) box.Add(x, y);
     }
   }
   return box;

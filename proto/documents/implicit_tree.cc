@@ -9,15 +9,14 @@
 #include <utility>
 
 #include "engine/core/check.h"
+#include "engine/geo/tile_cover.h"
 
 namespace terrace::proto {
 namespace {
 
 std::int64_t Count(const std::vector<geo::TileRange>& ranges) {
   return std::accumulate(ranges.begin(), ranges.end(), std::int64_t{0},
-                         [](std::int64_t sum, const geo::TileRange& range) {
-                           return sum + (range.end_x - range.start_x + 1) * (range.end_y - range.start_y + 1);
-                         });
+                         [](std::int64_t sum, const geo::TileRange& range) { return sum + geo::Cells(range); });
 }
 
 std::vector<geo::TileKey> TilesOf(Availability available, int level) {
@@ -51,15 +50,13 @@ geo::TileRange PartUnder(const geo::TileRange& range, const geo::TileKey& top, i
           std::min(range.end_x - corner.x, last), std::min(range.end_y - corner.y, last)};
 }
 
-bool IsEmpty(const geo::TileRange& range) { return range.start_x > range.end_x || range.start_y > range.end_y; }
-
 // The blocks that intersect the area of `top`, not clipped. Levels above `top` are empty.
 std::vector<std::vector<geo::TileRange>> BlocksThatReachUnder(Availability available, const geo::TileKey& top) {
   std::vector<std::vector<geo::TileRange>> blocks(available.size());
   for (auto level = static_cast<std::size_t>(top.level); level < available.size(); ++level) {
     const int k = static_cast<int>(level) - top.level;
     std::ranges::copy_if(available[level], std::back_inserter(blocks[level]),
-                         [&](const geo::TileRange& range) { return !IsEmpty(PartUnder(range, top, k)); });
+                         [&](const geo::TileRange& range) { return !geo::IsEmpty(PartUnder(range, top, k)); });
   }
   return blocks;
 }
@@ -128,7 +125,7 @@ int LevelsUnder(Availability available, const geo::TileKey& root) {
   for (int level = static_cast<int>(available.size()) - 1; level >= root.level; --level) {
     const int k = level - root.level;
     const auto& ranges = available[static_cast<std::size_t>(level)];
-    const auto is_under = [&](const geo::TileRange& range) { return !IsEmpty(PartUnder(range, root, k)); };
+    const auto is_under = [&](const geo::TileRange& range) { return !geo::IsEmpty(PartUnder(range, root, k)); };
     if (std::ranges::any_of(ranges, is_under)) return k + 1;
   }
   TERRACE_CHECK(false);
@@ -160,7 +157,7 @@ std::vector<std::vector<geo::TileRange>> BlocksBelow(Availability available, con
     if (level >= available.size()) break;
     for (const geo::TileRange& range : available[level]) {
       const geo::TileRange here = PartUnder(range, top, static_cast<int>(k));
-      if (!IsEmpty(here)) blocks[k].push_back(here);
+      if (!geo::IsEmpty(here)) blocks[k].push_back(here);
     }
   }
   return blocks;

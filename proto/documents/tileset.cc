@@ -105,8 +105,7 @@ Json Sphere(const HeightSpan& heights, int level, const geo::TileRange& block) {
   }
   const double longitude = -180 + static_cast<double>(block.start_x) * tile + width / 2;
   const geo::Vec3 middle = geo::ToEcef(longitude, (south + north) / 2, heights.min_m);
-  constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
-  const double along = kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
+  const double along = geo::kLargestRadius * geo::ToRadians(width / 2 + (north - south) / 2);
   const double across = geo::Length(middle) + geo::kSemiMajorAxis;
   const double radius = std::min(along, across) + heights.max_m - heights.min_m;
   return {{"sphere", {middle.x, middle.y, middle.z, radius}}};

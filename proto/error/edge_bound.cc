@@ -101,8 +101,8 @@ constexpr std::size_t kLanes = 16;  // limit of the lanes, and so of the values 
 EdgeBound::EdgeBound(const LatticeView& lattice)
     : lattice_(lattice), twists_(std::make_unique_for_overwrite<float[]>(lattice.heights.size() + kLanes)) {
   const auto cells = static_cast<std::size_t>(lattice.cells());
-  // By cell, with the one west of the first; by node.
-  std::vector<float> of_cells(cells + 2 + kLanes), below(of_cells.size());
+  std::vector<float> of_cells(cells + 2 + kLanes);  // by cell, with the one west of the first
+  std::vector<float> below(of_cells.size());        // by node
   float* out = twists_.get() + cells + 4;
   for (int j = 0; j <= lattice.cells(); ++j, out += cells + 3) {
     const float *const south = lattice.Row(j), *const north = lattice.Row(std::min(j + 1, lattice.cells()));

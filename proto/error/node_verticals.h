@@ -117,8 +117,8 @@ class NodeVerticals {
   };
   friend class VerticalsInTriangle;
 
-  // The smallest radius of curvature: that of a meridian at the equator, 100 km below the ellipsoid.
-  static constexpr double kMinRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis - 1e5;
+  // 100 km below the ellipsoid.
+  static constexpr double kMinRadius = geo::kSmallestRadius - 1e5;
   static constexpr Shift kUnknownShift = {std::numeric_limits<double>::infinity(),
                                           std::numeric_limits<double>::infinity()};
 

@@ -15,9 +15,6 @@
 namespace terrace::proto {
 namespace {
 
-// The smallest radius of curvature: that of a meridian at the equator.
-constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
-
 // The relative difference in curvature between the ellipsoid and ground up to 100 km from it.
 constexpr double kCurvatureMargin = 1.02;
 
@@ -47,14 +44,13 @@ class Ground {
   LatticePoint WidestStep() const {
     double widest = 0;
     for (const geo::SinCos& row : angles_.rows) widest = std::max(widest, row.cos);
-    constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
-    return {widest * step_ * kLargestRadius, step_ * kLargestRadius};
+    return {widest * step_ * geo::kLargestRadius, step_ * geo::kLargestRadius};
   }
   // Lower bounds of the same; not positive at a pole.
   LatticePoint NarrowestStep() const {
     double narrowest = 1;
     for (const geo::SinCos& row : angles_.rows) narrowest = std::min(narrowest, row.cos);
-    return {std::max(narrowest, 1e-12) * step_ * kSmallestRadius * 0.98, step_ * kSmallestRadius * 0.98};
+    return {std::max(narrowest, 1e-12) * step_ * geo::kSmallestRadius * 0.98, step_ * geo::kSmallestRadius * 0.98};
   }
   // Metres, an upper bound.
   double WidestDiagonal() const {
@@ -87,7 +83,7 @@ class Ground {
     constexpr double kUnknown = std::numeric_limits<double>::infinity();
     const double width = std::abs(a.x - b.x) * step_, height = std::abs(a.y - b.y) * step_;
     if (width > 0.5) return {kUnknown, kUnknown};
-    const double heights = std::abs(rise_m) / kSmallestRadius;
+    const double heights = std::abs(rise_m) / geo::kSmallestRadius;
     const double y = width * width / 16 + height * (heights / 4 + height * (0.005 + height));
     if (width == 0) return {0, y / step_};
     // For the whole tile if that is tight enough, else for the chord's rows.
@@ -337,7 +333,7 @@ double LargestOfHalves(const EdgeMeter& meter, const EdgeBound& bound, const Gro
 // between edges. `steps`: the largest span of an edge.
 double ChordDeviation(const Ground& ground, double steps) {
   const double diagonal = ground.WidestDiagonal(), span = steps * ground.step_radians();
-  return kCurvatureMargin * (0.75 * diagonal * diagonal / kSmallestRadius + span * span / 8 * diagonal);
+  return kCurvatureMargin * (0.75 * diagonal * diagonal / geo::kSmallestRadius + span * span / 8 * diagonal);
 }
 
 // The larger of `known_m` and the largest difference along edges from the lattice surface, with ChordDeviation.
@@ -367,7 +363,7 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
   double largest = std::max(deviation, known_m);
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
-    const double sagitta = kCurvatureMargin * (x * x + y * y) / (8 * kSmallestRadius);
+    const double sagitta = kCurvatureMargin * (x * x + y * y) / (8 * geo::kSmallestRadius);
     const LatticePoint shift = ground.Shift(places[a], places[b], ends[a].height - ends[b].height);
     // If both surfaces are measured, their heights also differ by rounding.
     double rounding = 0;

@@ -9,11 +9,10 @@
 namespace terrace::proto {
 
 double SkirtDepth(int level, double error_m) {
-  constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
   const double edge = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level);
   // The sagitta of a chord over the whole edge; but at most the error, because an edge's error includes the sagitta of
   // its chords.
-  const double sagitta = std::min(edge * edge / (8 * kSmallestRadius), error_m);
+  const double sagitta = std::min(edge * edge / (8 * geo::kSmallestRadius), error_m);
   return error_m + 2 * error_m + sagitta;
 }
 

@@ -111,7 +111,8 @@ Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem:
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, the format of Open Topo Data. Points of
 // a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. Orthometric
-// heights have "datum". `certified`: adds "certified_error" and "tile" to each point with a height; null: nothing is
+// heights have "datum". With normals: "normal" [east, north, up] and "slope" in degrees. Points of a drawn
+// surface have its "tile". `certified`: adds "certified_error" and "tile" to each point with a height; null: nothing is
 // added. Returns an empty string if a stop was requested.
 std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
@@ -181,7 +182,7 @@ DocumentAnswer DescribeViewerFile(const Handlers& handlers, const RequestContext
 // Whether the client may see a dataset. Empty: it may see all.
 using IsSeen = std::function<bool(const DatasetView&)>;
 
-// {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"finest_bounds":[w,s,e,n],"min_level","max_level",
+// {"datasets":[{"name","version","attribution","bounds":[w,s,e,n],"sources","finest_bounds":[w,s,e,n],"min_level","max_level",
 //   "heights":{"min","max"},"urls":{"layer","tileset","tiles","tiles_json","heights","grid","sight",
 //   "mesh","edits","hillshade","slope","contours","imagery","imagery_geodetic"},"imagery":{"attribution","bounds","max_level",
 //   "geodetic_max_level"}}],"preparing":[{"name","percent","failed":true}],"more_with_token":true}

@@ -22,7 +22,7 @@ namespace {
 
 // From this number of rays on, looking along them is long work, which never occupies all workers.
 constexpr std::size_t kFewRays = 16;
-// A query of at most this many bytes has one ray and is parsed in microseconds.
+// A query of at most this many bytes has a few rays and is parsed in microseconds.
 constexpr std::size_t kQuickQuery = 512;
 // Rays written between two checks of the stop token.
 constexpr std::size_t kRayStopPeriod = 1024;

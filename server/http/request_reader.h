@@ -17,10 +17,11 @@
 namespace terrace::server {
 
 struct ReadTimeouts {
-  std::chrono::milliseconds message{5'000};  // of a head, from its first byte to its empty line; of a body, between two
-                                             // bytes, and before min_rate applies
-  std::chrono::milliseconds idle{30'000};    // between a reply and the next request
-  std::size_t min_rate = 4096;               // average bytes per second of a body; 0: any
+  // For a head, from its first byte to its empty line. For a body, the longest time between two bytes, and the time
+  // before min_rate applies.
+  std::chrono::milliseconds message{5'000};
+  std::chrono::milliseconds idle{30'000};  // between a reply and the next request
+  std::size_t min_rate = 4096;             // average bytes per second of a body; 0: any
 };
 
 class RequestReader {

@@ -70,7 +70,8 @@ Result<QueryParameters> ParseQuery(std::string_view query);
 
 // Reads a query. Calls `set` with the index of each name in `names` and the value, in the order sent. `takes_version`:
 // the URL may have `v`, which is ignored. kInvalidArgument: as ParseQuery; a name is given twice; a name is not one of
-// `names`. `known`: the names that the message of the last one lists; empty: all `names`. Errors of `set` are returned.
+// `names`. `known`: the names that the message about an unknown name lists; empty: all `names`. Errors of `set` are
+// returned.
 Result<void> ReadParameters(std::string_view query, std::span<const char* const> names,
                             const std::function<Result<void>(std::size_t, const std::string&)>& set,
                             std::string_view known = {}, bool takes_version = true);

@@ -56,8 +56,8 @@ class ConnectionSet {
   std::uint64_t refused() const { return refused_.load(std::memory_order_relaxed); }
   bool draining() const;
 
-  // Makes room for a connection of `newcomer` by closing another one: a connection of the client with the most
-  // connections, the new one included. Clients with fewer than the newcomer lose none. Closes the client's oldest idle
+  // Makes room for a connection of `newcomer` by closing another one: the client with the most connections
+  // loses one. The new connection counts as one of the newcomer. Closes the client's oldest idle
   // connection, else its oldest without a complete request. If all are busy, closes its newest, but only if this client
   // is not the newcomer and has more connections. A connection without a client ("") counts as a client of its own.
   // Returns false if no connection can be closed.

@@ -162,8 +162,10 @@ Result<DiskCache> OpenDiskCache(const config::DiskCacheConfig& config, std::size
   off_t unfinished = lock->size();
   const bool anew = unfinished >= kMaxUnfinished;
   if (anew) {
-    spdlog::warn("disk cache in {}: {} starts ended while it was opened; begun anew, check the disk", config.directory,
-                 unfinished);
+    spdlog::warn(
+        "disk cache in {}: the last {} starts ended while this cache was being opened, so it was emptied; check the "
+        "disk",
+        config.directory, unfinished);
     unfinished = 0;
   }
   lock->SetSize(unfinished + 1);

@@ -226,8 +226,8 @@ void DiskStore::SwitchOff(const std::string& why, bool reading) {
   dropped_.fetch_add(waiting.size(), std::memory_order_relaxed);
   changed_.notify_all();
   if (was_on) {
-    spdlog::warn("disk cache of {}: {}; {}, and tried again every {} ms", options_.name, why,
-                 reading ? "nothing is written" : "it is switched off", options_.retry_after.count());
+    spdlog::warn("disk cache of {}: {}; {} and is tried again every {} ms", options_.name, why,
+                 reading ? "writing is off" : "it is off", options_.retry_after.count());
   }
 }
 

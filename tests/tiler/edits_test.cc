@@ -348,6 +348,15 @@ TEST_F(Edits, AreCertifiedBesideHolesAndOverReplacements) {
   dem::RasterSpec half = rough;
   half.width = 160;
   const std::string half_path = dem::WriteRaster(dir, half, "half.tif");
+  dem::RasterSpec plate;  // a plateau of a few pixels that ends between two columns of nodes
+  plate.width = 4, plate.height = 7;
+  plate.geo_transform = {kLongitude - 0.0155, 0.003, 0, kLatitude + 0.0105, 0, -0.003};
+  plate.value = [](int, int) { return 900.0; };
+  const std::string plate_path = dem::WriteRaster(dir, plate, "plate.tif");
+  dem::RasterSpec notched = rough;  // with a void that is too wide to be filled, and open to the north
+  notched.nodata = -1;
+  notched.value = [](int column, int row) { return column > 115 && column < 185 && row < 100 ? -1.0 : 900.0; };
+  const std::string notched_path = dem::WriteRaster(dir, notched, "notched.tif");
   const auto replace = [](const std::string& source, int blend_m) {
     return Feature(fmt::format(R"({{"op":"replace","source":"{}","blend_m":{}}})", source, blend_m), Polygon());
   };
@@ -356,7 +365,9 @@ TEST_F(Edits, AreCertifiedBesideHolesAndOverReplacements) {
       {"coarse", {Kinds().at("replace"), ""}},
       {"rough", {replace(path, 150), path}},
       {"rough without blend", {replace(path, 0), path}},
-      {"ends inside", {replace(half_path, 150), half_path}}};
+      {"ends inside", {replace(half_path, 150), half_path}},
+      {"ends inside, flat", {replace(plate_path, 3000), ""}},
+      {"has a void", {replace(notched_path, 3000), ""}}};
   for (const auto& [kind, feature] : kinds) {
     const TilePipeline pipeline = Open({feature.first});
     std::vector<Sample> samples = SamplesOf(Jacksboro());

@@ -13,8 +13,6 @@
 namespace terrace::tiler {
 namespace {
 
-constexpr double kSmallestRadius = geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;
-constexpr double kLargestRadius = geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;
 constexpr std::size_t kStopPeriod = 1024;  // triangles
 
 // Rotates from longitude 0 to the longitude of the equatorial unit vector.
@@ -87,13 +85,13 @@ void AreaSurface::AddCurvature(tin::GreedyOptions& options) const {
   const auto widest = std::max_element(east.begin(), east.end());
   std::inclusive_scan(east.begin(), widest, east.begin(), wider);
   std::inclusive_scan(east.rbegin(), std::make_reverse_iterator(widest), east.rbegin(), wider);
-  options.curvature.north_m2 = radians * kLargestRadius * radians * kLargestRadius;
-  options.curvature.radius_m = kSmallestRadius;
+  options.curvature.north_m2 = radians * geo::kLargestRadius * radians * geo::kLargestRadius;
+  options.curvature.radius_m = geo::kSmallestRadius;
   for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
     const bool is_parallel = side == tin::Side::kSouth || side == tin::Side::kNorth;
     const double latitude = At(0, side == tin::Side::kSouth ? 0 : window_.rows - 1).latitude;
     const double cosine = geo::SurfaceNormal(0, latitude).x;
-    const double radius = is_parallel ? geo::PrimeVerticalRadius(latitude) * cosine * cosine : kLargestRadius;
+    const double radius = is_parallel ? geo::PrimeVerticalRadius(latitude) * cosine * cosine : geo::kLargestRadius;
     options.borders[static_cast<std::size_t>(side)].sagitta_m = radians * radians * radius / 2;
   }
 }

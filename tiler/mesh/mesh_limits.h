@@ -12,8 +12,8 @@
 
 namespace terrace::tiler {
 
-// The error bound of a tile's mesh at its nodes for an error of at most `error_m` to the ground. It is smaller, because
-// the heights of nodes are rounded to 2^-10 m and their positions are inexact.
+// The bound that a mesh must keep at its nodes so that it stays within `error_m` of the ground. It is smaller than
+// `error_m`, because the heights of nodes are rounded to 2^-10 m and their positions are inexact.
 double NodeErrorBound(double error_m);
 
 // The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.

@@ -13,17 +13,12 @@
 namespace terrace::tiler {
 namespace {
 
-constexpr double kSmallestCurvatureRadius =
-    geo::kSemiMinorAxis * geo::kSemiMinorAxis / geo::kSemiMajorAxis;  // meridian, at the equator
-constexpr double kLargestCurvatureRadius =
-    geo::kSemiMajorAxis * geo::kSemiMajorAxis / geo::kSemiMinorAxis;  // at the poles
-
 // A bound in metres on the sagitta of the right triangles of a grid of `divisions` x `divisions` over a tile of this
 // level. Tiles count as wide as at the equator, so that all tiles of a level, and therefore neighbours, use the same
 // grids.
 double GridSagitta(int level, int divisions) {
   const double side = std::ldexp(geo::kSemiMajorAxis * geo::ToRadians(180), -level) / divisions;
-  return side * side / (4 * kSmallestCurvatureRadius);
+  return side * side / (4 * geo::kSmallestRadius);
 }
 
 tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
@@ -42,9 +37,9 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
   std::inclusive_scan(begin, widest, begin, wider);
   const auto back = curvature.east_m2.rbegin(), widest_back = std::make_reverse_iterator(widest);
   std::inclusive_scan(back, widest_back, back, wider);
-  const double north = geo::ToRadians(step) * kLargestCurvatureRadius;
+  const double north = geo::ToRadians(step) * geo::kLargestRadius;
   curvature.north_m2 = north * north;
-  curvature.radius_m = kSmallestCurvatureRadius;
+  curvature.radius_m = geo::kSmallestRadius;
   return curvature;
 }
 
@@ -62,7 +57,7 @@ std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
 // Half the second difference of the ground along an edge, per sample squared.
 double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
   const double step = geo::ToRadians(lattice.lattice.StepDegrees());
-  if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * kLargestCurvatureRadius / 2;
+  if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * geo::kLargestRadius / 2;
   const double latitude = lattice.Latitude(side == tin::Side::kSouth ? 0 : lattice.cells());
   const double cosine = geo::SurfaceNormal(0, latitude).x;
   return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;

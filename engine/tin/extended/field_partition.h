@@ -54,8 +54,9 @@ class FieldPartition {
 
 // The mesh of one block to an error, in the block's own coordinates; nothing if stopped. Void corners have the height
 // that HeightField::VertexHeight gives them in the whole field, so that neighbours agree on it. Copies the block's
-// samples, unless the block is the field. Of the options only the criterion is used; borders inside the field have
-// their own options. Safe to call from many threads at once.
+// samples, unless the block is the field. Uses the criterion, `data_dependent`, and the borders on the sides of the
+// field; borders inside the field have their own options. Preconditions: no curvature, seeds or limits. Safe to call
+// from many threads at once.
 std::optional<TinMesh> MeshBlock(const HeightField& field, const FieldBlock& block, double max_error_m,
                                  GreedyOptions options = {}, std::stop_token stop = {});
 

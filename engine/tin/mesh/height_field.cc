@@ -108,7 +108,6 @@ float HeightField::NearestHeight(int x, int y) const {
       const int step = (row == own_row - r || row == own_row + r) ? 1 : 2 * r;
       for (int column = own_column - r; column <= own_column + r; column += step) {
         if (column >= 0 && column < patches_along_x_) SearchPatch(column, row, x, y, nearest);
-        if (r == 0) break;
       }
     }
   }

@@ -235,7 +235,7 @@ void AddBake(CLI::App& app, int& exit_code) {
   AddHow(*command, *arguments);
   AddPlanning(*command, *arguments);
   std::vector<config::OptionInfo> about_dataset = config::DatasetOptions();
-  std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked"; });
+  std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked" || option.key == "public"; });
   AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);
   std::vector<config::OptionInfo> about_cache = config::ServerOptions();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });

@@ -73,8 +73,8 @@ void BakeDisplay::Show() {
 
 std::string BakeDisplay::Line() const {
   const double seconds = SecondsSince(start_);
-  const std::uint64_t built = counters_.tiles, passed = counters_.passed;
-  const std::uint64_t done = std::min(built + passed, tiles_);
+  const std::uint64_t built = counters_.tiles, skipped = counters_.skipped;
+  const std::uint64_t done = std::min(built + skipped, tiles_);
   const double pace = seconds > 0 ? static_cast<double>(built) / seconds : 0;
   std::string left;
   if (pace > 0 && built > 0) left = ", " + Duration(static_cast<double>(tiles_ - done) / pace) + " left";
@@ -124,7 +124,7 @@ std::string SummaryJson(const BakeSummary& summary, const bake::Counters& counte
 
 std::string SummaryText(const BakeSummary& summary) {
   std::string text =
-      fmt::format("{}: {} tiles, {}, {} units", summary.place, Grouped(summary.tiles),
+      fmt::format("{}: {} tiles, {}, {} files", summary.place, Grouped(summary.tiles),
                   Bytes(static_cast<double>(summary.bytes)), summary.baked + summary.kept + summary.copied);
   for (const auto& [count, what] : {std::pair(summary.kept, "were there"), std::pair(summary.copied, "copied"),
                                     std::pair(summary.missing, "missing"), std::pair(summary.failed, "failed")}) {

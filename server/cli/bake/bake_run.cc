@@ -55,8 +55,9 @@ int PlanFromCells(const BakeArguments& arguments, const bake::BakeRequest& reque
   if (!tiles) return cli::Fail(arguments.catalogue + ": " + tiles.error().message, kExitUsage);
   const int deepest = static_cast<int>(tiles->size()) - 1;
   if (request.levels && (request.levels->first > 0 || request.levels->second > deepest)) {
-    return cli::Fail(fmt::format("--levels {}: the catalogue has levels 0 to {}", arguments.levels, deepest),
-                     kExitUsage);
+    return cli::Fail(
+        fmt::format("--levels {}: must begin at level 0; the catalogue has levels 0 to {}", arguments.levels, deepest),
+        kExitUsage);
   }
   if (request.bbox) *tiles = bake::TilesWithin(*tiles, *request.bbox);
   if (request.levels) tiles->resize(static_cast<std::size_t>(request.levels->second) + 1);
@@ -107,7 +108,7 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
            {"error", error},
            {"extensions", extensions.empty() ? "none" : extensions},
            {"gzip", arguments.no_gzip ? "no" : "yes"},
-           {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options)}}};
+           {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options_hash)}}};
 }
 
 Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
@@ -248,7 +249,7 @@ int BakeAlone(const PlacedBake& bake) {
         "terrace: the bake is not complete: %s of %s files are missing, and there is no manifest; run %s to go "
         "on\n",
         Grouped(bake.plan.files - done).c_str(), Grouped(bake.plan.files).c_str(),
-        bake.arguments.finish ? "the shards that baked them again" : "the same command again");
+        bake.arguments.finish ? "the shards that they belong to again" : "the same command again");
     return kExitFailure;
   }
   if (bake.arguments.form == kFolder && bake.targets.front().manifest.kind.coding == tiler::Coding::kGzip) {
@@ -369,7 +370,7 @@ std::string WrongTogether(const BakeArguments& arguments) {
   }
   if (given(arguments.shard) && arguments.finish) return "--finish is for all shards together: leave --shard out";
   if ((given(arguments.shard) || arguments.finish || given(arguments.queue)) && arguments.form != kChunks) {
-    return fmt::format("--form {} is written from all units: bake with shards or a queue --form chunks",
+    return fmt::format("--form {} needs all units in one run; with --shard, --finish or --queue use --form chunks",
                        arguments.form);
   }
   if (given(arguments.update)) {

@@ -123,7 +123,7 @@ int OpenSeed(const std::string& folder, const config::DiskCacheConfig& limits, S
 int ReportSeed(const BakeArguments& arguments, const Seed& seed, const bake::UnitPlan& plan,
                const std::vector<bake::UnitReport>& reports, const bake::Counters& counters) {
   const std::string& folder = arguments.into_cache;
-  const std::uint64_t built = counters.tiles, kept = counters.passed;
+  const std::uint64_t built = counters.tiles, kept = counters.skipped;
   if (seed.is_full()) {
     return cli::Fail(fmt::format("{}: is full after {} of {} tiles; raise disk_cache.tile_bytes ({} now) in the "
                                  "configuration of the server, and give it with --config, or limit --levels or --bbox",

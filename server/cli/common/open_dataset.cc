@@ -130,7 +130,7 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   if (dataset.source->info().edits > 0) {
     dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.source->unedited_fingerprint());
   }
-  dataset.options = GenerationOf(wanted, dataset, version, 0);
+  dataset.options_hash = GenerationOf(wanted, dataset, version, 0);
   return dataset;
 }
 

@@ -52,15 +52,15 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
 // Advice about this raster; empty: none.
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
-  if (info.needs_averages) {
+  if (info.is_large_without_overviews) {
     advice.push_back(NoOverviewsAdvice(info));
   } else if (!info.overviews_unused.empty()) {
     advice.push_back("overviews not used: " + info.overviews_unused);
   }
   if (info.datum_in_use.empty()) {
     advice.push_back(
-        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid as they are; heights above "
-        "mean sea level will be off by the geoid, up to 100 m: say so with --vertical egm96, or another");
+        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
+        "sea level, add --vertical egm96 or another datum; otherwise they are off by up to 100 m");
   }
   if (!info.knows_height_unit) {
     advice.push_back(

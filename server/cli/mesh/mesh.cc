@@ -97,7 +97,7 @@ struct MeshArguments {
 std::string ComplainAboutArea(const MeshArguments& arguments) {
   if (!arguments.area.IsUsed()) {
     return IsOfAreas(arguments.coordinates)
-               ? "--coordinates " + arguments.coordinates + " belongs to --edits and --bbox"
+               ? "--coordinates " + arguments.coordinates + " belongs to --edits, --bbox and --vertical"
                : "";
   }
   const bool is_plain = arguments.max_error > 0 && arguments.criterion != kDataDependent && !arguments.compact &&
@@ -333,10 +333,11 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->group(kGoal);
   AddNodataOption(*command, arguments->nodata);
   command
-      ->add_option("--coordinates", arguments->coordinates,
-                   "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS; "
-                   "by default crs if the raster has one. With --edits or --bbox: enu, metres east, north and up of "
-                   "the middle; ecef; geographic, degrees and metres")
+      ->add_option(
+          "--coordinates", arguments->coordinates,
+          "pixel: x = column, y = row (from the top), z = height; crs: pixel centres in the raster's CRS; "
+          "by default crs if the raster has one. With --edits, --bbox or --vertical: enu, metres east, north and up of "
+          "the middle; ecef; geographic, degrees and metres")
       ->check(OneOf({"pixel", "crs", "enu", "ecef", "geographic"}))
       ->type_name("NAME");
   AddCriterionOptions(*command, *arguments);

@@ -12,10 +12,11 @@ Result<std::optional<int>> TakeListenSocket() {
   const int count = ::sd_listen_fds(/*unset_environment=*/1);
   if (count <= 0) return std::nullopt;  // below 0: the variables are for another process, or invalid
   if (count > 1) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{} sockets were passed, and one is served: give the .socket unit one ListenStream=, which may be "
-                     "a port alone for IPv6 and IPv4",
-                     count);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "systemd passed {} sockets, and terrace takes one: keep a single ListenStream= in the .socket unit; "
+        "a port without an address serves IPv4 and IPv6",
+        count);
   }
   const auto listens = [](int family) {
     return ::sd_is_socket(SD_LISTEN_FDS_START, family, SOCK_STREAM, /*listening=*/1) > 0;

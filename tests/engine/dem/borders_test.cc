@@ -59,6 +59,49 @@ TEST(Borders, AreBitEqualAcrossTheAntimeridian) {
   }
 }
 
+// A source around the whole Earth with one void, close to the antimeridian on one side. The blend around the void
+// reaches across it. With one raster, and with two that form one raster grid.
+TEST(Borders, AreBitEqualWhereABlendCrossesTheAntimeridian) {
+  const TempDir dir;
+  const std::string base = WriteRaster(dir, FlatSquare(-180, 90, 180, 1, 300), "base.tif");
+  const std::string east = WriteRaster(dir, FlatSquare(0, 90, 180, 1, 300), "east.tif");
+  for (const int void_column : {350, 5}) {
+    const auto part = [&](int first, int width, const std::string& name) {
+      RasterSpec spec{.width = width, .height = 180, .geo_transform = {first - 180.0, 1, 0, 90, 0, -1}};
+      spec.nodata = -1;
+      spec.value = [first, void_column](int c, int r) {
+        return std::abs(first + c - void_column) <= 2 && r >= 80 && r < 100 ? -1.0 : 100.0;
+      };
+      return WriteRaster(dir, spec, std::to_string(void_column) + name);
+    };
+    const std::string whole = part(0, 360, "whole.tif");
+    const std::string west_half = part(0, 180, "west.tif"), east_half = part(180, 180, "east.tif");
+    DemOptions options{.feather = 1'000'000};
+    options.max_void_gap = 0;
+    for (const std::vector<DemFile>& upper : {std::vector<DemFile>{{whole, 0}}, {{west_half, 0}, {east_half, 0}}}) {
+      SCOPED_TRACE(std::to_string(void_column) + ", rasters: " + std::to_string(upper.size()));
+      std::vector<DemFile> files = upper;
+      files.push_back({base, 1});
+      files.push_back({east, 1});
+      const auto source = OpenOrFail(files, options);
+      ASSERT_NE(source, nullptr);
+      bool is_blended = false;
+      for (int level = 0; level <= source->max_level(); ++level) {
+        for (std::int64_t row = 0; row < geo::TileRows(level);
+             row += std::max<std::int64_t>(1, geo::TileRows(level) / 8)) {
+          const geo::TileKey key{level, geo::TileColumns(level) - 1, row};
+          ExpectSameBorders(*source, key);
+          const auto tile = source->Read(key);
+          ASSERT_TRUE(tile);
+          const float height = tile->At(tile->lattice.cells, tile->lattice.cells / 2);
+          is_blended |= height > 101 && height < 299;
+        }
+      }
+      EXPECT_TRUE(is_blended);
+    }
+  }
+}
+
 TEST(Borders, AreBitEqualInRotatedAndInternationalDatums) {
   const TempDir dir;
   RasterSpec spec{.width = 200, .height = 150, .geo_transform = {7, .002, .0004, 47, .0003, -.0015}};

@@ -46,15 +46,15 @@ std::unique_ptr<RasterSource> OpenIn(const std::string& path, const RasterCache&
   return source ? *std::move(source) : nullptr;
 }
 
-// Expects the bits of ReadGrid, which is tested against the file itself.
+// Expects the bits of ReadAverages, which is tested against the file itself.
 void ExpectAveragesOf(const std::string& path, const RasterSource& source) {
   const auto dataset = OpenRaster(path);
   ASSERT_TRUE(dataset);
   const RasterLayout& layout = source.layout();
   for (int factor = 1; factor <= 256; factor *= 2) {
     const GridWindow whole{0, 0, DivideUp(layout.columns, factor), DivideUp(layout.height, factor)};
-    const auto read = source.ReadBlocks(factor, whole, {});
-    const auto direct = ReadGrid(**dataset, layout, factor, whole, {});
+    const auto read = source.ReadAverages(factor, whole, {});
+    const auto direct = ReadAverages(**dataset, layout, factor, whole, {});
     ASSERT_TRUE(read && direct);
     ASSERT_EQ(read->size(), direct->size());
     for (std::size_t i = 0; i < read->size(); ++i) {
@@ -211,8 +211,9 @@ TEST(CacheFolder, IsSharedByProcesses) {
         const std::string& path = rasters[child == 0 ? i : rasters.size() - 1 - i];
         const auto source = OpenIn(path, cache);
         const auto dataset = OpenRaster(path);
-        const auto read = source->ReadBlocks(4, {0, 0, 175, 175}, {});
-        is_well = is_well && read && *read == ReadGrid(**dataset, source->layout(), 4, {0, 0, 175, 175}, {}).value();
+        const auto read = source->ReadAverages(4, {0, 0, 175, 175}, {});
+        is_well =
+            is_well && read && *read == ReadAverages(**dataset, source->layout(), 4, {0, 0, 175, 175}, {}).value();
       }
     }
     ::_exit(is_well ? 0 : 1);

@@ -262,7 +262,7 @@ TEST(ManySources, PagedTablesSayWhatKeptOnesDo) {
     }
   }
   EXPECT_GT(pages->paged_bytes(), 0U);
-  EXPECT_EQ(kept->ReadBlocks(64, {3, 4, 5, 6}, {}).value(), paged.ReadBlocks(64, {3, 4, 5, 6}, {}).value());
+  EXPECT_EQ(kept->ReadAverages(64, {3, 4, 5, 6}, {}).value(), paged.ReadAverages(64, {3, 4, 5, 6}, {}).value());
 }
 
 // A shallow tile reads a few averages of each of hundreds of sources; reading their samples would take a minute.
@@ -279,15 +279,15 @@ TEST(ManySources, ShallowTilesReadKeptAveragesOfASource) {
       SCOPED_TRACE(factor);
       const std::uint64_t before = (*kept)->averages()->bytes_read();
       const int blocks = (1500 + factor - 1) / factor;
-      EXPECT_EQ((*kept)->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value(),
-                whole->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value());
+      EXPECT_EQ((*kept)->ReadAverages(factor, {0, 0, blocks, blocks}, {}).value(),
+                whole->ReadAverages(factor, {0, 0, blocks, blocks}, {}).value());
       const std::uint64_t bytes = (*kept)->averages()->bytes_read() - before;
       if (factor < 4 || factor > 32) {
         EXPECT_EQ(bytes, 0U);
       } else {
         EXPECT_GE(bytes, std::uint64_t{4} * static_cast<unsigned>(blocks * blocks));
-        EXPECT_EQ((*kept)->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value(),
-                  whole->ReadBlocks(factor, {0, 0, blocks, blocks}, {}).value());
+        EXPECT_EQ((*kept)->ReadAverages(factor, {0, 0, blocks, blocks}, {}).value(),
+                  whole->ReadAverages(factor, {0, 0, blocks, blocks}, {}).value());
         EXPECT_EQ((*kept)->averages()->bytes_read(), before + bytes) << "chunks stay in memory";
       }
     }

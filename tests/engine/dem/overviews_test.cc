@@ -81,7 +81,7 @@ TEST(Overviews, OfAFormatStandForWholeBlocks) {
     layout.height = 300;
     layout.rules = SampleRules::Of(*dataset->GetRasterBand(1), "");
     layout.overview_factors = {4};
-    const auto heights = ReadGrid(*dataset, layout, 4, {240, 10, 1, 1}, {});
+    const auto heights = ReadAverages(*dataset, layout, 4, {240, 10, 1, 1}, {});
     ASSERT_TRUE(heights);
     EXPECT_NEAR((*heights)[0], 240, 1);
   }
@@ -102,7 +102,7 @@ TEST(Overviews, BlocksLieWhereTheyLieWithout) {
     ASSERT_EQ(source->layout().overview_factors, (std::vector<int>{2, 4, 8, 16}));
     for (const int factor : {2, 4, 8, 16, 32}) {
       const GridAxis columns(width, factor, false), rows(height, factor, false);
-      const auto read = source->ReadBlocks(factor, {0, 0, columns.count(), rows.count()}, {});
+      const auto read = source->ReadAverages(factor, {0, 0, columns.count(), rows.count()}, {});
       ASSERT_TRUE(read);
       for (std::int64_t r = 0; r < rows.count(); ++r) {
         for (std::int64_t c = 0; c < columns.count(); ++c) {
@@ -180,7 +180,7 @@ TEST(Overviews, OfSidesRoundedEitherWayAreReadInPlaceOfTheRaster) {
     const int factor = AveragingFactor(SamplesPerCell({8, 256}, {30, 30, 30, 0.5, true}));
     ASSERT_EQ(factor, 8);
     const GridAxis blocks(kSide, factor, false);
-    const auto heights = ReadGrid(dataset, layout, factor, {0, 0, blocks.count(), blocks.count()}, {});
+    const auto heights = ReadAverages(dataset, layout, factor, {0, 0, blocks.count(), blocks.count()}, {});
     ASSERT_TRUE(heights);
     EXPECT_EQ(dataset.band().blocks_read, 0);
     EXPECT_EQ(dataset.band().overviews[0]->blocks_read + dataset.band().overviews[1]->blocks_read, 0);
@@ -260,11 +260,11 @@ TEST(Overviews, AWindowChangesNoBlock) {
     ASSERT_EQ(source->layout().wraps, around);
     for (const int factor : {2, 4, 8, 16, 32}) {
       const std::int64_t columns = (361 + factor - 1) / factor, rows = (179 + factor - 1) / factor;
-      const auto whole = source->ReadBlocks(factor, {0, 0, columns, rows}, {});
+      const auto whole = source->ReadAverages(factor, {0, 0, columns, rows}, {});
       ASSERT_TRUE(whole);
       for (std::int64_t c = around ? -3 : 0; c < columns + (around ? 3 : 0); ++c) {
         for (std::int64_t r = 0; r < rows; r += 3) {
-          const auto one = source->ReadBlocks(factor, {c, r, 1, 1}, {});
+          const auto one = source->ReadAverages(factor, {c, r, 1, 1}, {});
           ASSERT_TRUE(one);
           const float other = (*whole)[static_cast<std::size_t>(r * columns + (c + columns) % columns)];
           ASSERT_TRUE((*one)[0] == other || (std::isnan((*one)[0]) && std::isnan(other))) << factor << " " << c;

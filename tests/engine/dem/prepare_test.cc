@@ -78,8 +78,8 @@ void ExpectSameAverages(const std::string& path, const RasterSource& source) {
     const GridWindow whole{0, 0, (layout.columns + factor - 1) / factor, (layout.height + factor - 1) / factor};
     GridWindow part = whole;
     if (factor < 8) part = {whole.columns / 3, whole.rows / 3, whole.columns / 4, whole.rows / 4};
-    const auto read = source.ReadBlocks(factor, part, {});
-    const auto direct = ReadGrid(**dataset, layout, factor, part, {});
+    const auto read = source.ReadAverages(factor, part, {});
+    const auto direct = ReadAverages(**dataset, layout, factor, part, {});
     ASSERT_TRUE(read && direct);
     EXPECT_TRUE(SameHeights(*read, *direct)) << "factor " << factor;
   }
@@ -153,12 +153,12 @@ void ExpectErrorsHold(const std::string& path) {
   const auto dataset = OpenRaster(path);
   ASSERT_TRUE(source && dataset);
   const RasterLayout& layout = source->layout();
-  const auto samples = ReadGrid(**dataset, layout, 1, {0, 0, layout.columns, layout.height}, {});
+  const auto samples = ReadAverages(**dataset, layout, 1, {0, 0, layout.columns, layout.height}, {});
   ASSERT_TRUE(samples);
   for (int factor = 2; factor / 2 < std::max(layout.width, layout.height); factor *= 2) {
     const GridAxis columns(layout.columns, factor, layout.wraps), rows(layout.height, factor, false);
     GridWindow all{layout.wraps ? -1 : 0, 0, columns.count() + (layout.wraps ? 2 : 0), rows.count()};
-    const auto averages = ReadGrid(**dataset, layout, factor, all, {});
+    const auto averages = ReadAverages(**dataset, layout, factor, all, {});
     ASSERT_TRUE(averages);
     AveragingErrors truth(layout.width, layout.height);
     const int pixels = AveragingErrors::BlockPixels(factor);
@@ -266,7 +266,7 @@ TEST(Prepare, TwoProcessesShareOneCache) {
     child = ::fork();
     if (child == 0) {
       const auto source = RasterSource::Open(path, {}, CacheIn(cache));
-      ::_exit(source && (*source)->ReadBlocks(8, {300, 200, 100, 100}, {}) ? 0 : 1);
+      ::_exit(source && (*source)->ReadAverages(8, {300, 200, 100, 100}, {}) ? 0 : 1);
     }
   }
   for (const pid_t child : children) {
@@ -286,13 +286,13 @@ TEST(Prepare, KeepsNoFileOpenAndDoesWithoutOneThatIsGone) {
   OpenWithCache(path, cache);
   const auto source = OpenWithCache(path, cache);
   EXPECT_TRUE(source->preparation().from_cache);
-  const auto before = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  const auto before = source->ReadAverages(8, {300, 200, 100, 100}, {});
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
     EXPECT_FALSE(std::filesystem::read_symlink(entry, gone).string().starts_with(cache));
   }
   std::filesystem::remove_all(cache);
-  const auto after = source->ReadBlocks(8, {300, 200, 100, 100}, {});
+  const auto after = source->ReadAverages(8, {300, 200, 100, 100}, {});
   ASSERT_TRUE(before && after);
   EXPECT_TRUE(std::memcmp(before->data(), after->data(), before->size() * sizeof(float)) == 0) << "voids are NaN";
 }

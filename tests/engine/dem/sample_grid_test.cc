@@ -53,14 +53,14 @@ OpenGrid OpenAs(const std::string& path, bool wraps) {
   return grid;
 }
 
-TEST(ReadGrid, AveragesTheValidSamplesOfAlignedBlocks) {
+TEST(ReadAverages, AveragesTheValidSamplesOfAlignedBlocks) {
   const TempDir dir;
   RasterSpec spec{.width = 10, .height = 9, .nodata = -1};
   spec.value = [](int col, int row) {
     return col < 4 && row < 4 ? (row == 2 ? 6.0 : -1.0) : col < 8 && row < 4 ? -1.0 : col;
   };
   const OpenGrid grid = OpenAs(WriteRaster(dir, spec), false);
-  const auto heights = ReadGrid(*grid.dataset, grid.layout, 4, {0, 0, 3, 3}, {});
+  const auto heights = ReadAverages(*grid.dataset, grid.layout, 4, {0, 0, 3, 3}, {});
   ASSERT_TRUE(heights) << heights.error().message;
   EXPECT_EQ((*heights)[0], 6);
   EXPECT_TRUE(std::isnan((*heights)[1]));
@@ -69,16 +69,16 @@ TEST(ReadGrid, AveragesTheValidSamplesOfAlignedBlocks) {
   EXPECT_EQ((*heights)[8], 8.5f);
 }
 
-TEST(ReadGrid, WindowsAndWrappingChangeNoValue) {
+TEST(ReadAverages, WindowsAndWrappingChangeNoValue) {
   const TempDir dir;
   RasterSpec spec{.width = 50, .height = 40};
   spec.value = [](int col, int row) { return std::sin(col * 1.7) * 100 + std::cos(row * 2.3 + col); };
   const OpenGrid grid = OpenAs(WriteRaster(dir, spec), true);
   for (const int factor : {1, 2, 4, 8}) {
     const std::int64_t columns = (50 + factor - 1) / factor, rows = 40 / factor;
-    const auto whole = ReadGrid(*grid.dataset, grid.layout, factor, {0, 0, columns, rows}, {});
+    const auto whole = ReadAverages(*grid.dataset, grid.layout, factor, {0, 0, columns, rows}, {});
     const GridWindow window{columns - 2, 1, columns + 3, 3};
-    const auto part = ReadGrid(*grid.dataset, grid.layout, factor, window, {});
+    const auto part = ReadAverages(*grid.dataset, grid.layout, factor, window, {});
     ASSERT_TRUE(whole && part);
     for (std::int64_t r = 0; r < window.rows; ++r) {
       for (std::int64_t c = 0; c < window.columns; ++c) {
@@ -89,19 +89,19 @@ TEST(ReadGrid, WindowsAndWrappingChangeNoValue) {
   }
 }
 
-TEST(ReadGrid, StartsFromOverviews) {
+TEST(ReadAverages, StartsFromOverviews) {
   const TempDir dir;
   RasterSpec spec{.width = 512, .height = 512, .overviews = {4}};
   spec.value = [](int col, int) { return col; };
   OpenGrid grid = OpenAs(WriteRaster(dir, spec), false);
   grid.layout.overview_factors = {4};
-  const auto from_overview = ReadGrid(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {});
+  const auto from_overview = ReadAverages(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {});
   grid.layout.overview_factors = {};
-  const auto from_samples = ReadGrid(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {});
+  const auto from_samples = ReadAverages(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {});
   ASSERT_TRUE(from_overview && from_samples);
   EXPECT_EQ(*from_overview, *from_samples);
   grid.layout.overview_factors = {2};
-  EXPECT_EQ(ReadGrid(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {}).error().code, ErrorCode::kUnavailable);
+  EXPECT_EQ(ReadAverages(*grid.dataset, grid.layout, 8, {3, 5, 10, 2}, {}).error().code, ErrorCode::kUnavailable);
 }
 
 }  // namespace

@@ -93,7 +93,7 @@ class MeshOfAreas(unittest.TestCase):
                 (2, "the only goal is --max-error", ("--edits", self.edits, "--max-error", 0)),
                 (2, "leave out", ("--bbox", BOX, "--max-error", 5, "--compact")),
                 (2, "enu, ecef or geographic", ("--bbox", BOX, "--max-error", 5, "--coordinates", "pixel")),
-                (2, "belongs to --edits and --bbox", ("--max-error", 5, "--coordinates", "enu")),
+                (2, "belongs to --edits, --bbox and --vertical", ("--max-error", 5, "--coordinates", "enu")),
                 (2, "--bbox: south must be below north", ("--bbox", "-84.23,36.32,-84.17,36.28", "--max-error", 5)),
                 (2, "outside the dataset", ("--bbox", "10,10,11,11", "--max-error", 5)),
                 (1, "flaten", ("--edits", wrong, "--max-error", 5)),
