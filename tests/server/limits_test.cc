@@ -238,6 +238,8 @@ TEST_F(Limits, NamesDatasetsWithProblemsToThoseWhoMaySeeThem) {
             "degraded\ndataset: cannot be opened as its files are now; the log has the reason\n");
   EXPECT_EQ(Fetch(port(), "/readyz", std::string("Authorization: Bearer ") + kAll + "\r\n").body,
             "degraded\ndataset maui: cannot be opened as its files are now; the log has the reason\n");
+  server_->SetProblems({{"maui", kReopening}});
+  EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: is being reopened; cached tiles are still served\n");
 }
 
 TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
