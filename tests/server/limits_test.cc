@@ -104,6 +104,21 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   EXPECT_EQ(Metric("terrace_http_transfers_cut_total"), "0");
 }
 
+TEST_F(Limits, AReaderThatLeavesWhileItsReplyWaitsIsNotRefused) {
+  MakeTilesLarge();
+  ServerOptions options;
+  options.config.transfer_bytes = std::size_t{4} << 20;  // one for replies of this size
+  Start(options);
+  RawClient slow(port(), 4096), waiting(port(), 4096);
+  slow.Send(Get(Tile(0)));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "1048576"; }));
+  waiting.Send(Get(Tile(1)));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfers_waiting") == "1"; }));
+  waiting.Reset();
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/metrics").body.find(R"(status="499")") != std::string::npos; }));
+  EXPECT_EQ(Fetch(port(), "/metrics").body.find(R"(status="503")"), std::string::npos);
+}
+
 // The reply is larger than the whole budget, so it does not count in it. A client that does not read it does not block
 // others.
 TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
