@@ -436,6 +436,11 @@ TEST_F(Limits, BelievesTrustedProxiesAlone) {
   const Reply reply = Fetch(port(), "/maui/tiles.json", said);
   EXPECT_NE(reply.body.find("\"https://maps.example/maui/"), std::string::npos) << reply.body;
   EXPECT_NE(reply.Field("vary").find("X-Forwarded-Host, X-Forwarded-Proto"), std::string::npos);
+  // A reload does not change which proxies are trusted, nor what the reply varies by.
+  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  const Reply reloaded = Fetch(port(), "/maui/tiles.json", said);
+  EXPECT_EQ(reloaded.body, reply.body);
+  EXPECT_EQ(reloaded.Field("vary"), reply.Field("vary"));
 }
 
 TEST_F(Limits, TheHostOfATargetCountsBeforeHost) {
