@@ -60,7 +60,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     const RouteRow& row = *context_.route.row;
     admission.depends_on_token = admission_control.DependsOnToken(context_);
     if (row.takes_post()) {
-      admission.max_body_bytes = row.max_body_bytes(application_.max_locations_);
+      admission.max_body_bytes = row.max_body_bytes(application_.started_.max_locations);
       admission.body_remedy = "the limit follows from max_locations of this server: send fewer at once";
     }
     return admission;
@@ -165,16 +165,15 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
 }
 
 TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
-    : parts_(std::move(parts)),
-      max_locations_(config.max_locations),
-      deadline_(config.request_deadline),
-      opening_(catalog == nullptr) {
+    : parts_(std::move(parts)), started_(config), deadline_(config.request_deadline), opening_(catalog == nullptr) {
   handlers_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
 
-// Bodies are admitted by the limit of locations at the start, so it does not change.
+// Admission uses the limit of locations and the proxies of the start. Replies must agree with it.
 TerrainApplication::HandlersPtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
-  config.max_locations = max_locations_;
+  config.max_locations = started_.max_locations;
+  config.trusted_proxies = started_.trusted_proxies;
+  config.forwarded_header = started_.forwarded_header;
   return std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
 }
 

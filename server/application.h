@@ -82,7 +82,7 @@ class TerrainApplication final : public Application, public ProcessState {
   std::uint64_t replaced_ = 0;
   std::map<std::string, std::string> problems_;
   std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets
-  const std::size_t max_locations_;
+  const config::Config started_;                                                // the configuration at the start
   std::atomic<std::chrono::milliseconds> deadline_;
   std::atomic<bool> opening_;  // the first catalog has not come
 };

@@ -55,6 +55,9 @@ Result<SourceConfig> ExpandSource(const std::string& written, const std::filesys
   if (status != 0) return MakeError(ErrorCode::kUnavailable, "a folder on the way is missing or cannot be read");
   SourceConfig source(pattern.string());
   source.files.assign(matches.gl_pathv, matches.gl_pathv + matches.gl_pathc);
+  std::erase_if(source.files, [&](const std::string& match) { return std::filesystem::is_directory(match, ignored); });
+  if (source.files.empty())
+    return MakeError(ErrorCode::kNotFound, "only folders match; for the files in them, end the glob with /*");
   std::sort(source.files.begin(), source.files.end());  // glob itself would sort by locale
   return source;
 }

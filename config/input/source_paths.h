@@ -11,7 +11,7 @@ namespace terrace::config {
 
 // Relative paths are relative to `directory`. A path without *, ? and [, or a path that exists literally, is one file.
 // It need not exist: the error of opening it will be more specific. A glob becomes the files that match it, and a
-// folder the files in it except hidden ones, in byte order. kNotFound: nothing matches, or the folder is empty.
+// folder the files in it except hidden ones, in byte order. kNotFound: no file matches, or the folder is empty.
 // kUnavailable: a folder is missing or cannot be read.
 Result<SourceConfig> ExpandSource(const std::string& written, const std::filesystem::path& directory);
 

@@ -194,11 +194,12 @@ Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
   response.content_type = ContentTypeOf(query->format);
   response.content_encoding = tiler::NameOf(coding);
   if (!is_image) response.vary = "Accept-Encoding";
-  // The version does not cover the geoid grid that orthometric heights depend on.
-  const bool is_versioned = query->datum == dem::HeightDatum::kEllipsoid;
-  response.cache_control =
-      is_versioned ? CacheControlOf(context.route.query, view, handlers.cache_control) : handlers.cache_control;
-  response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
+  response.cache_control = handlers.cache_control;
+  // The generation does not cover the geoid grid that orthometric heights depend on.
+  if (query->datum == dem::HeightDatum::kEllipsoid) {
+    response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
+    response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
+  }
   if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   auto shared = std::make_shared<const GridQuery>(*std::move(query));
   return MakeGrid(handlers, context, *dataset, std::move(shared), coding, std::move(response));

@@ -98,12 +98,12 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;
   if (request.method != Method::kPost) {
-    // The version covers neither the geoid grid that orthometric heights depend on nor certified errors.
+    // The generation covers neither the geoid grid that orthometric heights depend on, nor the program that certified
+    // errors depend on.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
-    response.cache_control =
-        is_versioned ? CacheControlOf(context.route.query, view, handlers.cache_control) : handlers.cache_control;
-    // Certified errors depend on the program, not only on the data.
-    if (!parsed->certify_level) {
+    response.cache_control = handlers.cache_control;
+    if (is_versioned) {
+      response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
       response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
     }
     if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);

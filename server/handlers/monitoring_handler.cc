@@ -71,8 +71,9 @@ Answer AnswerReady(const Handlers& handlers, const RequestContext& context) {
     } else if (dataset.empty()) {
       text += "the configuration file is wrong, the last good one is in force\n";
     } else {
-      text += fmt::format("dataset{}: cannot be opened as its files are now; the log has the reason\n",
-                          context.sees_all() ? " " + dataset : "");
+      text += fmt::format(
+          "dataset{}: {}\n", context.sees_all() ? " " + dataset : "",
+          reason == kReopening ? kReopening : "cannot be opened as its files are now; the log has the reason");
     }
   }
   for (const PendingDataset& dataset : pending) {

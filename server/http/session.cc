@@ -137,7 +137,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<Response> Await(asio::awaitable<Response> answer);
   Response Failed(const std::exception& exception) const;
   asio::awaitable<void> Interrupted();
-  asio::awaitable<std::optional<TransferBudget::Hold>> RoomLater(Response& response);
+  using MaybeRoom = std::optional<TransferBudget::Hold>;
+  asio::awaitable<std::optional<MaybeRoom>> RoomLater(Response& response);
   TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
   bool SendsBody(const Response& response) const;
   Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
@@ -259,7 +260,8 @@ asio::awaitable<bool> Session::ReceiveBody() {
     upload.client = request.client;
     upload.holder = weak_from_this();
     auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(upload), Deadline()));
-    if (!room || !*room) {
+    if (!room) co_return co_await GiveUp();
+    if (!*room) {
       co_await RefuseUpload();
       co_return false;
     }
@@ -364,9 +366,9 @@ TransferBudget::HoldRequest Session::HoldRequestOf(const Response& response) con
 }
 
 // Releases the reply's body, waits for memory, and makes the reply again, usually from a cache: a waiting body must not
-// occupy the memory that it waits for. Returns nothing if there was no memory before the deadline, or if the client is
-// gone.
-asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response& response) {
+// occupy the memory that it waits for. Returns no room if there was no memory before the deadline, and nothing as
+// WhileConnected.
+asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& response) {
   for (;;) {
     TransferBudget::HoldRequest hold_request = HoldRequestOf(response);
     const std::size_t bytes = hold_request.bytes;
@@ -374,9 +376,8 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     Response bare;  // its lines share ownership with the body
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    auto waited = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), Deadline()));
-    if (!waited || !*waited) co_return std::nullopt;
-    std::optional<TransferBudget::Hold> room = *std::move(waited);
+    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), Deadline()));
+    if (!room || !*room) co_return room;
     Answer again = Handle();
     if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {
       std::optional<Response> made = co_await WhileConnected(Await(std::move(*later)));
@@ -386,7 +387,7 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
     response = std::get<Response>(std::move(again));
     response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
     if (SendsBody(response) && response.body->size() > bytes) continue;  // the dataset may have changed
-    room->Keep(response.body);
+    (*room)->Keep(response.body);
     co_return room;
   }
 }
@@ -396,13 +397,17 @@ asio::awaitable<std::optional<TransferBudget::Hold>> Session::RoomLater(Response
 asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again) {
   const Request& request = exchange_.request;
   if (can_respond_again) response.depends_on_token = response.depends_on_token || exchange_.admission.depends_on_token;
-  std::optional<TransferBudget::Hold> room;
+  MaybeRoom room;
   if (!SendsBody(response) || response.body->size() <= TransferBudget::kFreeBytes) {
     room.emplace();
   } else {
     room = context_->transfers->TryHold(HoldRequestOf(response));
   }
-  if (!room && can_respond_again) room = co_await RoomLater(response);
+  if (!room && can_respond_again) {
+    std::optional<MaybeRoom> later = co_await RoomLater(response);
+    if (!later) co_return co_await GiveUp();
+    room = *std::move(later);
+  }
   if (!room) {
     Response::Labels labels = std::move(response.labels);
     response = Overloaded("too many replies are on their way", request.id);

@@ -16,7 +16,7 @@ void Wake(WaiterPtr waiter) {
   while (WaiterPtr here = timer.lock()) {
     try {
       return asio::post(executor, [waiter = std::move(here)] { waiter->cancel(); });
-    } catch (const std::exception&) {  // no memory; the waiter then waits until its deadline
+    } catch (const std::exception&) {  // no memory: tries again while the waiter is there
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
   }

@@ -134,7 +134,8 @@ constexpr PathNote kPathNotes[] = {
 };
 
 constexpr HeaderNote kHeaderNotes[] = {
-    {"ETag", "Strong; of the coding that was sent", R"({"type":"string","pattern":"^\"[0-9a-f]+\"$"})"},
+    {"ETag", "Strong; of the coding that was sent. Orthometric heights and certified errors have none",
+     R"({"type":"string","pattern":"^\"[0-9a-f]+\"$"})"},
     {"Cache-Control", "How long the reply may be cached", R"({"type":"string"})"},
     {"Vary", "The request's headers that the reply depends on", R"({"type":"string"})"},
     {"Terrain-Max-Error", "The tile's or mesh's error in metres, measured and rounded up",

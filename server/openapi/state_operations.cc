@@ -16,17 +16,18 @@ const Operation kLiveOperation{.id = "getLive",
                                .headers = kStateHeaders,
                                .examples = {{"/livez"}}};
 
-const Operation kReadyOperation{.id = "getReady",
-                                .tag = "monitoring",
-                                .summary = "Readiness",
-                                .description =
-                                    "`ready`, or `degraded` if a changed source or configuration cannot be loaded, or "
-                                    "while a dataset is being prepared and others are served. 503: `opening` while the "
-                                    "server starts or prepares all that it has, `draining` while it stops.",
-                                .replies = kPlainText,
-                                .unavailable = kPlainText,
-                                .headers = kStateHeaders,
-                                .examples = {{"/readyz"}}};
+const Operation kReadyOperation{
+    .id = "getReady",
+    .tag = "monitoring",
+    .summary = "Readiness",
+    .description =
+        "`ready`, or `degraded` if a changed source or configuration cannot be loaded, if a dataset is still being "
+        "reopened after 10 s, or while a dataset is being prepared and others are served. 503: `opening` while the "
+        "server starts or prepares all that it has, `draining` while it stops.",
+    .replies = kPlainText,
+    .unavailable = kPlainText,
+    .headers = kStateHeaders,
+    .examples = {{"/readyz"}}};
 
 const Operation kMetricsOperation{.id = "getMetrics",
                                   .tag = "monitoring",

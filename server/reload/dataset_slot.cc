@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "server/tiles/catalog.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::server {
@@ -21,7 +22,7 @@ constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
 constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
 // Delay between openings for what the cache folder has lost; doubled each time. The loss may recur.
 constexpr std::chrono::minutes kFirstRecovery{1}, kLastRecovery{60};
-// A replacement that takes longer than this is reported as a problem.
+// A replacement that takes longer than this is reported as kReopening.
 constexpr std::chrono::seconds kPatience{10};
 // Opening a large source keeps a processor busy: building tiles has priority.
 constexpr int kNiceness = 10;
@@ -82,11 +83,10 @@ DatasetSlot::DatasetSlot(config::DatasetConfig wanted, std::future<Result<tiler:
 
 DatasetSlot::~DatasetSlot() { stop_opening_.request_stop(); }
 
-std::string DatasetSlot::Problem() const {
+std::string DatasetSlot::Problem(Clock::time_point now) const {
   const bool is_tried_again = !serving_ && is_opening();
   if (!problem_.empty() && !is_tried_again) return problem_;
-  if (serving_ && stale_since_ && Clock::now() - *stale_since_ > kPatience)
-    return "its source changes and is not complete yet";
+  if (serving_ && stale_since_ && now - *stale_since_ > kPatience) return kReopening;
   return {};
 }
 

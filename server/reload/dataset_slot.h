@@ -41,8 +41,9 @@ class DatasetSlot {
   // Whether nothing is left to open: the wanted dataset is served, or the last attempt to open it failed.
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
 
-  // The problem, for people; empty: there is none, or it is too recent.
-  std::string Problem() const;
+  // The problem, for people: why the last attempt failed, or kReopening if the wanted dataset is not open some time
+  // after the change was seen. Empty: there is none.
+  std::string Problem(Clock::time_point now) const;
 
   // Changes the wanted configuration. The old dataset is served until the new one is open.
   void Want(config::DatasetConfig wanted);

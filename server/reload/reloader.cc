@@ -242,7 +242,7 @@ void Reloader::ReportProblems() {
   std::map<std::string, std::string> problems;
   if (!config_problem_.empty()) problems.emplace("", config_problem_);
   for (const DatasetSlot& slot : slots_) {
-    if (std::string problem = slot.Problem(); !problem.empty())
+    if (std::string problem = slot.Problem(Clock::now()); !problem.empty())
       problems.emplace(slot.wanted().name, std::move(problem));
   }
   if (problems == reported_) return;

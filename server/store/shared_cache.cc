@@ -116,8 +116,8 @@ class SharedCache final : public tiler::TileStore {
   }
 
   // If another server builds the tile, waits for it, at most for the time of a lease. Returns nothing if this server is
-  // to build it. After a wait in vain there are no others for a while: if Redis says of every lease that it is held, or
-  // many servers are killed, a wait in ten lease times is lost and not one for each tile.
+  // to build it. After a wait in vain, this server takes no leases for ten lease times. Otherwise, if every lease seems
+  // held, it would wait once for each tile.
   std::optional<tiler::EncodedTile> AwaitOther(const std::string& record_key) {
     using Clock = std::chrono::steady_clock;
     if (Clock::now().time_since_epoch().count() < no_leases_until_) return std::nullopt;

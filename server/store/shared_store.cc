@@ -202,12 +202,26 @@ void SharedStore::Enqueue(Job job) {
 }
 
 SharedStore::Lease SharedStore::Take(const std::string& key, milliseconds time) {
+  const auto end = Clock::now() + time;  // not after its end in Redis
   const auto reply = Ask({"SET", LeaseOf(key), "1", "NX", "PX", std::to_string(time.count())});
   if (!reply) return Lease::kNone;
-  return reply->is_nil() ? Lease::kHeld : Lease::kTaken;
+  if (reply->is_nil()) return Lease::kHeld;
+  const std::lock_guard lock(mutex_);
+  leases_[key] = end;
+  return Lease::kTaken;
 }
 
-void SharedStore::Release(const std::string& key) { Enqueue({LeaseOf(key), nullptr, {}, 0}); }
+void SharedStore::Release(const std::string& key) {
+  {
+    const std::lock_guard lock(mutex_);
+    const auto lease = leases_.find(key);
+    if (lease == leases_.end()) return;
+    const bool has_ended = Clock::now() >= lease->second;
+    leases_.erase(lease);
+    if (has_ended) return;
+  }
+  Enqueue({LeaseOf(key), nullptr, {}, 0});
+}
 
 Result<std::size_t> SharedStore::Erase(const std::string& prefix,
                                        const std::function<bool(std::string_view key)>& is_chosen,

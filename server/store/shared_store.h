@@ -26,6 +26,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -69,6 +70,7 @@ class SharedStore {
   // Redis refuses writes; do not wait.
   enum class Lease { kTaken, kHeld, kNone };
   Lease Take(const std::string& key, std::chrono::milliseconds time);
+  // Has an effect only on a lease that this store has taken and that has not ended: another one is another server's.
   void Release(const std::string& key);
 
   // Erases the values whose keys begin with `prefix` and that `is_chosen` accepts, also those that wait to be written.
@@ -128,6 +130,7 @@ class SharedStore {
   Clock::time_point retry_at_, write_at_;  // earliest time of the next attempt to connect, to write
   std::list<Job> queue_;
   std::size_t queued_bytes_ = 0;
+  std::unordered_map<std::string, Clock::time_point> leases_;  // taken and not released, by key: when they end
   bool stop_ = false, abandoned_ = false;
   bool is_writing_ = false;                      // the store's thread has a batch
   std::vector<std::string> reported_;            // the reasons in the log since reported_at_

@@ -85,11 +85,11 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
 }
 
 prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
-  prometheus::MetricFamily family{
-      "terrace_source_samples_total",
-      "Samples read for tiles: measured, small voids filled from their edges, and voids where others show",
-      kCounter,
-      {}};
+  prometheus::MetricFamily family{"terrace_source_samples_total",
+                                  "Samples read for tiles: measured, small voids filled from their edges, and voids "
+                                  "left to other sources or the floor",
+                                  kCounter,
+                                  {}};
   if (pipeline == nullptr) return family;
   for (const tiler::Dataset& dataset : pipeline->datasets()) {
     if (!dataset.source) continue;
@@ -323,10 +323,10 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
   AddCaches(tiers, in_memory, all);
   add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
       tiles.joined);
-  add(kCounter, "terrace_builds_refused_total", "Tile requests for which the queue had no room", tiles.refused);
+  add(kCounter, "terrace_builds_refused_total", "Tile requests refused as overloaded", tiles.refused);
   all.push_back(StoreTimes(tiles, state));
-  add(kGauge, "terrace_flights", "Builds under way or waiting", tiles.in_flight);
-  add(kGauge, "terrace_queue_length", "Builds that wait for a worker", tiles.queued);
+  add(kGauge, "terrace_flights", "Jobs under way or waiting", tiles.in_flight);
+  add(kGauge, "terrace_queue_length", "Jobs that wait for a worker", tiles.queued);
   add(kGauge, "terrace_http_connections", "Open connections", state.connections);
   add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.refused_connections);
   add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.transfers.held_bytes);

@@ -72,6 +72,10 @@ struct Catalog {
 };
 using CatalogPtr = std::shared_ptr<const Catalog>;
 
+// The problem of a dataset whose reopening takes long, as clients see it. Other problems of datasets contain file
+// names.
+inline constexpr const char* kReopening = "is being reopened; cached tiles are still served";
+
 CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending = {});
 
 // Also false for keys outside the tiling scheme.

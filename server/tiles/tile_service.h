@@ -86,7 +86,7 @@ class TileService {
 
   struct Stats {
     std::uint64_t hits = 0, misses = 0, joined = 0;
-    std::uint64_t refused = 0;                           // builds for which the queue had no room
+    std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
     std::size_t queued = 0, in_flight = 0;
     tiler::ByteCacheStats cache;

@@ -122,6 +122,12 @@ class SeedCache(unittest.TestCase):
         found, built = self.crawl(config)
         self.assertEqual((built, {tier for tier, _ in found.values()}), (0, {"disk"}))
 
+    def test_a_folder_of_any_name(self):
+        config, cache = self.config('a "cache" \\ of tiles')
+        seeded = self.seed(config, cache, levels=1)
+        self.assertEqual(seeded.returncode, 0, seeded.stderr)
+        self.assertEqual(json.loads(seeded.stdout.splitlines()[-1])["cache"], str(cache))
+
     def test_one_coding(self):
         config, cache = self.config("cache")
         self.assertEqual(self.seed(config, cache, "--codings", "br").returncode, 0)

@@ -39,6 +39,17 @@ TEST_F(SourcePaths, ExpandsGlobsInByteOrder) {
   EXPECT_THAT(ExpandSource("[a-b].tif", folder_)->files, ElementsAre(In("a.tif"), In("b.tif")));
 }
 
+TEST_F(SourcePaths, GlobsLeaveFoldersOut) {
+  std::ofstream(folder_ / "d.zip") << '\n';
+  const auto files = ExpandSource("[abd]*", folder_);  // "deep" is a folder
+  ASSERT_TRUE(files) << files.error().message;
+  EXPECT_THAT(files->files, ElementsAre(In("a.tif"), In("b.tif"), In("d.zip")));
+  const auto none = ExpandSource("d*p/", folder_);
+  ASSERT_FALSE(none);
+  EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(none.error().message, "only folders match; for the files in them, end the glob with /*");
+}
+
 TEST_F(SourcePaths, TakesAFileWhoseNameLooksLikeAGlobAsItIs) {
   EXPECT_THAT(ExpandSource("tile[1].tif", folder_)->files, ElementsAre(In("tile[1].tif")));
 }

@@ -350,10 +350,15 @@ class SharedCache(unittest.TestCase):
         redis = self.redis()
         node = self.node(redis.port, lease_ms=300)
         self.fill(redis, node)
-        for key in redis.keys()[:5]:
-            redis.ask(b"SET", key.replace(b"terrace:tile:", b"terrace:lease:"), b"1")  # of nobody, and without an end
+        keys = redis.keys()[:5]
+        leases = [key.replace(b"terrace:tile:", b"terrace:lease:") for key in keys]
+        for key, lease in zip(keys, leases):
+            redis.ask(b"SET", lease, b"1")  # of nobody, and without an end
             redis.ask(b"DEL", key)
         self.assertEqual(self.bodies_of(node), self.truth)
+        self.wait_for(lambda: len(redis.keys()) == TILES, "tiles are not written")
+        time.sleep(0.2)
+        self.assertEqual([redis.ask(b"GET", lease) for lease in leases], [b"1"] * 5, "a lease of another is released")
 
     def test_leases_that_are_always_held_cost_one_wait_now_and_then(self):
         redis = self.redis()

@@ -263,6 +263,19 @@ TEST_F(Uploads, ThatAreDisplacedAreTold) {
   EXPECT_EQ(StatusOf(answered), 200);
 }
 
+TEST_F(Uploads, ThatLeaveWhileTheyWaitAreNotRefused) {
+  ServerOptions options;
+  options.config.transfer_bytes = std::size_t{6} << 20;  // two uploads
+  StartHeld(options);
+  for (int i = 0; i < 2; ++i) Send(Large(From("192.0.2.1")));
+  ASSERT_TRUE(HaveBegun(2));
+  RawClient& waiting = Send(Begun(20'000, From("192.0.2.1")));
+  ASSERT_TRUE(Eventually([&] { return Gauge("terrace_http_transfers_waiting") == 1; }));
+  waiting.Reset();
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/metrics").body.find(R"(status="499")") != std::string::npos; }));
+  EXPECT_EQ(Fetch(port(), "/metrics").body.find(R"(status="503")"), std::string::npos);
+}
+
 TEST_F(Uploads, ThatLeaveStayWithinTheirRoom) {
   StartHeld();
   for (int i = 0; i < 2; ++i) Send(Get(Tile(i)));  // the workers are busy

@@ -104,6 +104,21 @@ TEST_F(Limits, SlowReadersOfOneClientAreAllServedInTheEnd) {
   EXPECT_EQ(Metric("terrace_http_transfers_cut_total"), "0");
 }
 
+TEST_F(Limits, AReaderThatLeavesWhileItsReplyWaitsIsNotRefused) {
+  MakeTilesLarge();
+  ServerOptions options;
+  options.config.transfer_bytes = std::size_t{4} << 20;  // one for replies of this size
+  Start(options);
+  RawClient slow(port(), 4096), waiting(port(), 4096);
+  slow.Send(Get(Tile(0)));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfer_bytes") == "1048576"; }));
+  waiting.Send(Get(Tile(1)));
+  ASSERT_TRUE(Eventually([&] { return Metric("terrace_http_transfers_waiting") == "1"; }));
+  waiting.Reset();
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/metrics").body.find(R"(status="499")") != std::string::npos; }));
+  EXPECT_EQ(Fetch(port(), "/metrics").body.find(R"(status="503")"), std::string::npos);
+}
+
 // The reply is larger than the whole budget, so it does not count in it. A client that does not read it does not block
 // others.
 TEST_F(Limits, AnOversizedReplyThatIsNotTakenMakesRoomForAnothers) {
@@ -238,6 +253,8 @@ TEST_F(Limits, NamesDatasetsWithProblemsToThoseWhoMaySeeThem) {
             "degraded\ndataset: cannot be opened as its files are now; the log has the reason\n");
   EXPECT_EQ(Fetch(port(), "/readyz", std::string("Authorization: Bearer ") + kAll + "\r\n").body,
             "degraded\ndataset maui: cannot be opened as its files are now; the log has the reason\n");
+  server_->SetProblems({{"maui", kReopening}});
+  EXPECT_EQ(Fetch(port(), "/readyz").body, "degraded\ndataset: is being reopened; cached tiles are still served\n");
 }
 
 TEST_F(Limits, CountsTheClientsBehindAProxyEachByItself) {
@@ -419,6 +436,11 @@ TEST_F(Limits, BelievesTrustedProxiesAlone) {
   const Reply reply = Fetch(port(), "/maui/tiles.json", said);
   EXPECT_NE(reply.body.find("\"https://maps.example/maui/"), std::string::npos) << reply.body;
   EXPECT_NE(reply.Field("vary").find("X-Forwarded-Host, X-Forwarded-Proto"), std::string::npos);
+  // A reload does not change which proxies are trusted, nor what the reply varies by.
+  ASSERT_TRUE(server_->Replace(MakeCatalog(), {}));
+  const Reply reloaded = Fetch(port(), "/maui/tiles.json", said);
+  EXPECT_EQ(reloaded.body, reply.body);
+  EXPECT_EQ(reloaded.Field("vary"), reply.Field("vary"));
 }
 
 TEST_F(Limits, TheHostOfATargetCountsBeforeHost) {

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <stop_token>
 #include <system_error>
 #include <utility>
@@ -22,6 +23,7 @@
 namespace terrace::cli {
 namespace {
 
+using Json = nlohmann::ordered_json;
 using tiler::CacheKey;
 
 // The cache that is filled.
@@ -138,8 +140,9 @@ int ReportSeed(const BakeArguments& arguments, const Seed& seed, const bake::Uni
     std::fprintf(stderr, "terrace: unit %s failed: %s\n", report.entry.name.c_str(), report.message.c_str());
   }
   if (arguments.json) {
-    fmt::print("{{\"cache\":\"{}\",\"complete\":{},\"tiles\":{},\"built_tiles\":{},\"kept_tiles\":{},\"bytes\":{}}}\n",
-               folder, is_whole, plan.tiles, built, kept, counters.bytes.load());
+    const Json json = {{"cache", folder},      {"complete", is_whole}, {"tiles", plan.tiles},
+                       {"built_tiles", built}, {"kept_tiles", kept},   {"bytes", counters.bytes.load()}};
+    fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
   } else {
     fmt::print("{}: {} tiles: {} built ({}), {} were there\n", folder, Grouped(plan.tiles), Grouped(built),
                Bytes(static_cast<double>(counters.bytes)), Grouped(kept));

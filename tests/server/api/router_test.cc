@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "config/options/option_table.h"
 #include "server/api/tile_formats.h"
 #include "server/http/text.h"
 #include "server/routes.h"
@@ -201,9 +202,14 @@ TEST(Router, RefusesMalformedTargets) {
 }
 
 TEST(Router, ReservesTheNamesOfItsOwnUrls) {
-  for (const char* name : {"datasets", "viewer", "livez", "readyz", "metrics", "openapi.json"}) {
-    EXPECT_TRUE(Routes().IsReserved(name)) << name;
+  std::set<std::string> own;
+  for (const DocumentedUrl& url : DocumentedUrls()) {
+    const std::string first = url.pattern.substr(1, url.pattern.find('/', 1) - 1);
+    if (!first.empty() && first.find('{') == std::string::npos) own.insert(first);
   }
+  const auto reserved = config::ReservedDatasetNames();
+  EXPECT_EQ(own, std::set<std::string>(reserved.begin(), reserved.end())) << "see config/options/dataset_name.cc";
+  for (const std::string& name : own) EXPECT_TRUE(Routes().IsReserved(name)) << name;
   for (const char* name : {"maui", "", "layer.json", "{dataset}"}) EXPECT_FALSE(Routes().IsReserved(name)) << name;
 }
 

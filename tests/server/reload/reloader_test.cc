@@ -13,6 +13,7 @@
 #include <thread>
 #include <utility>
 
+#include "server/tiles/catalog.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::server {
@@ -193,6 +194,22 @@ TEST_F(ReloaderTest, ReportsProblemsAndMendsThem) {
   Put("a");
   ASSERT_TRUE(Eventually([&] { return Problems().empty(); }));
   EXPECT_NE(Served(), before);
+}
+
+TEST_F(ReloaderTest, ALongReopeningIsNoFailure) {
+  DatasetSlot slot(config_.datasets[0], *Open(config_.datasets[0], {}));
+  slot.Want(config_.datasets[0]);
+  const auto now = DatasetSlot::Clock::now();
+  EXPECT_EQ(slot.Problem(now), "");
+  EXPECT_EQ(slot.Problem(now + 1min), kReopening);
+  fails_ = true;
+  slot.OpenIfDue(
+      [this](const config::DatasetConfig& wanted, const std::stop_token& stop) { return Open(wanted, stop); });
+  EXPECT_TRUE(Eventually([&] {
+    slot.TakeOpened();
+    return !slot.is_opening();
+  }));
+  EXPECT_EQ(slot.Problem(now + 1min), "no raster");
 }
 
 TEST_F(ReloaderTest, AWrongConfigurationIsAProblemAndNothingElse) {

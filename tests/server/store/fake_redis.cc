@@ -85,6 +85,7 @@ void FakeRedis::Serve(int fd) {
     const std::string_view text(buffer.data(), static_cast<std::size_t>(size));
     const std::uint64_t pings = Count(text, "\r\nPING\r\n"), others = Count(text, "\r\nGETRANGE\r\n");
     const std::uint64_t erased = Count(text, "\r\nUNLINK\r\n"), written = Count(text, "\r\nSET\r\n");
+    const bool is_held = holds_ && Count(text, "\r\nNX\r\n") > 0;
     const bool is_silent = is_silent_ || (drops_ && has_written);
     has_written |= written > 0;
     std::string replies;
@@ -94,10 +95,11 @@ void FakeRedis::Serve(int fd) {
       replies += reply_;
     }
     for (std::uint64_t i = 0; i < erased; ++i) replies += ":1\r\n";
-    for (std::uint64_t i = 0; i < written; ++i) replies += "+OK\r\n";
+    for (std::uint64_t i = 0; i < written; ++i) replies += is_held ? "$-1\r\n" : "+OK\r\n";
     if (!is_silent) ::send(fd, replies.data(), replies.size(), MSG_NOSIGNAL);
     pings_ += pings;
     look_ups_ += others;
+    erased_ += erased;
   }
   const std::lock_guard lock(mutex_);
   std::erase(open_, fd);

@@ -28,12 +28,15 @@ class FakeRedis {
   void Speak() { is_silent_ = false; }
   // Reads and replies nothing on the connections that have written, as when a fire wall has dropped them.
   void DropWriters() { drops_ = true; }
+  // From now on another server has every lease (SET NX).
+  void HoldLeases() { holds_ = true; }
   // Ends one of the connections that are open, or all.
   void CloseOne();
   void CloseAll();
 
   std::uint64_t pings() const { return pings_; }
   std::uint64_t look_ups() const { return look_ups_; }  // GETRANGE
+  std::uint64_t erased() const { return erased_; }      // UNLINK
 
  private:
   void Accept();
@@ -43,7 +46,8 @@ class FakeRedis {
   int listener_ = -1;
   std::atomic<bool> is_silent_{false};
   std::atomic<bool> drops_{false};
-  std::atomic<std::uint64_t> pings_{0}, look_ups_{0};
+  std::atomic<bool> holds_{false};
+  std::atomic<std::uint64_t> pings_{0}, look_ups_{0}, erased_{0};
   std::mutex mutex_;  // of what follows
   std::string reply_;
   std::vector<int> open_;

@@ -158,6 +158,25 @@ TEST(SharedStore, DoesNotWriteOnAConnectionThatWasIdle) {
   EXPECT_EQ(tier.stats().switched_off, 0U);
 }
 
+TEST(SharedStore, ReleasesOnlyItsOwnLeases) {
+  FakeRedis redis;
+  SharedStore tier(OptionsOf(redis, 1));
+  Await([&] { return tier.stats().on; });
+  EXPECT_EQ(tier.Take("own", hours(1)), SharedStore::Lease::kTaken);
+  tier.Release("own");
+  tier.Release("own");  // it has none any more
+  EXPECT_EQ(tier.Take("short", milliseconds(1)), SharedStore::Lease::kTaken);
+  std::this_thread::sleep_for(milliseconds(2));
+  tier.Release("short");  // another server may have it by now
+  redis.HoldLeases();
+  EXPECT_EQ(tier.Take("other", hours(1)), SharedStore::Lease::kHeld);
+  tier.Release("other");
+  tier.Keep(
+      "key", [] { return std::string("value"); }, 5);  // written after all releases
+  Await([&] { return tier.stats().written == 1 && redis.erased() > 0; });
+  EXPECT_EQ(redis.erased(), 1U);
+}
+
 TEST(SharedStore, ComesBackWhenRedisAnswers) {
   FakeRedis redis;
   redis.SetValue(tiler::AddChecksum("key", "value"));
