@@ -19,10 +19,16 @@ std::vector<Position> Outline(double width, double height) {
   return outline;
 }
 
+// Also if the pole is so close that two points of the outline may lie on both sides of it, or beside the raster by
+// rounding.
 bool HoldsPole(const Georeference& georeference, double latitude) {
   Position pole{0, latitude};
   georeference.ToPixels({&pole, 1});
-  return pole.x >= 0 && pole.x <= georeference.width() && pole.y >= 0 && pole.y <= georeference.height();
+  const auto holds = [](double place, int side) {
+    const double margin = std::max(static_cast<double>(side) / kPointsPerSide, 1e-6);
+    return place >= -margin && place <= side + margin;
+  };
+  return holds(pole.x, georeference.width()) && holds(pole.y, georeference.height());
 }
 
 double WrappedTurn(double degrees) { return degrees - 360 * std::round(degrees / 360); }
@@ -36,9 +42,10 @@ Footprint Normalized(Footprint box) {
     box.east = 180;
     return box;
   }
-  const double turns = 360 * std::floor((box.west + 180) / 360);
-  box.west -= turns;
-  box.east -= turns;
+  double west = std::remainder(box.west, 360);  // exact
+  if (west == 180) west = -180;
+  box.east += west - box.west;
+  box.west = west;
   return box;
 }
 

@@ -63,7 +63,7 @@ ProjListPtr OperationsFrom(PJ_CONTEXT* context, const PJ* vertical) {
 }
 
 // The longitude in -180 .. 180, as areas of use and PROJ require.
-double WithinOneTurn(double longitude) { return longitude - 360 * std::floor((longitude + 180) / 360); }
+double WithinOneTurn(double longitude) { return std::remainder(longitude, 360); }
 
 geo::GeoBounds AreaOf(PJ_CONTEXT* context, const PJ* operation) {
   geo::GeoBounds area, told;

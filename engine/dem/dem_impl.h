@@ -71,6 +71,9 @@ class DemSource::Impl {
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
+  // ReplacedHeights::void_cells. `traces`: of this source, for the window.
+  std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
+                                      std::span<const PartTrace> traces) const;
   // The edits that may reach the nodes of a window.
   template <typename NodeGrid>
   std::vector<std::size_t> EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const;

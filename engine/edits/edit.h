@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -102,6 +103,7 @@ struct Edit {
   // within reach of it are band_edges[i] for band_begins[b] <= i < band_begins[b + 1], in the order of rings and edges.
   struct EdgeNumber {
     std::uint32_t ring, edge;
+    friend auto operator<=>(const EdgeNumber&, const EdgeNumber&) = default;
   };
   double bands_from = 0, bands_per_m = 0;
   std::vector<std::size_t> band_begins;

@@ -23,12 +23,12 @@ double TargetError(const Edit& edit, double diagonal_m, double furthest_m) {
 
 }  // namespace
 
-EditError::EditError(const NodeWindow& window, double error_m) : window_(window), before_(error_m) {
+EditErrorBound::EditErrorBound(const NodeWindow& window, double error_m) : window_(window), before_(error_m) {
   cells_.assign(Area(window.columns - 1, window.rows - 1), -1);
 }
 
-void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
-                    double tau_m) {
+void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
+                         const ReplacedHeights* replacement) {
   const auto stride = static_cast<std::size_t>(part.columns);
   for (int j = 0; j + 1 < part.rows; ++j) {
     for (int i = 0; i + 1 < part.columns; ++i) {
@@ -36,7 +36,10 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
       const std::array<const EditedNode*, 4> corners = {&nodes[at], &nodes[at + 1], &nodes[at + stride],
                                                         &nodes[at + stride + 1]};
       double nearest = std::numeric_limits<double>::infinity(), furthest = 0, difference = 0;
-      bool is_above = false, is_below = false, is_partial = false;
+      const std::size_t cell = Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i);
+      bool is_above = false, is_below = false;
+      bool is_partial =
+          replacement != nullptr && !replacement->void_cells.empty() && replacement->void_cells[cell] != 0;
       for (const EditedNode* node : corners) {
         const double distance = node->place.distance_m;
         nearest = std::min(nearest, distance);
@@ -58,9 +61,10 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
       const double high_weight = edit.WeightAt(std::max(nearest - diagonal_m / 2, 0.0));
       const double low_weight = is_partial ? 0 : edit.WeightAt(furthest + diagonal_m / 2);
       if (high_weight <= 0) continue;
-      double& error = cells_[Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i)];
+      double& error = cells_[cell];
       const double before = error < 0 ? before_ : error;
-      const double tau = edit.op == EditOp::kReplace ? tau_m : TargetError(edit, diagonal_m, furthest + diagonal_m / 2);
+      const double tau =
+          replacement != nullptr ? replacement->error_m : TargetError(edit, diagonal_m, furthest + diagonal_m / 2);
       const bool one_way = edit.op == EditOp::kCarve || edit.op == EditOp::kRaise;
       const double kept = one_way || edit.op == EditOp::kOffset ? 1 : 1 - low_weight;
       error = kept * before + (high_weight - low_weight) * difference + high_weight * tau;
@@ -69,7 +73,7 @@ void EditError::Add(const Edit& edit, const NodeWindow& part, std::span<const Ed
   }
 }
 
-double EditError::bound() const {
+double EditErrorBound::bound() const {
   constexpr double kRounding = 0x1p-10;  // of edited heights, and of the arithmetic
   double largest = before_;
   for (int j = 1; j + 2 < window_.rows; ++j) {  // without the halo's cells

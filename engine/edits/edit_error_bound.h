@@ -11,6 +11,7 @@
 // w0 is 0, because samples may keep their heights.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -20,6 +21,14 @@
 
 namespace terrace::dem {
 
+// Another source's heights at the nodes of a window; NaN where it has none.
+struct ReplacedHeights {
+  std::vector<float> heights;
+  double error_m = 0;  // of the surface between them, to that source's samples
+  // By cell of the window, row by row from the south: 1 where samples of the source may be voids. Empty: nowhere.
+  std::vector<std::uint8_t> void_cells = {};
+};
+
 // A node as an edit finds it.
 struct EditedNode {
   EditPlace place;
@@ -27,14 +36,14 @@ struct EditedNode {
   double target = 0;  // NaN: unknown, the weight is 0
 };
 
-class EditError {
+class EditErrorBound {
  public:
   // `window`: of a tile with a halo of one. `error_m`: the bound before the edits.
-  EditError(const NodeWindow& window, double error_m);
+  EditErrorBound(const NodeWindow& window, double error_m);
 
-  // `part`: the nodes, relative to the window. `diagonal_m`: of a cell. `tau_m`: of a replacement.
+  // `part`: the nodes, relative to the window. `diagonal_m`: of a cell. `replacement`: of a `replace`, else null.
   void Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
-           double tau_m);
+           const ReplacedHeights* replacement);
 
   double bound() const;
 

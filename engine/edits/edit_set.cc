@@ -82,7 +82,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
   const WindowAxes axes(grid, window);
   const auto stride = static_cast<std::size_t>(window.columns);
   std::vector<double> values(heights.begin(), heights.end());
-  std::optional<EditError> errors;
+  std::optional<EditErrorBound> errors;
   if (error_m != nullptr) errors.emplace(window, *error_m);
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
@@ -93,6 +93,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
       if (!read) return tl::unexpected(std::move(read).error());
       other = *read;
     }
+    const double diagonal_m = std::hypot(axes.step() * edit.plane.east_m, axes.step() * edit.plane.north_m);
     for (const auto& part : axes.PartsOf(edit.reach)) {
       const int columns = part.last_column - part.first_column + 1;
       std::vector<EditedNode> nodes;
@@ -100,7 +101,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
       for (int j = part.first_row; j <= part.last_row; ++j) {
         if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
         const double y = edit.plane.Y(axes.latitude(j));
-        const EditRow row(edit, y);
+        const EditRow row(edit, y, errors ? diagonal_m / 2 : 0);
         for (int i = part.first_column; i <= part.last_column; ++i) {
           const double x = edit.plane.X(axes.longitude(i));
           const EditPlace place = row.At(x);
@@ -121,9 +122,8 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
         }
       }
       if (errors) {
-        const double diagonal = std::hypot(axes.step() * edit.plane.east_m, axes.step() * edit.plane.north_m);
         errors->Add(edit, {part.first_column, part.first_row, columns, part.last_row - part.first_row + 1}, nodes,
-                    diagonal, other != nullptr ? other->error_m : 0);
+                    diagonal_m, other);
       }
     }
   }

@@ -23,12 +23,8 @@
 
 namespace terrace::dem {
 
-// Another source's heights at the nodes of a window; NaN where it has none.
-struct ReplacedHeights {
-  std::vector<float> heights;
-  double error_m = 0;  // of the surface between them, to that source's samples
-};
-// The result stays valid until Apply returns.
+struct ReplacedHeights;
+// The heights that an edit takes from its source. The result stays valid until Apply returns.
 using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
 
 // The row that each edit computed last, by the edit's number. Points on one parallel share it.

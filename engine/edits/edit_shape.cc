@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <numeric>
+#include <span>
 #include <utility>
 
 #include "engine/geo/ellipsoid.h"
@@ -50,16 +51,25 @@ std::size_t BandOf(const Edit& edit, double y, std::size_t bands) {
 
 double EditPlane::X(double lon) const { return std::remainder(lon - longitude, 360.0) * east_m; }
 
-EditRow::EditRow(const Edit& edit, double y) : edit_(edit), y_(y) {
-  const double reach = edit.reach_m();
-  const std::size_t band = BandOf(edit, y, edit.band_begins.size() - 1);
-  for (std::size_t k = edit.band_begins[band]; k < edit.band_begins[band + 1]; ++k) {
-    const auto [r, e] = edit.band_edges[k];
+EditRow::EditRow(const Edit& edit, double y, double margin_m)
+    : edit_(edit), y_(y), reach_m_(edit.reach_m() + margin_m) {
+  const std::size_t bands = edit.band_begins.size() - 1;
+  const std::size_t first = BandOf(edit, y - margin_m, bands), last = BandOf(edit, y + margin_m, bands);
+  std::vector<Edit::EdgeNumber> several;
+  std::span<const Edit::EdgeNumber> numbers(edit.band_edges);
+  numbers = numbers.subspan(edit.band_begins[first], edit.band_begins[last + 1] - edit.band_begins[first]);
+  if (first != last) {  // an edge may be in several bands
+    several.assign(numbers.begin(), numbers.end());
+    std::ranges::sort(several);
+    several.erase(std::unique(several.begin(), several.end()), several.end());
+    numbers = several;
+  }
+  for (const auto& [r, e] : numbers) {
     const auto& ring = edit.rings[r];
     const PlanPoint a = ring[e], b = ring[(e + 1) % ring.size()];
     if (edit.is_area && (a.y <= y) != (b.y <= y)) crossings_.push_back(a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y));
     const auto [low, high] = std::minmax(a.y, b.y);
-    if (y < low - reach || y > high + reach) continue;
+    if (y < low - reach_m_ || y > high + reach_m_) continue;
     const double dx = b.x - a.x, dy = b.y - a.y, length2 = dx * dx + dy * dy;
     edges_.push_back({a, b, length2 > 0 ? 1 / length2 : 0, r, e});
   }
@@ -74,11 +84,10 @@ EditPlace EditRow::At(double x) const {
     return place;
   }
   // Beyond the reach nothing depends on the distance.
-  const double reach = edit_.reach_m();
   double best = std::numeric_limits<double>::infinity();
   for (const Edge& edge : edges_) {
     const auto [west, east] = std::minmax(edge.a.x, edge.b.x);
-    if (x < west - reach || x > east + reach) continue;
+    if (x < west - reach_m_ || x > east + reach_m_) continue;
     const double dx = edge.b.x - edge.a.x, dy = edge.b.y - edge.a.y;
     const double t = std::clamp(((x - edge.a.x) * dx + (y_ - edge.a.y) * dy) * edge.inverse_length2, 0.0, 1.0);
     const double ex = edge.a.x + t * dx - x, ey = edge.a.y + t * dy - y_, square = ex * ex + ey * ey;
@@ -88,7 +97,7 @@ EditPlace EditRow::At(double x) const {
     place.edge = edge.edge;
     place.along = t;
   }
-  place.distance_m = std::isfinite(best) ? std::sqrt(best) : 2 * reach + 1;
+  place.distance_m = std::isfinite(best) ? std::sqrt(best) : 2 * reach_m_ + 1;
   return place;
 }
 

@@ -10,7 +10,7 @@ namespace terrace::dem {
 
 // The nearest point of an edit's outline or line.
 struct EditPlace {
-  double distance_m = 0;   // 0 inside a polygon; beyond the reach any number above the reach
+  double distance_m = 0;   // 0 inside a polygon; beyond the row's reach any number above it
   bool is_inside = false;  // of a polygon
   std::uint32_t ring = 0, edge = 0;
   double along = 0;  // 0 .. 1 on the edge
@@ -19,7 +19,8 @@ struct EditPlace {
 // The points of an edit's plane at one y. Edges beyond the reach of this row are excluded once.
 class EditRow {
  public:
-  EditRow(const Edit& edit, double y);
+  // `margin_m`: is added to the reach, for distances of points that the edit does not reach.
+  EditRow(const Edit& edit, double y, double margin_m = 0);
   EditPlace At(double x) const;
   double y() const { return y_; }
 
@@ -30,7 +31,7 @@ class EditRow {
     std::uint32_t ring, edge;
   };
   const Edit& edit_;
-  double y_;
+  double y_, reach_m_;
   std::vector<double> crossings_;  // of rings, ascending
   std::vector<Edge> edges_;        // within reach of the row
 };

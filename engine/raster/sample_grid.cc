@@ -156,7 +156,10 @@ double GridAxis::Center(std::int64_t index) const {
 }
 
 GridAxis::Location GridAxis::LocateNearEnd(double position) const {
-  auto index = static_cast<std::int64_t>(std::floor(position * per_factor_ - 0.5));
+  // Whole turns first: the last block of each may be smaller than the others.
+  const double turns = wraps_ ? std::floor(position / samples_) : 0;
+  auto index = static_cast<std::int64_t>(std::floor((position - turns * samples_) * per_factor_ - 0.5)) +
+               static_cast<std::int64_t>(turns) * count_;
   // The centre of the last block may be nearer than a whole factor.
   if ((wraps_ || index + 1 < count_) && position >= Center(index + 1)) ++index;
   if (!wraps_) {

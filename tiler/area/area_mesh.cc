@@ -153,7 +153,7 @@ Result<PlacedMesh> PlaceInSpace(const tin::HeightField& field, tin::TinMesh& mes
   const std::size_t every_sample = static_cast<std::size_t>(field.width()) * static_cast<std::size_t>(field.height());
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, every_sample, stop);
   if (!error) return tl::unexpected(error.error());
-  placed.max_error_m = RoundPosition({error->max_m, 0, 0}).x;
+  placed.max_error_m = std::ceil(error->max_m * 1024) / 1024;  // up to the next step of positions
   return placed;
 }
 

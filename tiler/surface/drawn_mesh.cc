@@ -186,22 +186,30 @@ bool DrawnMesh::IsFarFromParallels(const dem::GeoPosition& point) const {
 
 namespace {
 
-// From the plumb line to a triangle that it does not meet, in the plane across the line.
-double DistanceTo(const std::array<geo::Vec3, 3>& triangle, const geo::Vec3& on_line, const geo::Vec3& up) {
+// The point of a triangle that is nearest to a plumb line, which does not meet the triangle.
+struct NearestPoint {
+  double distance_m = std::numeric_limits<double>::infinity();  // in the plane across the line
+  double height_m = 0;                                          // along the line
+};
+
+NearestPoint NearestPointOf(const std::array<geo::Vec3, 3>& triangle, const geo::Vec3& on_line, const geo::Vec3& up) {
   std::array<geo::Vec3, 3> corners;
+  std::array<double, 3> heights;
   for (std::size_t k = 0; k < 3; ++k) {
     const geo::Vec3 from = triangle[k] - on_line;
-    corners[k] = from - up * geo::Dot(from, up);
+    heights[k] = geo::Dot(from, up);
+    corners[k] = from - up * heights[k];
   }
-  double squared = std::numeric_limits<double>::infinity();
+  NearestPoint best;
   for (std::size_t k = 0; k < 3; ++k) {
     const geo::Vec3 start = corners[k], along = corners[(k + 1) % 3] - start;
     const double length = geo::Dot(along, along);
     const double share = length > 0 ? std::clamp(-geo::Dot(start, along) / length, 0.0, 1.0) : 0;
     const geo::Vec3 nearest = start + along * share;
-    squared = std::min(squared, geo::Dot(nearest, nearest));
+    const double distance_m = geo::Length(nearest);
+    if (distance_m < best.distance_m) best = {distance_m, heights[k] + share * (heights[(k + 1) % 3] - heights[k])};
   }
-  return std::sqrt(squared);
+  return best;
 }
 
 // A square of buckets around that of a place, `ring` to each side.
@@ -232,11 +240,11 @@ void DrawnMesh::Meeting::MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line
   mesh.Meet(line, other, *this);
   if (is_met()) return;
   const auto& [a, b, c] = mesh.triangles_[other];
-  const double away_m = DistanceTo({mesh.positions_[a], mesh.positions_[b], mesh.positions_[c]}, line.start, line.up);
+  const auto [away_m, at_m] =
+      NearestPointOf({mesh.positions_[a], mesh.positions_[b], mesh.positions_[c]}, line.start, line.up);
   if (away_m > distance_m || (away_m == distance_m && other >= triangle)) return;
-  const std::optional<Crossing> passed = mesh.Cross(line, other);
-  if (!passed) return;
-  distance_m = away_m, height_m = passed->height_m, triangle = other;
+  if (!mesh.Cross(line, other)) return;
+  distance_m = away_m, height_m = at_m, triangle = other;
 }
 
 void DrawnMesh::Meeting::MeetAll(const DrawnMesh& mesh, const PlumbLine& line) {

@@ -1,5 +1,7 @@
 // A global node has the same bits in every tile.
+#include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstdint>
 
 #include "tests/engine/dem/dem_fixture.h"
@@ -55,6 +57,48 @@ TEST(Borders, AreBitEqualAcrossTheAntimeridian) {
       for (const std::int64_t eighth : {0, 1, 4, 5}) {
         ExpectSameBorders(*source, {level, geo::TileColumns(level) - 1, geo::TileRows(level) * eighth / 8});
       }
+    }
+  }
+}
+
+// The last block of averages has fewer samples than the others, and a hole lies on both sides of the antimeridian.
+TEST(Borders, AreBitEqualWhereAHoleCrossesTheAntimeridian) {
+  const TempDir dir;
+  for (const int columns : {1001, 1002}) {
+    SCOPED_TRACE(columns);
+    const double pixel = 360.0 / columns;
+    RasterSpec spec{.width = columns, .height = 500, .geo_transform = {-180, pixel, 0, 90, 0, -pixel}};
+    spec.nodata = -9999;
+    spec.value = [columns](int column, int row) {
+      if (row >= 100 && row < 400 && (column < 150 || column >= columns - 150)) return -9999.0;
+      const double turn = 2 * 3.14159265358979 * column / columns;
+      return 2000 + 1500 * std::sin(3 * turn + 1) + 1000 * std::sin(row / 40.0) + 300 * std::sin(40 * turn);
+    };
+    const auto source = OpenOrFail(WriteRaster(dir, spec, std::to_string(columns) + ".tif"));
+    ASSERT_NE(source, nullptr);
+    for (int level = 0; level <= source->max_level(); ++level) {
+      for (std::int64_t row = 0; row < geo::TileRows(level);
+           row += std::max<std::int64_t>(1, geo::TileRows(level) / 8)) {
+        ExpectSameBorders(*source, {level, geo::TileColumns(level) - 1, row});
+      }
+    }
+  }
+}
+
+// The pole is the corner of a polar raster up to rounding.
+TEST(Borders, AreBitEqualWhereARasterEndsAtThePole) {
+  const TempDir dir;
+  const std::string base = WriteRaster(dir, FlatSquare(-180, 90, 180, 1, 0), "base.tif");
+  const std::string east = WriteRaster(dir, FlatSquare(0, 90, 180, 1, 0), "east.tif");
+  constexpr double kPixel = 19999.1, kSide = kPixel * 60;
+  RasterSpec spec{.width = 60, .height = 60, .geo_transform = {-kSide, kPixel, 0, kSide, 0, -kPixel}};
+  spec.crs = "EPSG:3031";
+  spec.value = [](int, int) { return 3000.0; };
+  const auto source = OpenOrFail({{WriteRaster(dir, spec, "polar.tif"), 0}, {base, 1}, {east, 1}});
+  ASSERT_NE(source, nullptr);
+  for (int level = 2; level <= 5; ++level) {
+    for (std::int64_t column = 0; column < geo::TileColumns(level); ++column) {
+      ExpectSameBorders(*source, {level, column, 0});
     }
   }
 }

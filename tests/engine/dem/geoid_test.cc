@@ -55,6 +55,12 @@ TEST(Geoid, IsFoundForACentreBeyondTheAntimeridian) {
   EXPECT_EQ((*beyond)->Undulation({190, 20}), (*beyond)->Undulation({-170, 20}));
 }
 
+// The centre of a raster from 0 to 360 degrees, up to rounding. No other test uses this text.
+TEST(Geoid, IsFoundForACentreJustBeforeTheAntimeridian) {
+  const auto geoid = Geoid::OfCrs("EPSG:9707", {std::nextafter(180.0, 0.0), 20});
+  EXPECT_TRUE(geoid) << geoid.error().message;
+}
+
 TEST(Geoid, Egm96EqualsCs2csAtNamedPlaces) {
   for (const auto& [name, degrees] : kPlaces) {
     const auto geoid = Geoid::OfCrs("EPSG:5773", degrees);

@@ -1,0 +1,87 @@
+// The error of tiles where an edit changes samples between the nodes.
+#include <cmath>
+#include <cstdint>
+
+#include "tests/engine/dem/edits_fixture.h"
+
+namespace terrace::dem {
+namespace {
+
+// The distance of a sample of the source from the surface between the nodes of a tile.
+double DistanceAt(const TileHeights& tile, const geo::TileKey& key, const GeoPosition& at, double height) {
+  const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
+  const double x = ((at.longitude + 180) / side - static_cast<double>(key.x)) * tile.lattice.cells;
+  const double y = ((at.latitude + 90) / side - static_cast<double>(key.y)) * tile.lattice.cells;
+  const int i = static_cast<int>(x), j = static_cast<int>(y);
+  const double u = x - i, v = y - j;
+  const double south = (1 - u) * tile.At(i, j) + u * tile.At(i + 1, j);
+  const double north = (1 - u) * tile.At(i, j + 1) + u * tile.At(i + 1, j + 1);
+  return std::abs((1 - v) * south + v * north - height);
+}
+
+class EditErrors : public TerrainEdits {
+ protected:
+  // Expects that the error of the tiles at a position covers the sample there. Returns the largest distance found.
+  static double ExpectCovered(const DemSource& source, const GeoPosition& at, int first, int last) {
+    const double height = At(source, at.longitude, at.latitude);
+    double largest = 0;
+    for (int level = first; level <= last; ++level) {
+      const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+      const geo::TileKey key{level, static_cast<std::int64_t>((at.longitude + 180) / side),
+                             static_cast<std::int64_t>((at.latitude + 90) / side)};
+      const auto tile = source.Read(key);
+      EXPECT_TRUE(tile.has_value());
+      if (!tile) return 0;
+      const double distance = DistanceAt(*tile, key, at, height);
+      EXPECT_GE(tile->source_error_m, distance) << level;
+      largest = std::max(largest, distance);
+    }
+    return largest;
+  }
+};
+
+// A void that is open to the north, so that it is not a hole, and narrower than a cell of coarse levels.
+TEST_F(EditErrors, CoverVoidsOfAReplacementBetweenNodes) {
+  constexpr int kSide = 1500;
+  constexpr double kPixel = 1.0 / 6000;
+  RasterSpec hill{.width = kSide, .height = kSide, .geo_transform = {10, kPixel, 0, 46, 0, -kPixel}};
+  RasterSpec slit = hill;
+  hill.value = [](int column, int row) {
+    return 3000 * std::exp(-(std::pow(column - 540, 2) + std::pow(row - 540, 2)) / (2 * 225.0 * 225.0));
+  };
+  slit.nodata = -9999;
+  slit.value = [](int column, int row) { return column >= 490 && column < 590 && row < 1000 ? -9999.0 : 0.0; };
+  WriteRaster(dir_, slit, "slit.tif");
+  DemOptions options;
+  options.edits = {
+      WriteEdits(dir_, Rectangle(R"({"op":"replace","source":"slit.tif","blend_m":100000})", 9.5, 45.3, 10.7, 46.4))};
+  const auto source = OpenOrFail(WriteRaster(dir_, hill, "hill.tif"), options);
+  ASSERT_NE(source, nullptr);
+  const GeoPosition top{10 + 540.5 * kPixel, 46 - 540.5 * kPixel};
+  EXPECT_GT(ExpectCovered(*source, top, 4, source->max_level()), 2900);
+}
+
+// A strip between two rows of nodes, with one row of samples. It has no blend, so that no node is within its reach.
+TEST_F(EditErrors, CoverEditsBetweenNodes) {
+  constexpr double kPixel = 0.25 / 111'320;
+  constexpr int kSide = 400;
+  RasterSpec flat{.width = kSide, .height = kSide, .geo_transform = {10, kPixel, 0, 45, 0, -kPixel}};
+  flat.value = [](int, int) { return 100.0; };
+  const std::string path = WriteRaster(dir_, flat, "flat.tif");
+  for (const int level : {15, 16, 17}) {
+    const double step = OpenOrFail(path)->LatticeOf(level).StepDegrees();
+    const double row = std::floor((45 - 0.5 * kSide * kPixel + 90) / step);
+    const double south = (row + 0.25) * step - 90, north = (row + 0.8) * step - 90;
+    const double middle = 45 - (std::floor((45 - 0.5 * (south + north)) / kPixel) + 0.5) * kPixel;
+    if (middle < south || middle > north) continue;
+    DemOptions options;
+    options.edits = {WriteEdits(
+        dir_, Rectangle(R"({"op":"offset","metres":30})", 10 + 150 * kPixel, south, 10 + 250 * kPixel, north))};
+    const auto source = OpenOrFail(path, options);
+    ASSERT_NE(source, nullptr);
+    EXPECT_GT(ExpectCovered(*source, {10 + 200.5 * kPixel, middle}, level, level), 29) << level;
+  }
+}
+
+}  // namespace
+}  // namespace terrace::dem
