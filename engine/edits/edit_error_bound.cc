@@ -35,13 +35,13 @@ void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<con
       const std::size_t at = Area(part.columns, j) + static_cast<std::size_t>(i);
       const std::array<const EditedNode*, 4> corners = {&nodes[at], &nodes[at + 1], &nodes[at + stride],
                                                         &nodes[at + stride + 1]};
-      double nearest = std::numeric_limits<double>::infinity(), furthest = 0, difference = 0;
+      double nearest = std::numeric_limits<double>::infinity(), furthest = -nearest, difference = 0;
       const std::size_t cell = Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i);
       bool is_above = false, is_below = false;
       bool is_partial =
           replacement != nullptr && !replacement->void_cells.empty() && replacement->void_cells[cell] != 0;
       for (const EditedNode* node : corners) {
-        const double distance = node->place.distance_m;
+        const double distance = node->place.is_inside ? -node->place.depth_m : node->place.distance_m;
         nearest = std::min(nearest, distance);
         furthest = std::max(furthest, distance);
         const double low = std::isnan(node->target) ? edit.low_m : node->target;

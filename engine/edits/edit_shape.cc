@@ -52,7 +52,7 @@ std::size_t BandOf(const Edit& edit, double y, std::size_t bands) {
 double EditPlane::X(double lon) const { return std::remainder(lon - longitude, 360.0) * east_m; }
 
 EditRow::EditRow(const Edit& edit, double y, double margin_m)
-    : edit_(edit), y_(y), reach_m_(edit.reach_m() + margin_m) {
+    : edit_(edit), y_(y), margin_m_(margin_m), reach_m_(edit.reach_m() + margin_m) {
   const std::size_t bands = edit.band_begins.size() - 1;
   const std::size_t first = BandOf(edit, y - margin_m, bands), last = BandOf(edit, y + margin_m, bands);
   std::vector<Edit::EdgeNumber> several;
@@ -79,10 +79,8 @@ EditRow::EditRow(const Edit& edit, double y, double margin_m)
 EditPlace EditRow::At(double x) const {
   EditPlace place;
   const auto before = std::ranges::lower_bound(crossings_, x) - crossings_.begin();
-  if (before % 2 == 1) {
-    place.is_inside = true;
-    return place;
-  }
+  place.is_inside = before % 2 == 1;
+  if (place.is_inside && margin_m_ == 0) return place;
   // Beyond the reach nothing depends on the distance.
   double best = std::numeric_limits<double>::infinity();
   for (const Edge& edge : edges_) {
@@ -93,9 +91,14 @@ EditPlace EditRow::At(double x) const {
     const double ex = edge.a.x + t * dx - x, ey = edge.a.y + t * dy - y_, square = ex * ex + ey * ey;
     if (square >= best) continue;
     best = square;
+    if (place.is_inside) continue;
     place.ring = edge.ring;
     place.edge = edge.edge;
     place.along = t;
+  }
+  if (place.is_inside) {
+    place.depth_m = std::min(std::sqrt(best), margin_m_);
+    return place;
   }
   place.distance_m = std::isfinite(best) ? std::sqrt(best) : 2 * reach_m_ + 1;
   return place;

@@ -12,6 +12,7 @@ namespace terrace::dem {
 struct EditPlace {
   double distance_m = 0;   // 0 inside a polygon; beyond the row's reach any number above it
   bool is_inside = false;  // of a polygon
+  double depth_m = 0;      // inside a polygon, a distance at which its outline is not nearer; at most the row's margin
   std::uint32_t ring = 0, edge = 0;
   double along = 0;  // 0 .. 1 on the edge
 };
@@ -19,7 +20,7 @@ struct EditPlace {
 // The points of an edit's plane at one y. Edges beyond the reach of this row are excluded once.
 class EditRow {
  public:
-  // `margin_m`: is added to the reach, for distances of points that the edit does not reach.
+  // `margin_m`: is added to the reach, for distances of points that the edit does not reach, and for depths.
   EditRow(const Edit& edit, double y, double margin_m = 0);
   EditPlace At(double x) const;
   double y() const { return y_; }
@@ -31,7 +32,7 @@ class EditRow {
     std::uint32_t ring, edge;
   };
   const Edit& edit_;
-  double y_, reach_m_;
+  double y_, margin_m_, reach_m_;
   std::vector<double> crossings_;  // of rings, ascending
   std::vector<Edge> edges_;        // within reach of the row
 };

@@ -61,6 +61,23 @@ TEST_F(EditErrors, CoverVoidsOfAReplacementBetweenNodes) {
   EXPECT_GT(ExpectCovered(*source, top, 4, source->max_level()), 2900);
 }
 
+// Inside of a polygon, whether or not its edge is blended.
+TEST_F(EditErrors, AreNoLargerWhereAnEditIsConstant) {
+  for (const char* const terrain :
+       {R"({"op":"flatten","height":777})", R"({"op":"flatten","height":777,"blend_m":5})"}) {
+    SCOPED_TRACE(terrain);
+    const auto source = Open(Rectangle(terrain, 10.05, 50.05, 10.35, 50.35));
+    ASSERT_NE(source, nullptr);
+    for (int level = source->max_level() - 2; level <= source->max_level(); ++level) {
+      const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+      const auto tile =
+          source->Read({level, static_cast<std::int64_t>(190.2 / side), static_cast<std::int64_t>(140.2 / side)});
+      ASSERT_TRUE(tile.has_value());
+      EXPECT_LT(tile->source_error_m, 0.01) << level;
+    }
+  }
+}
+
 // A strip between two rows of nodes, with one row of samples. It has no blend, so that no node is within its reach.
 TEST_F(EditErrors, CoverEditsBetweenNodes) {
   constexpr double kPixel = 0.25 / 111'320;
