@@ -63,8 +63,9 @@ void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<con
       if (high_weight <= 0) continue;
       double& error = cells_[cell];
       const double before = error < 0 ? before_ : error;
-      const double tau =
-          replacement != nullptr ? replacement->error_m : TargetError(edit, diagonal_m, furthest + diagonal_m / 2);
+      const double tau = replacement != nullptr
+                             ? replacement->error_m
+                             : TargetError(edit, diagonal_m, std::max(furthest, 0.0) + diagonal_m / 2);
       const bool one_way = edit.op == EditOp::kCarve || edit.op == EditOp::kRaise;
       const double kept = one_way || edit.op == EditOp::kOffset ? 1 : 1 - low_weight;
       error = kept * before + (high_weight - low_weight) * difference + high_weight * tau;
