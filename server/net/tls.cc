@@ -30,6 +30,9 @@ int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_size, con
   return SSL_TLSEXT_ERR_OK;
 }
 
+// Without it OpenSSL asks for the passphrase of an encrypted key on the terminal, and the thread waits for the answer.
+int NoPassphrase(char*, int, int, void*) { return 0; }
+
 Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certificate, const std::filesystem::path& key) {
   const std::filesystem::path* file = &certificate;
   const auto mismatch = [&] {
@@ -45,6 +48,7 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
     ::SSL_CTX_set_mode(native, SSL_MODE_RELEASE_BUFFERS);
     ::SSL_CTX_set_cipher_list(native, kCiphers);
     ::SSL_CTX_set_alpn_select_cb(native, ChooseProtocol, nullptr);
+    ::SSL_CTX_set_default_passwd_cb(native, NoPassphrase);
     context->use_certificate_chain_file(certificate.string());
     file = &key;
     context->use_private_key_file(key.string(), ssl::context::pem);  // throws if a key of another type is required
