@@ -38,6 +38,14 @@ Result<Archives> OpenArchives(const std::string& place) {
   return archives;
 }
 
+// A manifest's generation is that of the sources and options. Bakes of one generation differ in formats, errors and
+// levels, and without sources the replies are those of the archives.
+std::uint64_t GenerationOf(const Archives& archives) {
+  std::uint64_t generation = 0;
+  for (const auto& opened : archives) generation ^= archive::TilesHash(opened->manifest());  // kinds differ
+  return generation;
+}
+
 }  // namespace
 
 std::vector<std::string> FilesOfBaked(const std::string& place) {
@@ -100,7 +108,7 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
     if (kind.format == tiler::TileFormat::kGlb) dataset.glb.compression = kind.compression;
   }
   dataset.metadata_levels = baked.metadata_levels;
-  dataset.generation = baked.generation;
+  dataset.generation = GenerationOf(*archives);
   dataset.baked_files = FilesOfBaked(wanted.baked);
   dataset.baked = archive::MakeBakedTiles(*std::move(archives));
   return dataset;
