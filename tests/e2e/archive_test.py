@@ -296,6 +296,22 @@ class ArchiveTest(unittest.TestCase):
         with self.serve_alone(self.bake("coarse.pmtiles", "--error", "5000", "--form", "single")) as server:
             self.assertEqual(server.version, versions[0])
 
+    def test_archive_that_comes_later_is_used(self):
+        place = pathlib.Path(tempfile.mkdtemp(dir=self.scratch)) / "baked"
+        with self.serve(baked=str(place)) as server:
+            def wait_for(tier):
+                end = time.monotonic() + 30
+                while server.tier("/cell/4/16/12.terrain") != tier and time.monotonic() < end:
+                    time.sleep(0.2)
+                self.assertEqual(server.tier("/cell/4/16/12.terrain"), tier, server.log())
+            wait_for("miss")
+            self.copy().rename(place)
+            wait_for("archive")
+            place.rename(place.with_name("old"))
+            wait_for("miss")
+            self.bake("later.pmtiles", "--form", "single").rename(place)
+            wait_for("archive")
+
     def test_damaged_file_is_built_or_503(self):
         place = self.copy()
         unit = place / "terrain/top.pmtiles"

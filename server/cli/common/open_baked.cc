@@ -10,6 +10,7 @@
 #include "archive/archive.h"
 #include "archive/baked_tiles.h"
 #include "archive/manifest.h"
+#include "engine/gdal/file_stamp.h"
 #include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
 
@@ -23,8 +24,25 @@ bool IsFile(const std::string& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+// The files that a place is opened from.
+std::vector<std::string> FilesAt(const std::string& place) {
+  std::vector<std::string> files = archive::Archive::FilesOf(place);
+  std::erase_if(files, [](const std::string& file) { return !IsFile(file); });
+  return files;
+}
+
+// Call it before OpenArchives: an archive that is replaced meanwhile, or appears, then differs from its stamp.
+std::vector<tiler::WatchedFile> StampFiles(const std::string& place) {
+  std::vector<tiler::WatchedFile> files;
+  for (std::string& path : archive::Archive::FilesOf(place)) {
+    std::optional<dem::FileStamp> stamp = dem::StampOf(path);
+    files.push_back({std::move(path), stamp});
+  }
+  return files;
+}
+
 Result<Archives> OpenArchives(const std::string& place) {
-  for (const std::string& file : FilesOfBaked(place)) {
+  for (const std::string& file : FilesAt(place)) {
     if (Result<void> allowed = dem::CheckPlainFile(file); !allowed) return tl::unexpected(std::move(allowed.error()));
   }
   Result<Archives> archives = archive::Archive::OpenAll(place);
@@ -48,25 +66,13 @@ std::uint64_t GenerationOf(const Archives& archives) {
 
 }  // namespace
 
-std::vector<std::string> FilesOfBaked(const std::string& place) {
-  if (IsFile(place)) return {place};
-  std::vector<std::string> files;
-  const auto add = [&](const std::string& folder) {
-    const std::string manifest = folder + "/" + archive::kManifestFile;
-    if (IsFile(manifest)) files.push_back(manifest);
-  };
-  add(place);
-  for (const auto& [name, format] : archive::kFormatNames) add(place + "/" + std::string(name));
-  return files;
-}
-
 bool IsArchive(const std::string& path) {
   if (IsFile(path)) return path.ends_with(".pmtiles");
-  return !FilesOfBaked(path).empty();
+  return !FilesAt(path).empty();
 }
 
 Result<std::string> NameOfBaked(const std::string& place) {
-  for (const std::string& file : FilesOfBaked(place)) {
+  for (const std::string& file : FilesAt(place)) {
     const std::string of = IsFile(place) ? place : std::filesystem::path(file).parent_path().string();
     Result<archive::Manifest> manifest = archive::ReadManifest(of);
     if (!manifest) return tl::unexpected(std::move(manifest.error()));
@@ -77,7 +83,7 @@ Result<std::string> NameOfBaked(const std::string& place) {
 
 void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
   if (wanted.baked.empty()) return;
-  dataset.baked_files = FilesOfBaked(wanted.baked);
+  dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);
   if (!archives) {
     spdlog::warn("dataset {}: its archive is not used, and tiles are built: {}", wanted.name, archives.error().message);
@@ -95,10 +101,11 @@ void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
 }
 
 Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
+  tiler::Dataset dataset;
+  dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);
   if (!archives) return tl::unexpected(std::move(archives.error()));
   const archive::BakedDataset& baked = archives->front()->manifest().dataset;
-  tiler::Dataset dataset;
   dataset.name = wanted.name;
   dataset.attribution = baked.attribution;
   dataset.error_fraction = baked.error_fraction;
@@ -109,7 +116,6 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
   }
   dataset.metadata_levels = baked.metadata_levels;
   dataset.generation = GenerationOf(*archives);
-  dataset.baked_files = FilesOfBaked(wanted.baked);
   dataset.baked = archive::MakeBakedTiles(*std::move(archives));
   return dataset;
 }

@@ -169,6 +169,28 @@ TEST_F(ReloaderTest, SurvivesAnExceptionOfLoading) {
   EXPECT_EQ(openings_, 0);
 }
 
+// It was replaced between its opening and the first check, or was not there when the dataset was opened.
+TEST_F(ReloaderTest, SeesAnArchiveThatChangedWhileItWasOpened) {
+  for (const bool is_there : {true, false}) {
+    tiler::Dataset dataset = *Open(config_.datasets[0], {});
+    const std::string file = (folder_ / "a.tif").string();
+    dataset.baked_files = {{file, is_there ? dem::StampOf(file) : std::nullopt}};
+    if (is_there) Put("a");
+    dataset.source = nullptr;
+    DatasetSlot slot(config_.datasets[0], dataset);
+    EXPECT_EQ(slot.CheckFiles(10), 1u);
+    EXPECT_FALSE(slot.is_current());
+  }
+}
+
+TEST_F(ReloaderTest, AnArchiveThatStaysAbsentIsNoChange) {
+  tiler::Dataset dataset = *Open(config_.datasets[0], {});
+  dataset.baked_files = {{(folder_ / "b.pmtiles").string(), std::nullopt}};
+  DatasetSlot slot(config_.datasets[0], dataset);
+  slot.CheckFiles(10);
+  EXPECT_TRUE(slot.is_current());
+}
+
 TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {
   config_.datasets.push_back(MakeConfig("b"));
   Start();
