@@ -67,8 +67,9 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
 std::string StampOf(const std::filesystem::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) return "missing";
-  return fmt::format("{}:{}:{}:{}.{}", status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
-                     status.st_mtim.tv_nsec);
+  // Permissions and owner, which decide whether the file can be read, change only the time of the status.
+  return fmt::format("{}:{}:{}:{}.{}:{}.{}", status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec, status.st_ctim.tv_sec, status.st_ctim.tv_nsec);
 }
 
 }  // namespace
@@ -94,12 +95,12 @@ Result<bool> TlsContext::ReloadIfChanged() {
   {
     const std::lock_guard lock(mutex_);
     if (stamp == stamp_) return false;
-    stamp_ = stamp;
   }
   Result<std::shared_ptr<ssl::context>> context = Load(certificate_, key_);
   if (!context) return tl::unexpected(context.error());
   const std::lock_guard lock(mutex_);
   context_ = *std::move(context);
+  stamp_ = stamp;
   return true;
 }
 

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -109,6 +110,28 @@ TEST_F(Tls, TakesANewCertificateAndKeepsTheOldWhereTheNewIsWrong) {
   EXPECT_EQ(FetchTls(port(), kAsk).subject, "first.example");
   WriteCertificate("second.example", certificate_, key_);
   EXPECT_TRUE(Eventually([&] { return FetchTls(port(), kAsk).subject == "second.example"; }));
+}
+
+// Without memory, descriptors or permission the new files cannot be read at the first attempt.
+TEST_F(Tls, TriesFilesAgainThatCouldNotBeRead) {
+  const auto tls = *TlsContext::Open(certificate_, key_);
+  WriteCertificate("second.example", certificate_, key_);
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const rlimit none{0, limit.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const Result<bool> failed = tls->ReloadIfChanged();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
+  EXPECT_FALSE(failed);
+  EXPECT_TRUE(*tls->ReloadIfChanged());
+  EXPECT_FALSE(*tls->ReloadIfChanged());
+}
+
+TEST_F(Tls, TriesFilesAgainWhosePermissionsHaveChanged) {
+  const auto tls = *TlsContext::Open(certificate_, key_);
+  std::this_thread::sleep_for(20ms);  // longer than the granularity of times of files
+  std::filesystem::permissions(key_, std::filesystem::perms::owner_read);
+  EXPECT_TRUE(*tls->ReloadIfChanged());
 }
 
 // OpenSSL would ask for the passphrase on the terminal, or else read it from standard input.
