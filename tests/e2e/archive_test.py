@@ -296,6 +296,19 @@ class ArchiveTest(unittest.TestCase):
         with self.serve_alone(self.bake("coarse.pmtiles", "--error", "5000", "--form", "single")) as server:
             self.assertEqual(server.version, versions[0])
 
+    def test_archives_with_other_errors_are_not_one_dataset(self):
+        place = self.copy()
+        shutil.rmtree(place / "glb")
+        self.bake("meshes", "--error", "5000", "--format", "glb").rename(place / "glb")
+        config = json.dumps({"datasets": [{"name": "cell", "baked": str(place)}]})
+        done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--listen", "127.0.0.1:0"], text=True, timeout=60,
+                              input=config, capture_output=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"{place}/terrain and {place}/glb have different errors", done.stderr)
+        with self.serve(baked=str(place)) as server:  # the sources have what the archives lack
+            self.assertEqual(server.tier("/cell/5/33/24.terrain", QUANTIZED), "archive")
+            self.assertEqual(server.get("/cell/5/33/24.glb")[0], 200)
+
     def test_archive_that_comes_later_is_used(self):
         place = pathlib.Path(tempfile.mkdtemp(dir=self.scratch)) / "baked"
         with self.serve(baked=str(place)) as server:

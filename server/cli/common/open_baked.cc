@@ -13,6 +13,7 @@
 #include "engine/gdal/file_stamp.h"
 #include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::cli {
 namespace {
@@ -54,6 +55,23 @@ Result<Archives> OpenArchives(const std::string& place) {
                      archives->front()->place(), opened->place());
   }
   return archives;
+}
+
+// A dataset without sources has one error for each level and one set of tiles, whatever the format of its meshes.
+Result<void> CheckSameTiles(const Archives& archives) {
+  const archive::Manifest& first = archives.front()->manifest();
+  for (const auto& opened : archives) {
+    const archive::Manifest& other = opened->manifest();
+    if (tiler::IsMercator(first.kind.format) || tiler::IsMercator(other.kind.format)) continue;
+    const bool has_same_errors = first.error_steps == other.error_steps;
+    if (has_same_errors && first.available == other.available) continue;
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{} and {} have different {}; without sources all meshes need the same: bake one of them again with "
+        "the options of the other, or serve one alone",
+        archives.front()->place(), opened->place(), has_same_errors ? "tiles" : "errors");
+  }
+  return {};
 }
 
 // A manifest's generation is that of the sources and options. Bakes of one generation differ in formats, errors and
@@ -105,6 +123,7 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
   dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);
   if (!archives) return tl::unexpected(std::move(archives.error()));
+  if (Result<void> same = CheckSameTiles(*archives); !same) return tl::unexpected(std::move(same.error()));
   const archive::BakedDataset& baked = archives->front()->manifest().dataset;
   dataset.name = wanted.name;
   dataset.attribution = baked.attribution;
