@@ -182,4 +182,10 @@ Result<std::vector<std::shared_ptr<const Archive>>> Archive::OpenAll(const std::
   return archives;
 }
 
+std::vector<std::string> Archive::FilesOf(const std::string& place) {
+  std::vector<std::string> files = {place, fmt::format("{}/{}", place, kManifestFile)};
+  for (const auto& [name, format] : kFormatNames) files.push_back(fmt::format("{}/{}/{}", place, name, kManifestFile));
+  return files;
+}
+
 }  // namespace terrace::archive

@@ -28,6 +28,8 @@ class Archive {
   static Result<std::shared_ptr<const Archive>> Open(const std::string& place);
   // The archives of a place: one, or those of several formats in the folders FolderOf. Errors as Open.
   static Result<std::vector<std::shared_ptr<const Archive>>> OpenAll(const std::string& place);
+  // The files that a place is opened from, and that a bake replaces last. Most of them do not exist.
+  static std::vector<std::string> FilesOf(const std::string& place);
   virtual ~Archive() = default;
 
   virtual const std::string& place() const = 0;

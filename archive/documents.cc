@@ -20,7 +20,7 @@ std::string LayerJson(const Manifest& manifest) {
   proto::LayerDescription layer;
   layer.name = dataset.name;
   layer.attribution = dataset.attribution;
-  layer.version = tiler::VersionText(dataset.generation);
+  layer.version = tiler::VersionText(TilesHash(manifest));
   layer.available = manifest.available;
   layer.bounds = dataset.bounds;
   layer.normals = manifest.kind.normals;
@@ -34,7 +34,7 @@ std::string TileJson(const Manifest& manifest) {
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
-  tiles.tile_template = "{z}/{x}/{y}.png?v=" + tiler::VersionText(dataset.generation);
+  tiles.tile_template = "{z}/{x}/{y}.png?v=" + tiler::VersionText(TilesHash(manifest));
   tiles.max_zoom = manifest.max_level;
   tiles.tile_size = manifest.kind.side_px;
   tiles.encoding = manifest.kind.height_encoding;
@@ -54,7 +54,7 @@ std::string SingleMetadata(const Manifest& manifest) {
     case tiler::TileFormat::kGlb:
       json["name"] = manifest.dataset.name;
       json["attribution"] = manifest.dataset.attribution;
-      json["version"] = tiler::VersionText(manifest.dataset.generation);
+      json["version"] = tiler::VersionText(TilesHash(manifest));
       json["scheme"] = "tms";
       json["projection"] = "EPSG:4326";
       break;

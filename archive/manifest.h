@@ -90,6 +90,10 @@ Result<std::optional<geo::TileKey>> UnitRoot(std::string_view name);
 inline constexpr const char* kManifestFile = "manifest.json";
 std::string UnitPath(std::string_view name);
 
+// A hash of what the archive's tiles are and which there are: of the dataset's generation, the kind, the errors and the
+// available tiles. The version in documents of the archive is that of this hash. All forms of a bake have the same.
+std::uint64_t TilesHash(const Manifest& manifest);
+
 std::string ToJson(const Manifest& manifest);
 // kInvalidArgument: not a manifest, or one of a newer format; the message names what is wrong.
 Result<Manifest> ParseManifest(std::string_view json);

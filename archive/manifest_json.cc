@@ -1,6 +1,7 @@
 #include "archive/manifest_json.h"
 
 #include <fmt/format.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <array>
@@ -222,6 +223,13 @@ Manifest Read(const Json& json) {
 std::optional<std::uint64_t> ParseHex16(std::string_view text) {
   constexpr std::size_t kDigits = 16;
   return text.size() == kDigits ? ParseNumber<std::uint64_t>(text, 16) : std::nullopt;
+}
+
+std::uint64_t TilesHash(const Manifest& manifest) {
+  const Json json = {manifest.dataset.generation, KindJson(manifest.kind, manifest.error_steps),
+                     AvailableJson(manifest.available)};
+  const std::string text = json.dump();
+  return XXH3_64bits(text.data(), text.size());
 }
 
 std::string ToJson(const Manifest& manifest) {

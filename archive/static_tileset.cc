@@ -25,7 +25,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
   const BakedDataset& dataset = manifest.dataset;
   const dem::HeightRange all{std::min(dataset.heights.min, dataset.floor_m),
                              std::max(dataset.heights.max, dataset.floor_m)};
-  return {tiler::VersionText(dataset.generation),
+  return {tiler::VersionText(TilesHash(manifest)),
           dataset.attribution,
           manifest.available,
           dataset.bounds,

@@ -46,6 +46,12 @@ struct ImageryOptions {
   std::string attribution;
 };
 
+// A file that a dataset was opened from, and its stamp from before it was opened.
+struct WatchedFile {
+  std::string path;
+  std::optional<dem::FileStamp> stamp;  // nullopt: there was none
+};
+
 // One served dataset. Copies share the source, water and imagery, which are immutable: a reload keeps a dataset that
 // has not changed.
 struct Dataset {
@@ -56,7 +62,7 @@ struct Dataset {
   proto::GlbOptions glb;                         // compression: for GLB requests that name none
   std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
-  std::vector<std::string> baked_files;          // a change of one of them means that the archive was replaced
+  std::vector<WatchedFile> baked_files;          // a change of one of them means that there is another archive
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none

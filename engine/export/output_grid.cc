@@ -13,7 +13,6 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kWgs84 = 4326;
 // A position that comes back farther away than this has no inverse. In units of a projected CRS, or 10^-5 degrees.
 constexpr double kReturn = 1;
 // Nodes between two that are transformed back.

@@ -14,6 +14,8 @@
 
 namespace terrace::dem {
 
+inline constexpr int kWgs84 = 4326;  // EPSG
+
 // Rows run from the north, nodes in a row from the west; the outermost nodes lie on the box.
 struct OutputGrid {
   int epsg = 4326;

@@ -43,15 +43,14 @@ Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
 
 asio::awaitable<void> WatchCertificate(TlsContext* tls) {
   asio::steady_timer timer(co_await asio::this_coro::executor);
+  std::string problem;  // that the log has
   for (;;) {
     timer.expires_after(std::chrono::seconds(2));
     co_await timer.async_wait(asio::use_awaitable);
     const Result<bool> reloaded = tls->ReloadIfChanged();
-    if (!reloaded) {
-      spdlog::warn("the certificate in use stays: {}", reloaded.error().message);
-    } else if (*reloaded) {
-      spdlog::info("new connections get the certificate that has just changed");
-    }
+    const std::string said = std::exchange(problem, reloaded ? std::string() : reloaded.error().message);
+    if (!reloaded && problem != said) spdlog::warn("the certificate in use stays: {}", problem);
+    if (reloaded && *reloaded) spdlog::info("new connections get the certificate that has just changed");
   }
 }
 

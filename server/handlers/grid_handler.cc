@@ -195,8 +195,8 @@ Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
   response.content_encoding = tiler::NameOf(coding);
   if (!is_image) response.vary = "Accept-Encoding";
   response.cache_control = handlers.cache_control;
-  // The generation does not cover the geoid grid that orthometric heights depend on.
-  if (query->datum == dem::HeightDatum::kEllipsoid) {
+  // The generation does not cover the files of PROJ: geoids, and grids of the shifts between reference systems.
+  if (query->datum == dem::HeightDatum::kEllipsoid && query->grid.epsg == dem::kWgs84) {
     response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
     response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
   }

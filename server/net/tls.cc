@@ -30,6 +30,9 @@ int ChooseProtocol(SSL*, const unsigned char** out, unsigned char* out_size, con
   return SSL_TLSEXT_ERR_OK;
 }
 
+// Without it OpenSSL asks for the passphrase of an encrypted key on the terminal, and the thread waits for the answer.
+int NoPassphrase(char*, int, int, void*) { return 0; }
+
 Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certificate, const std::filesystem::path& key) {
   const std::filesystem::path* file = &certificate;
   const auto mismatch = [&] {
@@ -45,6 +48,7 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
     ::SSL_CTX_set_mode(native, SSL_MODE_RELEASE_BUFFERS);
     ::SSL_CTX_set_cipher_list(native, kCiphers);
     ::SSL_CTX_set_alpn_select_cb(native, ChooseProtocol, nullptr);
+    ::SSL_CTX_set_default_passwd_cb(native, NoPassphrase);
     context->use_certificate_chain_file(certificate.string());
     file = &key;
     context->use_private_key_file(key.string(), ssl::context::pem);  // throws if a key of another type is required
@@ -63,8 +67,9 @@ Result<std::shared_ptr<ssl::context>> Load(const std::filesystem::path& certific
 std::string StampOf(const std::filesystem::path& file) {
   struct stat status {};
   if (::stat(file.c_str(), &status) != 0) return "missing";
-  return fmt::format("{}:{}:{}:{}.{}", status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
-                     status.st_mtim.tv_nsec);
+  // Permissions and owner, which decide whether the file can be read, change only the time of the status.
+  return fmt::format("{}:{}:{}:{}.{}:{}.{}", status.st_dev, status.st_ino, status.st_size, status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec, status.st_ctim.tv_sec, status.st_ctim.tv_nsec);
 }
 
 }  // namespace
@@ -90,12 +95,12 @@ Result<bool> TlsContext::ReloadIfChanged() {
   {
     const std::lock_guard lock(mutex_);
     if (stamp == stamp_) return false;
-    stamp_ = stamp;
   }
   Result<std::shared_ptr<ssl::context>> context = Load(certificate_, key_);
   if (!context) return tl::unexpected(context.error());
   const std::lock_guard lock(mutex_);
   context_ = *std::move(context);
+  stamp_ = stamp;
   return true;
 }
 

@@ -26,7 +26,7 @@ class TlsContext {
   std::shared_ptr<asio::ssl::context> Current() const;
 
   // Checks whether the files have changed, and uses the new certificate if it is valid; returns true then. On an error
-  // the old certificate stays in use, and the same files are not tried again.
+  // the old certificate stays in use, and the next call tries the files again.
   Result<bool> ReloadIfChanged();
 
  private:
@@ -37,7 +37,7 @@ class TlsContext {
   const std::filesystem::path certificate_, key_;
   mutable std::mutex mutex_;
   std::shared_ptr<asio::ssl::context> context_;
-  std::string stamp_;  // of the files as they were last tried
+  std::string stamp_;  // of the files that are in use
 };
 
 }  // namespace terrace::server

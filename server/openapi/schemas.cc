@@ -134,7 +134,9 @@ constexpr PathNote kPathNotes[] = {
 };
 
 constexpr HeaderNote kHeaderNotes[] = {
-    {"ETag", "Strong; of the coding that was sent. Orthometric heights and certified errors have none",
+    {"ETag",
+     "Strong; of the coding that was sent. Orthometric heights, grids in a crs other than EPSG:4326, and certified "
+     "errors have none",
      R"({"type":"string","pattern":"^\"[0-9a-f]+\"$"})"},
     {"Cache-Control", "How long the reply may be cached", R"({"type":"string"})"},
     {"Vary", "The request's headers that the reply depends on", R"({"type":"string"})"},

@@ -10,6 +10,7 @@
 #include <system_error>
 #include <utility>
 
+#include "archive/archive.h"
 #include "server/tiles/catalog.h"
 #include "tiler/encoder_version.h"
 
@@ -27,11 +28,14 @@ constexpr std::chrono::seconds kPatience{10};
 // Opening a large source keeps a processor busy: building tiles has priority.
 constexpr int kNiceness = 10;
 
-dem::StampedFiles FilesOf(const tiler::Dataset& dataset) {
-  dem::StampedFiles files(dataset.baked_files);
-  if (dataset.source) files.Append(dataset.source->files());
-  if (dataset.water.mask) files.Append(dataset.water.mask->files());
-  if (dataset.imagery.image) files.Append(dataset.imagery.image->files());
+std::vector<tiler::WatchedFile> FilesOf(const tiler::Dataset& dataset) {
+  std::vector<tiler::WatchedFile> files = dataset.baked_files;
+  const auto add = [&](const dem::StampedFiles& more) {
+    for (std::size_t i = 0; i < more.size(); ++i) files.push_back({more.path(i), more.stamp(i)});
+  };
+  if (dataset.source) add(dataset.source->files());
+  if (dataset.water.mask) add(dataset.water.mask->files());
+  if (dataset.imagery.image) add(dataset.imagery.image->files());
   return files;
 }
 
@@ -44,7 +48,10 @@ std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
   files.insert(files.end(), dataset.edits.begin(), dataset.edits.end());
   if (!dataset.water.mask.empty()) files.push_back(dataset.water.mask);
   if (!dataset.imagery.image.empty()) files.push_back(dataset.imagery.image);
-  if (!dataset.baked.empty()) files.push_back(dataset.baked);
+  if (!dataset.baked.empty()) {
+    const std::vector<std::string> baked = archive::Archive::FilesOf(dataset.baked);
+    files.insert(files.end(), baked.begin(), baked.end());
+  }
   return files;
 }
 
@@ -112,11 +119,11 @@ std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
   }
   const std::size_t count = std::min(max_files, files_.size());
   for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t file = next_file_;
+    const auto& [path, stamp] = files_[next_file_];
     next_file_ = (next_file_ + 1) % files_.size();
-    if (!files_.HasChanged(file)) continue;
-    spdlog::info("dataset {}: {} {}", wanted_.name, files_.path(file),
-                 dem::StampOf(files_.path(file)) ? "has changed" : "is gone");
+    const std::optional<dem::FileStamp> now = dem::StampOf(path);
+    if (now == stamp) continue;
+    spdlog::info("dataset {}: {} {}", wanted_.name, path, !now ? "is gone" : stamp ? "has changed" : "is new");
     MarkStale();
     return i + 1;
   }

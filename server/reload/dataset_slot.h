@@ -68,7 +68,7 @@ class DatasetSlot {
 
   config::DatasetConfig wanted_;
   std::optional<tiler::Dataset> serving_;
-  dem::StampedFiles files_;                       // of serving_
+  std::vector<tiler::WatchedFile> files_;         // of serving_
   std::size_t next_file_ = 0;                     // to check
   std::optional<Clock::time_point> stale_since_;  // since when serving_ differs from what is wanted
 

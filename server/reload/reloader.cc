@@ -13,8 +13,6 @@
 namespace terrace::server {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::chrono::milliseconds kPeriod{1'000};
 // Interval while datasets are being opened.
 constexpr std::chrono::milliseconds kBusyPeriod{100};
@@ -104,7 +102,7 @@ void Reloader::Reload() {
 }
 
 void Reloader::Run(const std::stop_token& stop) {
-  Clock::time_point next_check = Clock::now() + kPeriod, next_config = next_check;
+  next_check_ = next_config_ = Clock::now() + kPeriod;
   std::unique_lock lock(mutex_);
   for (;;) {
     wake_.wait_for(lock, stop, kMinPause, [] { return false; });
@@ -117,20 +115,33 @@ void Reloader::Run(const std::stop_token& stop) {
     if (stop.stop_requested() || hooks_.stop.stop_requested()) return;
     const bool reload = std::exchange(reload_, false), check_now = std::exchange(check_now_, false) || reload;
     lock.unlock();
-    const Clock::time_point now = Clock::now();
-    if (reload || (watch_ && now >= next_config)) {
-      CheckConfigFile(reload);
-      next_config = now + (config_settles_ ? kConfigSettleTime : kPeriod);
+    try {
+      Step(reload, check_now);
+      lock.lock();
+    } catch (const std::exception& exception) {
+      spdlog::error("configuration and files cannot be checked now: {}; the server tries again", exception.what());
+      lock.lock();
+      // Which changes this step saw and did not take over is not known: the next one loads the configuration anew.
+      reload_ = reload_ || reload || watch_;
+      wake_.wait_for(lock, stop, kPeriod, [] { return false; });
     }
-    if (check_now || (watch_ && now >= next_check)) {
-      CheckFiles();
-      next_check = now + kPeriod;
-    }
-    if (StepOpenings()) Publish();
-    ReportProblems();
-    if (reload && hooks_.reloaded) hooks_.reloaded();
-    lock.lock();
   }
+}
+
+void Reloader::Step(bool reload, bool check_now) {
+  const Clock::time_point now = Clock::now();
+  if (reload || (watch_ && now >= next_config_)) {
+    CheckConfigFile(reload);
+    next_config_ = now + (config_settles_ ? kConfigSettleTime : kPeriod);
+  }
+  if (check_now || (watch_ && now >= next_check_)) {
+    CheckFiles();
+    next_check_ = now + kPeriod;
+  }
+  if (StepOpenings()) is_published_ = false;
+  if (!is_published_) Publish();
+  ReportProblems();
+  if (reload && hooks_.reloaded) hooks_.reloaded();
 }
 
 bool Reloader::IsBusy() const {
@@ -204,7 +215,7 @@ void Reloader::Apply(config::Config next) {
   config_ = std::move(next);
   spdlog::info(is_rewritten ? "the new configuration is in force"
                             : "folders or globs of the configuration hold other files than before");
-  Publish();
+  is_published_ = false;
 }
 
 void Reloader::CheckFiles() {
@@ -236,6 +247,7 @@ void Reloader::Publish() {
     if (slot.serving()) datasets.push_back(*slot.serving());
   }
   hooks_.publish(datasets, config_);
+  is_published_ = true;
 }
 
 void Reloader::ReportProblems() {
@@ -246,8 +258,8 @@ void Reloader::ReportProblems() {
       problems.emplace(slot.wanted().name, std::move(problem));
   }
   if (problems == reported_) return;
+  hooks_.report(problems);
   reported_ = std::move(problems);
-  hooks_.report(reported_);
 }
 
 }  // namespace terrace::server

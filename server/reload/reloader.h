@@ -4,6 +4,7 @@
 // complete. An invalid configuration changes nothing. All changes are logged.
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -21,6 +22,8 @@ namespace terrace::server {
 
 class Reloader {
  public:
+  using Clock = std::chrono::steady_clock;
+
   // Files checked per second. If there are more, each is checked every few seconds.
   static constexpr std::size_t kMaxFileChecks = 10'000;
 
@@ -56,6 +59,7 @@ class Reloader {
 
  private:
   void Run(const std::stop_token& stop);
+  void Step(bool reload, bool check_now);
   void CheckFiles();
   config::ConfigResult Load() const;
   void CheckConfigFile(bool is_requested);
@@ -76,7 +80,9 @@ class Reloader {
   std::string config_problem_;
   config::ConfigResult seen_;    // at the last check, valid or not
   bool config_settles_ = false;  // it had changed at the check before
+  bool is_published_ = true;     // what the slots serve, with config_
   std::map<std::string, std::string> reported_;
+  Clock::time_point next_check_, next_config_;
 
   std::mutex mutex_;
   std::condition_variable_any wake_;

@@ -46,6 +46,22 @@ TEST(ManifestTest, GoesBothWays) {
   EXPECT_EQ(read->dataset.heights.min, FullManifest().dataset.heights.min);
 }
 
+TEST(ManifestTest, HashOfTilesIsThatOfWhatIsSent) {
+  const std::uint64_t hash = TilesHash(FullManifest());
+  Manifest other = FullManifest();
+  other.units.clear(), other.identity = "{}", other.product = "terrace 2";
+  EXPECT_EQ(TilesHash(other), hash);
+  for (const auto& change : {+[](Manifest& manifest) { ++manifest.dataset.generation; },
+                             +[](Manifest& manifest) { ++manifest.error_steps[1]; },
+                             +[](Manifest& manifest) { manifest.kind.normals = false; },
+                             +[](Manifest& manifest) { ++manifest.available[2][0].end_x; },
+                             +[](Manifest& manifest) { manifest.available.pop_back(); }}) {
+    other = FullManifest();
+    change(other);
+    EXPECT_NE(TilesHash(other), hash);
+  }
+}
+
 TEST(ManifestTest, NewerFormatIsNamed) {
   std::string json = ToJson(FullManifest());
   const std::string wanted = "\"terrace_archive\": 1";

@@ -44,6 +44,7 @@ class Server:
             raise RuntimeError(f"did not start: {self.log_path.read_text()}")
         self.port = int(match.group(1))
         self.connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        self.version = json.loads(self.get("/datasets", {"Accept-Encoding": "identity"})[2])["datasets"][0]["version"]
 
     def __enter__(self):
         return self
@@ -129,10 +130,18 @@ class ArchiveTest(unittest.TestCase):
         wanted = live.get(target, headers)
         self.assertEqual(wanted[0], 200, target)
         for other in others:
-            found = other.get(target, headers)
+            found = other.get(target.replace(live.version, other.version), headers)
             self.assertEqual((found[0], found[2]), (200, wanted[2]), target)
             for name in SAME:
                 self.assertEqual(found[1][name], wanted[1][name], f"{target} {name}")
+
+    def expect_same_document(self, target, live, *others):
+        """The same apart from the version, which is that of the archives if there are no sources."""
+        wanted = gzip.decompress(live.get(target)[2]).decode()
+        self.assertIn(live.version, wanted)
+        for other in others:
+            found = gzip.decompress(other.get(target.replace(live.version, other.version))[2]).decode()
+            self.assertEqual(found.replace(other.version, live.version), wanted, target)
 
     def test_every_tile_and_document_equals_what_building_gives(self):
         with self.serve() as live, self.serve(baked=str(self.place)) as both, self.serve_alone() as alone:
@@ -152,7 +161,8 @@ class ArchiveTest(unittest.TestCase):
                 count += 1
             self.assertGreater(count, 500)
             for document in ("layer.json", "tileset.json"):
-                self.expect_same(f"/cell/{document}", {}, live, both, alone)
+                self.expect_same(f"/cell/{document}", {}, live, both)
+                self.expect_same_document(f"/cell/{document}", live, alone)
             text = gzip.decompress(live.get("/cell/tileset.json")[2]).decode()
             template = re.search(r'"(3dtiles/[^"]*?/)\{level\}/\{x\}/\{y\}(\.\d+\.subtree[^"]*)"', text)
             self.expect_same(f"/cell/{template[1]}0/0/0{template[2]}", {}, live, both, alone)
@@ -216,8 +226,8 @@ class ArchiveTest(unittest.TestCase):
                 self.expect_same(target, QUANTIZED, live, server)
                 stored = (folder / target[len("/cell/"):].split("?")[0]).read_bytes()
                 self.assertEqual(stored, server.get(target, QUANTIZED)[2])
-            self.expect_same("/cell/layer.json", {}, live, server)
-            self.assertEqual((folder / "layer.json").read_bytes(), gzip.decompress(live.get("/cell/layer.json")[2]))
+            self.expect_same_document("/cell/layer.json", live, server)
+            self.assertEqual((folder / "layer.json").read_bytes(), gzip.decompress(server.get("/cell/layer.json")[2]))
 
     def test_levels_that_edits_add_have_metadata_where_tiles_lie_below(self):
         box = [[7.2, 46.2], [7.201, 46.2], [7.201, 46.201], [7.2, 46.201], [7.2, 46.2]]
@@ -264,6 +274,56 @@ class ArchiveTest(unittest.TestCase):
             served = json.loads(server.get("/datasets", {"Accept-Encoding": "identity"})[2])["datasets"][0]["version"]
             self.assertIn(version, warnings[0])
             self.assertIn(served, warnings[0])
+
+    def bake(self, name, *arguments, levels="0-5"):
+        place = self.scratch / name
+        done = subprocess.run([BINARY, "bake", "--config", self.scratch / "bake.json", "--out", place, "--levels", levels, *arguments],
+                              capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return place
+
+    def test_bakes_with_other_tiles_have_other_versions(self):
+        bakes = [self.bake("coarse", "--error", "5000"), self.bake("fine", "--error", "50"),
+                 self.bake("short", "--error", "5000", levels="0-4"), self.bake("normals", "--error", "5000", "--extensions", "octvertexnormals")]
+        manifests = [json.loads((place / "manifest.json").read_text()) for place in bakes]
+        self.assertEqual(len({manifest["dataset"]["generation"] for manifest in manifests}), 1)
+        versions = []
+        for place in bakes:
+            with self.serve_alone(place) as server:
+                versions.append(server.version)
+                self.assertIn(server.version, gzip.decompress(server.get("/cell/layer.json")[2]).decode())
+        self.assertEqual(len(set(versions)), 4, versions)
+        with self.serve_alone(self.bake("coarse.pmtiles", "--error", "5000", "--form", "single")) as server:
+            self.assertEqual(server.version, versions[0])
+
+    def test_archives_with_other_errors_are_not_one_dataset(self):
+        place = self.copy()
+        shutil.rmtree(place / "glb")
+        self.bake("meshes", "--error", "5000", "--format", "glb").rename(place / "glb")
+        config = json.dumps({"datasets": [{"name": "cell", "baked": str(place)}]})
+        done = subprocess.run([BINARY, "serve", "--config", "/dev/stdin", "--listen", "127.0.0.1:0"], text=True, timeout=60,
+                              input=config, capture_output=True)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"{place}/terrain and {place}/glb have different errors", done.stderr)
+        with self.serve(baked=str(place)) as server:  # the sources have what the archives lack
+            self.assertEqual(server.tier("/cell/5/33/24.terrain", QUANTIZED), "archive")
+            self.assertEqual(server.get("/cell/5/33/24.glb")[0], 200)
+
+    def test_archive_that_comes_later_is_used(self):
+        place = pathlib.Path(tempfile.mkdtemp(dir=self.scratch)) / "baked"
+        with self.serve(baked=str(place)) as server:
+            def wait_for(tier):
+                end = time.monotonic() + 30
+                while server.tier("/cell/4/16/12.terrain") != tier and time.monotonic() < end:
+                    time.sleep(0.2)
+                self.assertEqual(server.tier("/cell/4/16/12.terrain"), tier, server.log())
+            wait_for("miss")
+            self.copy().rename(place)
+            wait_for("archive")
+            place.rename(place.with_name("old"))
+            wait_for("miss")
+            self.bake("later.pmtiles", "--form", "single").rename(place)
+            wait_for("archive")
 
     def test_damaged_file_is_built_or_503(self):
         place = self.copy()

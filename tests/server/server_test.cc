@@ -95,20 +95,25 @@ TEST_F(ServerTest, TellsHowLongRepliesMayBeKept) {
   }
 }
 
-// The geoid grid that orthometric heights depend on may change while the version stays.
-TEST_F(ServerTest, OrthometricHeightsHaveNoETag) {
+// The files of PROJ, geoids and grids of shifts between reference systems, may change while the version stays.
+TEST_F(ServerTest, RepliesThatDependOnFilesOfProjHaveNoETag) {
   read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token) {
     return Result<std::vector<float>>(std::vector<float>(points.size(), 7.0f));
   };
   Start();
-  for (const char* target : {"/maui/heights?locations=1,2&datum=", "/maui/grid?bbox=0,0,1,1&width=2&height=2&datum="}) {
-    const std::string versioned = std::string("&v=") + kMauiVersion;
-    const Reply ellipsoidal = Fetch(port(), target + std::string("ellipsoid") + versioned);
-    ASSERT_EQ(ellipsoidal.status, 200) << target << ellipsoidal.body;
-    EXPECT_NE(ellipsoidal.Field("etag"), "") << target;
-    const std::string orthometric = target + std::string("orthometric") + versioned;
+  const std::string versioned = std::string("&v=") + kMauiVersion;
+  const std::string heights = "/maui/heights?locations=1,2", grid = "/maui/grid?width=2&height=2";
+  for (const std::string& target :
+       {heights + "&datum=ellipsoid", grid + "&bbox=0,0,1,1&datum=ellipsoid", grid + "&bbox=0,0,1,1&crs=EPSG:4326"}) {
+    const Reply reply = Fetch(port(), target + versioned);
+    ASSERT_EQ(reply.status, 200) << target << reply.body;
+    EXPECT_NE(reply.Field("etag"), "") << target;
+    EXPECT_NE(reply.Field("cache-control").find("immutable"), std::string::npos) << target;
+  }
+  for (const std::string& target : {heights + "&datum=orthometric", grid + "&bbox=0,0,1,1&datum=orthometric",
+                                    grid + "&bbox=400000,5000000,400100,5000100&crs=EPSG:23032"}) {
     for (const char* fields : {"", "If-None-Match: *\r\n"}) {
-      const Reply reply = Fetch(port(), orthometric, fields);
+      const Reply reply = Fetch(port(), target + versioned, fields);
       EXPECT_EQ(reply.status, 200) << target << reply.body;
       EXPECT_FALSE(reply.fields.contains("etag")) << target;
       EXPECT_EQ(reply.Field("cache-control"), "public, max-age=3600") << target;

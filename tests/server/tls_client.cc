@@ -55,7 +55,8 @@ void LeaveTls(std::uint16_t port, const std::string& request, const std::functio
   ::shutdown(::SSL_get_fd(ssl), SHUT_RDWR);
 }
 
-void WriteCertificate(const std::string& name, const std::string& certificate_file, const std::string& key_file) {
+void WriteCertificate(const std::string& name, const std::string& certificate_file, const std::string& key_file,
+                      const std::string& passphrase) {
   const std::unique_ptr<EVP_PKEY, void (*)(EVP_PKEY*)> key(EVP_EC_gen("P-256"), ::EVP_PKEY_free);
   const std::unique_ptr<X509, void (*)(X509*)> certificate(::X509_new(), ::X509_free);
   ::ASN1_INTEGER_set(::X509_get_serialNumber(certificate.get()), 1);
@@ -74,8 +75,11 @@ void WriteCertificate(const std::string& name, const std::string& certificate_fi
     std::fclose(out);
     std::rename(fresh.c_str(), file.c_str());
   };
-  write(key_file,
-        [&](std::FILE* out) { ::PEM_write_PrivateKey(out, key.get(), nullptr, nullptr, 0, nullptr, nullptr); });
+  write(key_file, [&](std::FILE* out) {
+    ::PEM_write_PrivateKey(out, key.get(), passphrase.empty() ? nullptr : ::EVP_aes_256_cbc(),
+                           reinterpret_cast<const unsigned char*>(passphrase.data()),
+                           static_cast<int>(passphrase.size()), nullptr, nullptr);
+  });
   write(certificate_file, [&](std::FILE* out) { ::PEM_write_X509(out, certificate.get()); });
 }
 

@@ -21,7 +21,9 @@ TlsReply FetchTls(std::uint16_t port, const std::string& request, int highest = 
 // Sends the request, and closes with TLS's close_notify when `until` has returned.
 void LeaveTls(std::uint16_t port, const std::string& request, const std::function<void()>& until);
 
-// Writes a self-signed certificate for `name` and its key, PEM both.
-void WriteCertificate(const std::string& name, const std::string& certificate_file, const std::string& key_file);
+// Writes a self-signed certificate for `name` and its key, PEM both. `passphrase`: encrypts the key; empty: it is
+// plain.
+void WriteCertificate(const std::string& name, const std::string& certificate_file, const std::string& key_file,
+                      const std::string& passphrase = "");
 
 }  // namespace terrace::server

@@ -1,6 +1,9 @@
 // HTTPS: supported and refused versions, and certificates that change.
+#include "server/net/tls.h"
+
 #include <gtest/gtest.h>
 #include <openssl/ssl.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -107,6 +110,48 @@ TEST_F(Tls, TakesANewCertificateAndKeepsTheOldWhereTheNewIsWrong) {
   EXPECT_EQ(FetchTls(port(), kAsk).subject, "first.example");
   WriteCertificate("second.example", certificate_, key_);
   EXPECT_TRUE(Eventually([&] { return FetchTls(port(), kAsk).subject == "second.example"; }));
+}
+
+// Without memory, descriptors or permission the new files cannot be read at the first attempt.
+TEST_F(Tls, TriesFilesAgainThatCouldNotBeRead) {
+  const auto tls = *TlsContext::Open(certificate_, key_);
+  WriteCertificate("second.example", certificate_, key_);
+  rlimit limit{};
+  ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &limit), 0);
+  const rlimit none{0, limit.rlim_max};
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &none), 0);
+  const Result<bool> failed = tls->ReloadIfChanged();
+  ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &limit), 0);
+  EXPECT_FALSE(failed);
+  EXPECT_TRUE(*tls->ReloadIfChanged());
+  EXPECT_FALSE(*tls->ReloadIfChanged());
+}
+
+TEST_F(Tls, TriesFilesAgainWhosePermissionsHaveChanged) {
+  const auto tls = *TlsContext::Open(certificate_, key_);
+  std::this_thread::sleep_for(20ms);  // longer than the granularity of times of files
+  std::filesystem::permissions(key_, std::filesystem::perms::owner_read);
+  EXPECT_TRUE(*tls->ReloadIfChanged());
+}
+
+// OpenSSL would ask for the passphrase on the terminal, or else read it from standard input.
+TEST_F(Tls, AsksNobodyForAPassphrase) {
+  WriteCertificate("first.example", certificate_, key_, "secret");
+  int input[2];
+  ASSERT_EQ(::pipe(input), 0);
+  ASSERT_EQ(::write(input[1], "secret\n", 7), 7);
+  ::close(input[1]);
+  const int kept = ::dup(0);
+  ::dup2(input[0], 0);
+  const auto tls = TlsContext::Open(certificate_, key_);
+  ::dup2(kept, 0);
+  char answer[8];
+  EXPECT_EQ(::read(input[0], answer, sizeof answer), 7) << "the answer was taken";
+  ::close(input[0]);
+  ::close(kept);
+  ASSERT_FALSE(tls);
+  EXPECT_TRUE(tls.error().message.starts_with(key_ + ": cannot be used for TLS")) << tls.error().message;
+  EXPECT_TRUE(tls.error().message.ends_with("the key without a passphrase")) << tls.error().message;
 }
 
 TEST_F(Tls, SaysWhichFileIsWrong) {

@@ -10,8 +10,10 @@
 #include "archive/archive.h"
 #include "archive/baked_tiles.h"
 #include "archive/manifest.h"
+#include "engine/gdal/file_stamp.h"
 #include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/tile_request.h"
 
 namespace terrace::cli {
 namespace {
@@ -23,8 +25,25 @@ bool IsFile(const std::string& path) {
   return std::filesystem::is_regular_file(path, ignored);
 }
 
+// The files that a place is opened from.
+std::vector<std::string> FilesAt(const std::string& place) {
+  std::vector<std::string> files = archive::Archive::FilesOf(place);
+  std::erase_if(files, [](const std::string& file) { return !IsFile(file); });
+  return files;
+}
+
+// Call it before OpenArchives: an archive that is replaced meanwhile, or appears, then differs from its stamp.
+std::vector<tiler::WatchedFile> StampFiles(const std::string& place) {
+  std::vector<tiler::WatchedFile> files;
+  for (std::string& path : archive::Archive::FilesOf(place)) {
+    std::optional<dem::FileStamp> stamp = dem::StampOf(path);
+    files.push_back({std::move(path), stamp});
+  }
+  return files;
+}
+
 Result<Archives> OpenArchives(const std::string& place) {
-  for (const std::string& file : FilesOfBaked(place)) {
+  for (const std::string& file : FilesAt(place)) {
     if (Result<void> allowed = dem::CheckPlainFile(file); !allowed) return tl::unexpected(std::move(allowed.error()));
   }
   Result<Archives> archives = archive::Archive::OpenAll(place);
@@ -38,27 +57,40 @@ Result<Archives> OpenArchives(const std::string& place) {
   return archives;
 }
 
-}  // namespace
-
-std::vector<std::string> FilesOfBaked(const std::string& place) {
-  if (IsFile(place)) return {place};
-  std::vector<std::string> files;
-  const auto add = [&](const std::string& folder) {
-    const std::string manifest = folder + "/" + archive::kManifestFile;
-    if (IsFile(manifest)) files.push_back(manifest);
-  };
-  add(place);
-  for (const auto& [name, format] : archive::kFormatNames) add(place + "/" + std::string(name));
-  return files;
+// A dataset without sources has one error for each level and one set of tiles, whatever the format of its meshes.
+Result<void> CheckSameTiles(const Archives& archives) {
+  const archive::Manifest& first = archives.front()->manifest();
+  for (const auto& opened : archives) {
+    const archive::Manifest& other = opened->manifest();
+    if (tiler::IsMercator(first.kind.format) || tiler::IsMercator(other.kind.format)) continue;
+    const bool has_same_errors = first.error_steps == other.error_steps;
+    if (has_same_errors && first.available == other.available) continue;
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{} and {} have different {}; without sources all meshes need the same: bake one of them again with "
+        "the options of the other, or serve one alone",
+        archives.front()->place(), opened->place(), has_same_errors ? "tiles" : "errors");
+  }
+  return {};
 }
+
+// A manifest's generation is that of the sources and options. Bakes of one generation differ in formats, errors and
+// levels, and without sources the replies are those of the archives.
+std::uint64_t GenerationOf(const Archives& archives) {
+  std::uint64_t generation = 0;
+  for (const auto& opened : archives) generation ^= archive::TilesHash(opened->manifest());  // kinds differ
+  return generation;
+}
+
+}  // namespace
 
 bool IsArchive(const std::string& path) {
   if (IsFile(path)) return path.ends_with(".pmtiles");
-  return !FilesOfBaked(path).empty();
+  return !FilesAt(path).empty();
 }
 
 Result<std::string> NameOfBaked(const std::string& place) {
-  for (const std::string& file : FilesOfBaked(place)) {
+  for (const std::string& file : FilesAt(place)) {
     const std::string of = IsFile(place) ? place : std::filesystem::path(file).parent_path().string();
     Result<archive::Manifest> manifest = archive::ReadManifest(of);
     if (!manifest) return tl::unexpected(std::move(manifest.error()));
@@ -69,7 +101,7 @@ Result<std::string> NameOfBaked(const std::string& place) {
 
 void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
   if (wanted.baked.empty()) return;
-  dataset.baked_files = FilesOfBaked(wanted.baked);
+  dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);
   if (!archives) {
     spdlog::warn("dataset {}: its archive is not used, and tiles are built: {}", wanted.name, archives.error().message);
@@ -87,10 +119,12 @@ void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
 }
 
 Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
+  tiler::Dataset dataset;
+  dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);
   if (!archives) return tl::unexpected(std::move(archives.error()));
+  if (Result<void> same = CheckSameTiles(*archives); !same) return tl::unexpected(std::move(same.error()));
   const archive::BakedDataset& baked = archives->front()->manifest().dataset;
-  tiler::Dataset dataset;
   dataset.name = wanted.name;
   dataset.attribution = baked.attribution;
   dataset.error_fraction = baked.error_fraction;
@@ -100,8 +134,7 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
     if (kind.format == tiler::TileFormat::kGlb) dataset.glb.compression = kind.compression;
   }
   dataset.metadata_levels = baked.metadata_levels;
-  dataset.generation = baked.generation;
-  dataset.baked_files = FilesOfBaked(wanted.baked);
+  dataset.generation = GenerationOf(*archives);
   dataset.baked = archive::MakeBakedTiles(*std::move(archives));
   return dataset;
 }

@@ -11,7 +11,8 @@
 namespace terrace::cli {
 
 // Adds the dataset's archive, if the configuration names one. An archive that cannot be opened or is of another version
-// is not used; the log says why. Precondition: all other members of `dataset` are set.
+// is not used; the log says why, and baked_files tell when to try again. Precondition: all other members of `dataset`
+// are set.
 void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset);
 
 // Makes a dataset without sources, from its archive alone. Errors name the place and the remedy.
@@ -21,8 +22,5 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted);
 bool IsArchive(const std::string& path);
 // The name of the dataset that was baked.
 Result<std::string> NameOfBaked(const std::string& place);
-
-// The files that change when an archive is baked again.
-std::vector<std::string> FilesOfBaked(const std::string& place);
 
 }  // namespace terrace::cli

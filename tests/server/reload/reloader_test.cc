@@ -94,6 +94,7 @@ class ReloaderTest : public testing::Test {
     hooks.stop = stop_;
     hooks.may_have_changed = [this] {
       ++looks_;
+      if (look_throws_.exchange(false)) throw std::bad_alloc();
       return changes_.load();
     };
     hooks.load = [this] {
@@ -106,11 +107,13 @@ class ReloaderTest : public testing::Test {
       return Open(wanted, stop);
     };
     hooks.publish = [this](const std::vector<tiler::Dataset>& served, const config::Config&) {
+      if (publish_throws_.exchange(false)) throw std::bad_alloc();
       const std::lock_guard lock(mutex_);
       served_.clear();
       for (const tiler::Dataset& dataset : served) served_.emplace_back(dataset.name, dataset.generation);
     };
     hooks.report = [this](const std::map<std::string, std::string>& problems) {
+      if (report_throws_.exchange(false)) throw std::bad_alloc();
       const std::lock_guard lock(mutex_);
       problems_ = problems;
     };
@@ -139,6 +142,7 @@ class ReloaderTest : public testing::Test {
   std::atomic<int> openings_{0}, looks_{0}, loads_{0};
   std::atomic<bool> changes_{true};
   std::atomic<bool> blocks_{false}, fails_{false}, throws_{false};
+  std::atomic<bool> look_throws_{false}, publish_throws_{false}, report_throws_{false};  // once
   std::mutex mutex_;
   config::ConfigResult next_;                                  // mutex_ guards this and the following
   std::vector<std::pair<std::string, std::uint64_t>> served_;  // name and generation
@@ -167,6 +171,42 @@ TEST_F(ReloaderTest, SurvivesAnExceptionOfLoading) {
   ASSERT_TRUE(Eventually([&] { return Problems().empty(); }));
   EXPECT_EQ(Served().size(), 1u);
   EXPECT_EQ(openings_, 0);
+}
+
+TEST_F(ReloaderTest, SurvivesExceptionsOfItsHooks) {
+  Start();
+  const auto before = Served();
+  for (std::atomic<bool>* fault : {&look_throws_, &publish_throws_, &report_throws_}) {
+    *fault = true;
+    fails_ = fault == &report_throws_;
+    const auto served = Served();
+    Put("a");
+    ASSERT_TRUE(Eventually([&] { return !*fault; })) << "the hook was called";
+    ASSERT_TRUE(Eventually([&] { return fails_ ? Problems().contains("a") : Served() != served; }));
+  }
+  EXPECT_NE(Served(), before);
+}
+
+// It was replaced between its opening and the first check, or was not there when the dataset was opened.
+TEST_F(ReloaderTest, SeesAnArchiveThatChangedWhileItWasOpened) {
+  for (const bool is_there : {true, false}) {
+    tiler::Dataset dataset = *Open(config_.datasets[0], {});
+    const std::string file = (folder_ / "a.tif").string();
+    dataset.baked_files = {{file, is_there ? dem::StampOf(file) : std::nullopt}};
+    if (is_there) Put("a");
+    dataset.source = nullptr;
+    DatasetSlot slot(config_.datasets[0], dataset);
+    EXPECT_EQ(slot.CheckFiles(10), 1u);
+    EXPECT_FALSE(slot.is_current());
+  }
+}
+
+TEST_F(ReloaderTest, AnArchiveThatStaysAbsentIsNoChange) {
+  tiler::Dataset dataset = *Open(config_.datasets[0], {});
+  dataset.baked_files = {{(folder_ / "b.pmtiles").string(), std::nullopt}};
+  DatasetSlot slot(config_.datasets[0], dataset);
+  slot.CheckFiles(10);
+  EXPECT_TRUE(slot.is_current());
 }
 
 TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {
