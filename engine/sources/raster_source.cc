@@ -30,24 +30,15 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
            "`gdal_translate -a_nodata VALUE in out` and make its overviews";
   }
   if (!rules.has_mask) return {};
-  constexpr const char* kOwnMask =
-      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
   if (!HasMaskBand(band)) {
     return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
            "bytes, and the overviews anew";
   }
   if (HasFileEndingWith(dataset, ".msk")) {
-    return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+    return "they were made without regard to the mask in a file of its own; copy it with `gdal_translate --config "
+           "GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
   }
-  for (int i = 0; i < band.GetOverviewCount(); ++i) {
-    GDALRasterBand* const overview = band.GetOverview(i);
-    if (overview == nullptr) continue;
-    GDALRasterBand* const mask = overview->GetMaskBand();
-    const bool has_mask = HasMaskBand(*overview) && mask != nullptr && mask->GetXSize() == overview->GetXSize() &&
-                          mask->GetYSize() == overview->GetYSize();
-    if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
-  }
-  return {};
+  return WhyOverviewsLackMasks(band);
 }
 
 // Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
