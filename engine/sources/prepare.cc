@@ -21,7 +21,7 @@ namespace {
 // blocks.
 constexpr std::uint32_t kOverviewReading = 2;
 // Incremented whenever detection finds other voids in the same raster (undeclared_nodata.h).
-constexpr std::uint32_t kNodataDetection = 2;
+constexpr std::uint32_t kNodataDetection = 3;
 
 // A hash of everything that the statistics of a raster depend on and that is known in advance.
 std::uint64_t HashOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
