@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <limits>
+#include <system_error>
 #include <vector>
 
 #include "engine/core/bytes.h"
@@ -139,12 +141,40 @@ class ClassicHeader {
   std::uint64_t end_of_fixed_ = 0;
 };
 
+// Whether a JPEG has its end marker. Programs append to JPEGs, so it need not be at the end of the file: it is the
+// first one outside of the segments, which may contain whole JPEGs. In the data of a scan, 0xFF is followed by 0 or
+// belongs to a restart marker.
+bool HasEndOfJpeg(std::istream& file) {
+  constexpr int kStart = 0xD8, kEnd = 0xD9, kFirstRestart = 0xD0, kPrivate = 0x01;
+  file.seekg(-2, std::ios::end);
+  if (file.get() == 0xFF && file.get() == kEnd) return true;
+  file.clear();
+  file.seekg(0);
+  while (file) {
+    if (file.get() != 0xFF) continue;
+    while (file.peek() == 0xFF) file.get();
+    const int marker = file.get();
+    if (marker == kEnd) return true;
+    const bool is_alone = marker <= kPrivate || (marker >= kFirstRestart && marker <= kStart);
+    if (is_alone) continue;
+    const int high = file.get(), low = file.get();
+    file.seekg(std::max(high * 256 + low - 2, 0), std::ios::cur);
+  }
+  return false;
+}
+
 }  // namespace
 
 std::uint64_t EndOfClassicNetCdf(std::string_view bytes) { return ClassicHeader(bytes).End(); }
 
 std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path) {
   if (EQUAL(dataset.GetDriverName(), "ENVI")) return EndOfEnvi(dataset);
+  if (EQUAL(dataset.GetDriverName(), "JPEG")) {
+    std::ifstream file(path, std::ios::binary);
+    std::error_code unknown;
+    const std::uint64_t size = std::filesystem::file_size(path, unknown);
+    return !file || unknown || HasEndOfJpeg(file) ? 0 : size + 2;
+  }
   if (!EQUAL(dataset.GetDriverName(), "netCDF")) return 0;
   // A header has a few kilobytes; one that is larger than this is not examined.
   constexpr std::size_t kMaxHeaderBytes = std::size_t{1} << 20;

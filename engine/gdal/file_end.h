@@ -1,5 +1,5 @@
-// The end of the samples in files of ENVI and netCDF. GDAL's drivers of these formats return zeros beyond the end of a
-// file, without an error.
+// The end of the samples in files of ENVI, netCDF and JPEG. GDAL's drivers of these formats return zeros, or grey,
+// beyond the end of a file, without an error.
 #pragma once
 
 #include <gdal_priv.h>
@@ -10,8 +10,8 @@
 
 namespace terrace::dem {
 
-// Returns a lower bound of the size in bytes of an ENVI or a classic netCDF file that has all its samples; 0 if nothing
-// is known, as for files of other formats.
+// Returns a lower bound of the size in bytes of an ENVI, a classic netCDF or a JPEG file that has all its samples; 0 if
+// nothing is known, as for files of other formats and for a JPEG with its end marker.
 std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path);
 
 // The same for the first bytes of a netCDF file. 0: it is of no classic format (CDF-1, CDF-2, CDF-5), as netCDF-4 is,

@@ -23,24 +23,11 @@ constexpr int kSamplesPerRead = 1 << 20;
 // Heights that are passed on at a time: 16 KiB.
 constexpr int kHeightsPerVisit = 1 << 12;
 
+// Many 16-bit elevation files contain SRTM's void value without declaring it; no place on Earth has this height.
 std::optional<double> NodataOf(GDALRasterBand& band) {
-  int has = 0;
-  double value = 0;
-  switch (band.GetRasterDataType()) {
-    case GDT_Int64:
-      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
-      break;
-    case GDT_UInt64:
-      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
-      break;
-    default:
-      value = band.GetNoDataValue(&has);
-      break;
-  }
-  if (has != 0) return value;
-  // Many 16-bit elevation files contain SRTM's void value without declaring it; no place on Earth has this height.
-  if (band.GetRasterDataType() == GDT_Int16) return std::numeric_limits<std::int16_t>::min();
-  return std::nullopt;
+  const std::optional<double> declared = DeclaredNodata(band);
+  if (declared || band.GetRasterDataType() != GDT_Int16) return declared;
+  return std::numeric_limits<std::int16_t>::min();
 }
 
 // The band that says which samples are valid: GDAL's mask, or an alpha band of a type that GDAL does not use as a mask.
@@ -61,6 +48,44 @@ bool IsSignedByte(GDALRasterBand& band) {
 }
 
 }  // namespace
+
+std::optional<double> DeclaredNodata(GDALRasterBand& band) {
+  int has = 0;
+  double value = 0;
+  switch (band.GetRasterDataType()) {
+    case GDT_Int64:
+      value = static_cast<double>(band.GetNoDataValueAsInt64(&has));
+      break;
+    case GDT_UInt64:
+      value = static_cast<double>(band.GetNoDataValueAsUInt64(&has));
+      break;
+    default:
+      value = band.GetNoDataValue(&has);
+      break;
+  }
+  return has != 0 ? std::optional(value) : std::nullopt;
+}
+
+std::string WhyOverviewsLackMasks(GDALRasterBand& band) {
+  constexpr const char* kRemedy =
+      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  GDALRasterBand* const mask = MaskOf(band);
+  if (mask == nullptr || band.GetOverviewCount() == 0) return {};
+  // GDAL makes masks for such overviews, which hide nothing.
+  if (HasFileEndingWith(*band.GetDataset(), ".msk") && mask->GetOverviewCount() == 0) {
+    return std::string("the mask in a file of its own has no overviews") + kRemedy;
+  }
+  for (int i = 0; i < band.GetOverviewCount(); ++i) {
+    GDALRasterBand* const overview = band.GetOverview(i);
+    if (overview == nullptr) continue;
+    GDALRasterBand* const of_overview = MaskOf(*overview);
+    if (of_overview == nullptr || of_overview->GetXSize() != overview->GetXSize() ||
+        of_overview->GetYSize() != overview->GetYSize()) {
+      return std::string("they have no masks, as the raster has") + kRemedy;
+    }
+  }
+  return {};
+}
 
 std::optional<double> MetresPerUnit(const std::string& unit) {
   std::string name;

@@ -59,6 +59,13 @@ struct SampleRules {
   static constexpr float kVoid = __builtin_nanf("");
 };
 
+// The nodata value that a band states; nothing if it states none.
+std::optional<double> DeclaredNodata(GDALRasterBand& band);
+
+// Why the overviews of a band with a mask, or with an alpha band, show samples that it hides, and the remedy; empty:
+// they hide them too, or there is nothing that hides samples.
+std::string WhyOverviewsLackMasks(GDALRasterBand& band);
+
 // Returns metres per unit for a unit name; nothing if the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 

@@ -28,19 +28,20 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
   bins.side_ = side;
   bins.last_col_ = (image.width() - 1) / side;
   bins.last_row_ = (image.height() - 1) / side;
+  std::vector<bool> is_needed(static_cast<std::size_t>(bins.last_col_) + 1);
   int west = std::numeric_limits<int>::max(), east = -1, north = west, south = -1;
   for (const Position& p : positions) {
     if (std::isnan(p.x) || std::isnan(p.y)) continue;
     const Neighbors x = Around(p.x, side, bins.last_col_), y = Around(p.y, side, bins.last_row_);
+    is_needed[static_cast<std::size_t>(x.lower)] = is_needed[static_cast<std::size_t>(x.upper)] = true;
     west = std::min(west, x.lower);
     east = std::max(east, x.upper);
     north = std::min(north, y.lower);
     south = std::max(south, y.upper);
   }
   if (east < 0) return bins;
-  bins.first_col_ = west;
+  bins.ChooseColumns(is_needed, west, east);
   bins.first_row_ = north;
-  bins.cols_ = east - west + 1;
   bins.rows_ = south - north + 1;
   if (std::int64_t{bins.cols_} * bins.rows_ > kMaxBins) {
     return MakeError(
@@ -54,9 +55,34 @@ Result<ImageBins> ImageBins::Read(ImageFile& image, int side, const std::vector<
   return bins;
 }
 
+// Leaves out the widest gap between needed columns if it is wider than all that remain: where an image around the Earth
+// begins and ends within a tile, the tile needs only its first and its last columns.
+void ImageBins::ChooseColumns(const std::vector<bool>& is_needed, int west, int east) {
+  first_col_ = west;
+  cols_ = east - west + 1;
+  int after = west;  // the first column after a needed one
+  for (int col = west; col <= east; ++col) {
+    if (!is_needed[static_cast<std::size_t>(col)]) continue;
+    if (col - after > gap_) {
+      gap_ = col - after;
+      gap_end_ = col;
+    }
+    after = col + 1;
+  }
+  if (2 * gap_ <= cols_) gap_ = 0;
+  cols_ -= gap_;
+}
+
 Result<void> ImageBins::Fill(ImageFile& image, const std::stop_token& stop) {
-  const int west = first_col_ * side_, north = first_row_ * side_;
-  const int east = std::min((first_col_ + cols_) * side_, image.width()),
+  if (gap_ == 0) return FillColumns(image, first_col_, cols_, stop);
+  const int before = gap_end_ - gap_ - first_col_;
+  if (auto filled = FillColumns(image, first_col_, before, stop); !filled) return filled;
+  return FillColumns(image, gap_end_, cols_ - before, stop);
+}
+
+Result<void> ImageBins::FillColumns(ImageFile& image, int first_col, int cols, const std::stop_token& stop) {
+  const int west = first_col * side_, north = first_row_ * side_;
+  const int east = std::min((first_col + cols) * side_, image.width()),
             south = std::min((first_row_ + rows_) * side_, image.height());
   const int width = east - west, rows_at_once = std::clamp(kPixelsAtOnce / width, 1, south - north);
   std::vector<ColorSample> pixels(Area(width, rows_at_once));
@@ -66,7 +92,7 @@ Result<void> ImageBins::Fill(ImageFile& image, const std::stop_token& stop) {
     if (auto read = image.Read(west, row, width, rows, pixels.data()); !read) return read;
     const ColorSample* pixel = pixels.data();
     for (int y = row; y < row + rows; ++y) {
-      Bin* const bins = bins_.data() + static_cast<std::ptrdiff_t>(y / side_ - first_row_) * cols_;
+      Bin* const bins = bins_.data() + static_cast<std::ptrdiff_t>(y / side_ - first_row_) * cols_ + Column(first_col);
       for (int x = 0; x < width; ++x, ++pixel) {
         if ((*pixel)[3] == 0) continue;
         Bin& bin = bins[x / side_];
@@ -84,7 +110,7 @@ ColorSample ImageBins::At(Position position) const {
   std::array<double, 3> sums{};
   double whole = 0;
   const auto add = [&](int col, int row, double share) {
-    const Bin& bin = bins_[Area(row - first_row_, cols_) + static_cast<std::size_t>(col - first_col_)];
+    const Bin& bin = bins_[Area(row - first_row_, cols_) + static_cast<std::size_t>(Column(col))];
     if (bin.count == 0 || share == 0) return;
     for (std::size_t i = 0; i < 3; ++i) sums[i] += share * bin.sums[i] / bin.count;
     whole += share;

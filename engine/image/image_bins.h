@@ -41,11 +41,16 @@ class ImageBins {
   };
   static Neighbors Around(double position, int side, int last);
 
+  // Chooses the columns of squares in bins_: of those from `west` to `east`, the needed ones with what lies between.
+  void ChooseColumns(const std::vector<bool>& is_needed, int west, int east);
   Result<void> Fill(ImageFile& image, const std::stop_token& stop);
+  Result<void> FillColumns(ImageFile& image, int first_col, int cols, const std::stop_token& stop);
+  int Column(int col) const { return col - first_col_ - (col >= gap_end_ ? gap_ : 0); }  // in bins_
 
   int side_ = 1;
   int last_col_ = 0, last_row_ = 0;                          // last square of the image
   int first_col_ = 0, first_row_ = 0, cols_ = 0, rows_ = 0;  // of the squares in bins_
+  int gap_end_ = 0, gap_ = 0;                                // columns that bins_ leaves out, and the first one after
   std::vector<Bin> bins_;
 };
 

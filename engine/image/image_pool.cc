@@ -2,7 +2,8 @@
 
 #include <utility>
 
-#include "engine/gdal/raster_file.h"
+#include "engine/common/source_log.h"
+#include "engine/gdal/sample_rules.h"
 #include "engine/image/image_bins.h"
 #include "engine/raster/sample_grid.h"
 
@@ -11,7 +12,9 @@ namespace terrace::dem {
 ImagePool::ImagePool(ImageFile image, StampedFiles files) : path_(image.path()), files_(std::move(files)) {
   GDALRasterBand& band = *image.dataset().GetRasterBand(1);
   sizes_.push_back(std::make_unique<Size>());
-  for (const int factor : OverviewFactors(band)) {
+  const std::string why = WhyOverviewsLackMasks(band);
+  if (!why.empty()) LogSource(SourceLog::Level::kWarn, path_, "its overviews are not used: {}", why);
+  for (const int factor : why.empty() ? OverviewFactors(band) : std::vector<int>()) {
     GDALRasterBand* const wanted = FindOverview(band, factor);
     for (int i = 0; i < band.GetOverviewCount(); ++i) {
       if (band.GetOverview(i) != wanted) continue;

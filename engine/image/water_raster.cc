@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "engine/common/source_log.h"
 #include "engine/core/check.h"
 #include "engine/crs/footprint.h"
 #include "engine/crs/georeference.h"
@@ -11,6 +12,7 @@
 #include "engine/crs/node_positions.h"
 #include "engine/gdal/handle_pool.h"
 #include "engine/gdal/raster_file.h"
+#include "engine/gdal/sample_rules.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/sample_grid.h"
 #include "engine/sources/located_raster.h"
@@ -56,6 +58,10 @@ Result<std::unique_ptr<WaterRaster>> WaterRaster::Open(const std::string& path, 
   impl->spacing = located->spacing;
   impl->layout = RasterLayout::Of(*located->dataset, impl->georeference, "");
   impl->layout.rules.is_indicator = true;
+  if (const std::string why = WhyOverviewsLackMasks(HeightBand(*located->dataset)); !why.empty()) {
+    LogSource(SourceLog::Level::kWarn, path, "its overviews are not used: {}", why);
+    impl->layout.overview_factors.clear();
+  }
   impl->footprint = footprint.Padded();
   const auto fingerprint = impl->georeference.FingerprintWith(impl->handles.files(), content);
   if (!fingerprint) return tl::unexpected(fingerprint.error());

@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "engine/common/open_file.h"
 #include "engine/common/source_log.h"
 #include "engine/core/bytes.h"
 
@@ -21,12 +22,12 @@ namespace {
 // blocks.
 constexpr std::uint32_t kOverviewReading = 2;
 // Incremented whenever detection finds other voids in the same raster (undeclared_nodata.h).
-constexpr std::uint32_t kNodataDetection = 2;
+constexpr std::uint32_t kNodataDetection = 3;
 
 // A hash of everything that the statistics of a raster depend on and that is known in advance.
 std::uint64_t HashOf(const RasterLayout& layout, bool find_voids, const std::string& path, const StampedFiles& files) {
   ByteWriter writer;
-  writer.PutBytes(path);
+  writer.PutBytes(AbsolutePath(path).string());  // one file with two names has one cache file
   writer.Put(files.fingerprint());
   for (const int part : {layout.width, layout.height, layout.columns, layout.wraps ? 1 : 0}) writer.Put(part);
   const SampleRules& rules = layout.rules;
@@ -62,7 +63,7 @@ class Preparer {
         chunks_(layout.width, layout.height) {
     if (options.cache.folder) {
       cache_file_ = StatisticsPath(options.cache.folder->path(), path, layout.rules.extra_nodata, options.find_voids,
-                                   !layout.overview_factors.empty());
+                                   !layout.overview_factors.empty(), layout.rules.metres_per_unit);
       prepared_.use = std::make_shared<const CacheFolder::Use>(options.cache.folder, cache_file_);
     }
     prepared_.preparation.chunks = chunks_.count();
@@ -223,13 +224,14 @@ class Preparer {
 }  // namespace
 
 std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
-                           const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews) {
+                           const std::vector<double>& extra_nodata, bool find_voids, bool has_overviews,
+                           double metres_per_unit) {
   const std::filesystem::path whole = AbsolutePath(path);
   ByteWriter writer;
   writer.PutBytes(whole.string());
   for (const double value : extra_nodata) writer.Put(value);
-  if (!find_voids) writer.Put<std::uint8_t>(0);
-  if (has_overviews) writer.Put<std::uint8_t>(1);
+  writer.Put(metres_per_unit);
+  for (const bool option : {find_voids, has_overviews}) writer.Put<std::uint8_t>(option ? 1 : 0);
   const std::string bytes = writer.Take();
   return (std::filesystem::path(cache_dir) /
           fmt::format("{}-{:016x}.statistics", whole.filename().string(), XXH3_64bits(bytes.data(), bytes.size())))

@@ -53,11 +53,12 @@ struct PreparedRaster {
 Result<PreparedRaster> PrepareRaster(GDALDataset& dataset, const RasterLayout& layout, const std::string& path,
                                      const StampedFiles& files, const PrepareOptions& options);
 
-// The cache file of a raster. Its name contains the raster's name and a hash of its full path, of its configured nodata
-// values, because two datasets may configure one file differently, and of the use of overviews. A raster whose
-// overviews turn out to contain voids has two cache files: one that says so, and one made without the overviews.
+// The cache file of a raster. Its name contains the raster's name and a hash of its full path, of what two datasets may
+// configure differently for one file (nodata values, detection of voids, the unit of a vertical datum), and of the use
+// of overviews. A raster whose overviews turn out to contain voids has two cache files: one that says so, and one made
+// without the overviews.
 std::string StatisticsPath(const std::string& cache_dir, const std::string& path,
                            const std::vector<double>& extra_nodata = {}, bool find_voids = true,
-                           bool has_overviews = false);
+                           bool has_overviews = false, double metres_per_unit = 1);
 
 }  // namespace terrace::dem

@@ -30,24 +30,27 @@ std::string WhyMisleading(GDALDataset& dataset, const SampleRules& rules) {
            "`gdal_translate -a_nodata VALUE in out` and make its overviews";
   }
   if (!rules.has_mask) return {};
-  constexpr const char* kOwnMask =
-      "; copy it with `gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
   if (!HasMaskBand(band)) {
     return "they were made without regard to an alpha band of this type, which GDAL takes for no mask; make it one of "
            "bytes, and the overviews anew";
   }
   if (HasFileEndingWith(dataset, ".msk")) {
-    return std::string("they were made without regard to the mask in a file of its own") + kOwnMask;
+    return "they were made without regard to the mask in a file of its own; copy it with `gdal_translate --config "
+           "GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
   }
+  return WhyOverviewsLackMasks(band);
+}
+
+// Whether an overview was made while the file stated another nodata value, or none: then it has averaged voids.
+bool HaveOtherNodata(GDALRasterBand& band, double declared, const SampleRules& rules) {
   for (int i = 0; i < band.GetOverviewCount(); ++i) {
     GDALRasterBand* const overview = band.GetOverview(i);
     if (overview == nullptr) continue;
-    GDALRasterBand* const mask = overview->GetMaskBand();
-    const bool has_mask = HasMaskBand(*overview) && mask != nullptr && mask->GetXSize() == overview->GetXSize() &&
-                          mask->GetYSize() == overview->GetYSize();
-    if (!has_mask) return std::string("they have no masks, as the raster has") + kOwnMask;
+    const auto stated = DeclaredNodata(*overview);
+    const bool is_same = stated && (rules.IsSame(*stated, declared) || (std::isnan(*stated) && std::isnan(declared)));
+    if (!is_same) return true;
   }
-  return {};
+  return false;
 }
 
 // Removes from the layout the overviews that must not be read: those that include voids, by the nodata values of the
@@ -66,23 +69,29 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) 
 
 // The same, based on the statistics of the raster and its overviews.
 std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
-  if (layout.overview_factors.empty()) return {};
-  int is_declared = 0;
-  HeightBand(dataset).GetNoDataValue(&is_declared);
+  if (layout.overview_factors.empty() || statistics.voids == 0) return {};
+  const auto declared = DeclaredNodata(HeightBand(dataset));
   const BlockRange all = statistics.table.Whole();
   // Cubic and Lanczos kernels overshoot their input by less than this.
   const double overshoot = 0.02 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest));
+  const bool has_other_heights = all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot;
   std::string why;
-  if (layout.rules.has_mask) {
-    if (all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot) {
-      why =
-          "they have heights that the raster has not, as if they were made without its mask; copy it with "
-          "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
-    }
-  } else if (layout.rules.nodata && is_declared == 0 && statistics.voids > 0) {
+  if (layout.rules.nodata && !declared && !layout.rules.has_mask) {
     why =
         "they were made of voids too, which are not declared; declare them in a copy with "
         "`gdal_translate -a_nodata -32768 in out` and make its overviews";
+  } else if (declared && HaveOtherNodata(HeightBand(dataset), *declared, layout.rules)) {
+    why =
+        "they were made of voids too, before the raster stated its nodata value; make them anew with `gdaladdo -clean "
+        "file` and `gdaladdo -r average file`";
+  } else if (has_other_heights && layout.rules.has_mask) {
+    why =
+        "they have heights that the raster has not, as if they were made without its mask; copy it with "
+        "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
+  } else if (has_other_heights) {
+    why =
+        "they have heights that the raster has not, as if they were made of its voids too; make them anew with "
+        "`gdaladdo -clean file` and `gdaladdo -r average file`";
   }
   if (!why.empty()) layout.overview_factors.clear();
   return why;

@@ -69,10 +69,11 @@ struct CachedAverages::ChunkAverages {
   const char* floats() const { return bytes.get() + sizeof(std::uint64_t); }
 };
 
-CachedAverages::CachedAverages(const OpenFile& file, std::string path, RasterLayout layout,
+CachedAverages::CachedAverages(const OpenFile& file, std::string header, std::string path, RasterLayout layout,
                                std::vector<std::uint64_t> offsets)
     : id_(NextId()),
       identity_(IdentityOf(file.get()).value_or(FileIdentity())),
+      header_(std::move(header)),
       path_(std::move(path)),
       layout_(std::move(layout)),
       factors_(KeptFactors(layout_)),
@@ -87,7 +88,8 @@ Result<OpenFile> CachedAverages::Open() const {
     return MakeError(passes ? ErrorCode::kUnavailable : ErrorCode::kNotFound, "{}: cannot be opened: {}", path_,
                      ErrorText());
   }
-  if (IdentityOf(file.get()) != identity_) return MakeError(ErrorCode::kNotFound, "{}: was replaced", path_);
+  if (IdentityOf(file.get()) != identity_ || ReadAt(file.get(), 0, header_.size(), header_.size()) != header_)
+    return MakeError(ErrorCode::kNotFound, "{}: was replaced", path_);
   TouchHourly(file);
   return file;
 }

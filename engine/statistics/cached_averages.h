@@ -22,8 +22,9 @@ class CachedAverages {
   // For all rasters of the process.
   static constexpr std::size_t kMaxBytesInMemory = std::size_t{32} << 20;
 
-  // `file`: the open cache file at `path`.
-  CachedAverages(const OpenFile& file, std::string path, RasterLayout layout, std::vector<std::uint64_t> offsets);
+  // `file`: the open cache file at `path`, which begins with `header`.
+  CachedAverages(const OpenFile& file, std::string header, std::string path, RasterLayout layout,
+                 std::vector<std::uint64_t> offsets);
 
   bool Has(int factor) const {
     return factor < kLargestDirectFactor && (factors_ & static_cast<unsigned>(factor)) != 0;
@@ -52,6 +53,7 @@ class CachedAverages {
 
   const std::uint64_t id_;  // of its chunks in memory
   FileIdentity identity_;
+  std::string header_;  // a new file may get the inode of one that was removed
   std::string path_;
   RasterLayout layout_;
   unsigned factors_;

@@ -131,13 +131,17 @@ RasterLayout WithDetectedNodata(RasterLayout layout, const DetectedNodata& detec
   return layout;
 }
 
-std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsKey& wanted) {
+namespace {
+
+// LoadStatistics, with or without its lines in the log.
+std::optional<CachedStatistics> FindStatistics(const std::string& path, const StatisticsKey& wanted, bool is_logged) {
   OpenFile file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file.is_open()) return std::nullopt;
   const std::uint64_t size = SizeOf(file.get());
   const auto damaged = [&](const char* what) {
-    LogSource(SourceLog::Level::kWarn, path, "{} does not fit its checksum, or was cut; the source is prepared anew",
-              what);
+    if (is_logged)
+      LogSource(SourceLog::Level::kWarn, path, "{} does not fit its checksum, or was cut; the source is prepared anew",
+                what);
     return std::nullopt;
   };
   StatisticsKey key = wanted;
@@ -146,8 +150,9 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
     case HeaderState::kDamaged:
       return damaged("its header");
     case HeaderState::kOther:
-      LogSource(SourceLog::Level::kInfo, path,
-                "was made from another state of the source, or by another version; the source is prepared anew");
+      if (is_logged)
+        LogSource(SourceLog::Level::kInfo, path,
+                  "was made from another state of the source, or by another version; the source is prepared anew");
       return std::nullopt;
     case HeaderState::kSame:
       break;
@@ -168,11 +173,17 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
   auto statistics = DecodeStatistics(whole.GetBytes(whole.remaining()), layout);
   if (!statistics) return damaged("its statistics");
   Touch(file.get());
-  CachedStatistics cached{std::move(key.detected), *std::move(statistics), nullptr};
+  CachedStatistics cached{key.detected, *std::move(statistics), nullptr};
   if (KeptFactors(layout) != 0) {
-    cached.averages = std::make_shared<const CachedAverages>(file, path, layout, std::move(offsets));
+    cached.averages = std::make_shared<const CachedAverages>(file, HeaderOf(key), path, layout, std::move(offsets));
   }
   return cached;
+}
+
+}  // namespace
+
+std::optional<CachedStatistics> LoadStatistics(const std::string& path, const StatisticsKey& key) {
+  return FindStatistics(path, key, /*is_logged=*/true);
 }
 
 StatisticsCacheWriter::StatisticsCacheWriter(std::shared_ptr<CacheFolder> folder, OpenFile file, std::string path,
@@ -210,7 +221,9 @@ Result<std::optional<StatisticsCacheWriter>> StatisticsCacheWriter::Open(std::sh
     }
     // The previous owner of the lock may have renamed or removed the file.
     if (const auto opened = IdentityOf(file.get()); !opened || opened != IdentityOf(partial)) continue;
-    if (waiting && LoadStatistics(path, key)) {
+    // Another process may have finished the file before this one locked the partial one, whether or not it waited. What
+    // does not fit was reported when it was first looked for.
+    if (FindStatistics(path, key, /*is_logged=*/false)) {
       ::unlink(partial.c_str());
       return std::nullopt;
     }

@@ -47,8 +47,8 @@ std::optional<CachedStatistics> LoadStatistics(const std::string& path, const St
 // Writes a cache file, as `path`.partial until it is finished. Locked: one process at a time.
 class StatisticsCacheWriter {
  public:
-  // Waits while another process writes the file; returns nothing if that one has finished it. kUnavailable: the folder
-  // is not writable, or files in use take its budget. kCancelled: stopped.
+  // Waits while another process writes the file; returns nothing if one has finished it meanwhile. kUnavailable: the
+  // folder is not writable, or files in use take its budget. kCancelled: stopped.
   static Result<std::optional<StatisticsCacheWriter>> Open(std::shared_ptr<CacheFolder> folder, const std::string& path,
                                                            const StatisticsKey& key, const std::stop_token& stop);
 

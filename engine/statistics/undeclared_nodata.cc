@@ -77,13 +77,15 @@ class BandScanner {
 
   float At(int c, int r) const { return samples_[Index(c, r)]; }
 
+  // Samples of one of the values are no evidence that another one is a height, as -32767 is none for -32768.
   void CountValues(float height, Evidence& evidence) const {
+    const auto same = std::ranges::find(heights_, height);
+    if (same != heights_.end()) {
+      ++evidence.at_value[static_cast<std::size_t>(same - heights_.begin())];
+      return;
+    }
     for (std::size_t i = 0; i < kUsualNodata.size(); ++i) {
-      if (height == heights_[i]) {
-        ++evidence.at_value[i];
-      } else if (std::abs(height - heights_[i]) <= kAloneWithin) {
-        ++evidence.near_value[i];
-      }
+      if (std::abs(height - heights_[i]) <= kAloneWithin) ++evidence.near_value[i];
     }
   }
 

@@ -382,6 +382,53 @@ TEST(CacheFolder, FilesThatDoNotFitAreMadeAnewAndSaidOnce) {
   }
 }
 
+TEST(CacheFolder, OneRasterWithTwoNamesHasOneFile) {
+  const TempDir dir;
+  fs::create_directory(dir.File("real"));
+  const std::string path = WriteRaster(dir, Hills(700, 700), "real/dem.tif"), folder = dir.File("cache");
+  fs::create_directory_symlink(dir.File("real"), dir.File("link"));
+  const auto first = OpenIn(path, CacheIn(folder));
+  const auto second = OpenIn(dir.File("link/dem.tif"), CacheIn(folder));
+  EXPECT_TRUE(second->preparation().from_cache);
+  ExpectAveragesOf(path, *first);
+  EXPECT_FALSE(first->has_lost_cache());
+}
+
+TEST(CacheFolder, UnitsOfTwoDatasetsHaveFilesOfTheirOwn) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, Hills(700, 700)), folder = dir.File("cache");
+  const auto source = OpenIn(path, CacheIn(folder));
+  RasterLayout feet = source->layout();
+  feet.rules.metres_per_unit = 0.3048;
+  const auto dataset = OpenRaster(path);
+  ASSERT_TRUE(dataset);
+  const auto prepared = PrepareRaster(**dataset, feet, path, source->files(), {CacheIn(folder)});
+  ASSERT_TRUE(prepared);
+  EXPECT_FALSE(prepared->preparation.from_cache);
+  EXPECT_TRUE(OpenIn(path, CacheIn(folder))->preparation().from_cache);
+  ExpectAveragesOf(path, *source);
+  EXPECT_FALSE(source->has_lost_cache());
+
+  // Whoever looked before this file was finished does not make it again.
+  const auto writer =
+      StatisticsCacheWriter::Open(std::make_shared<CacheFolder>(folder), prepared->cache_file, prepared->key, {});
+  ASSERT_TRUE(writer);
+  EXPECT_FALSE(writer->has_value());
+}
+
+TEST(CacheFolder, AveragesOfAnotherRasterAreNotReadFromTheSameInode) {
+  const TempDir dir;
+  RasterSpec deeper = Hills(700, 700);
+  deeper.value = [value = deeper.value](int c, int r) { return value(c, r) - 500; };
+  const std::string path = WriteRaster(dir, Hills(700, 700)), other = WriteRaster(dir, deeper, "other.tif"),
+                    folder = dir.File("cache");
+  OpenIn(other, CacheIn(folder));
+  const auto source = OpenIn(path, CacheIn(folder));
+  std::ofstream(StatisticsPath(folder, path), std::ios::binary) << ContentOf(StatisticsPath(folder, other));
+  ExpectAveragesOf(path, *source);
+  EXPECT_TRUE(source->has_lost_cache());
+}
+
 TEST(KeptFactors, NoLevelReadsManySamplesForANode) {
   RasterLayout layout;
   const auto factors = [&](int width, int height, std::vector<int> overviews) {

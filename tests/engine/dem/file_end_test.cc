@@ -117,6 +117,33 @@ TEST(FileEnd, OtherFormatsOfNetCdfAreNotExamined) {
   EXPECT_TRUE(DemSource::Open(path));
 }
 
+TEST(FileEnd, OfAJpegIsItsMarker) {
+  const TempDir dir;
+  RasterSpec spec = Slope();
+  spec.type = "Byte";
+  spec.width = spec.height = 200;
+  spec.value = [](int col, int row) { return (col * 7 + row * 13) % 100; };
+  const std::string path = Written(dir, spec, "JPEG", "dem.jpg"), bytes = AllBytes(path);
+  const auto opens = [&](const std::string& content) {
+    std::ofstream(path, std::ios::binary) << content;
+    const auto source = DemSource::Open(path);
+    if (!source) {
+      EXPECT_NE(source.error().message.find("is cut short"), std::string::npos) << source.error().message;
+    }
+    return source.has_value();
+  };
+  EXPECT_TRUE(opens(bytes));
+  for (const std::size_t lost : {std::size_t{1}, std::size_t{2}, std::size_t{40}, bytes.size() / 4}) {
+    EXPECT_FALSE(opens(bytes.substr(0, bytes.size() - lost))) << lost;
+  }
+  EXPECT_TRUE(opens(bytes + std::string(5000, 'x'))) << "as cameras append";
+  // A comment with a JPEG's markers in it, as thumbnails have them.
+  const std::string comment("\xff\xfe\x00\x06\xff\xd8\xff\xd9", 8);
+  const std::string commented = bytes.substr(0, 2) + comment + bytes.substr(2);
+  EXPECT_TRUE(opens(commented + "x"));
+  EXPECT_FALSE(opens(commented.substr(0, commented.size() - 2)));
+}
+
 // Big-endian numbers of four bytes, and texts padded to four.
 class Header {
  public:

@@ -5,7 +5,9 @@
 #include <ogr_spatialref.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <thread>
 
@@ -287,6 +289,54 @@ TEST(Imagery, MercatorPixelsAreAveragesAndDoNotDependOnTheTile) {
     }
     EXPECT_NEAR(whole->rgba[4 * (256 * 128 + 128)], 100, 2) << "not one of the pixels";
   }
+}
+
+// Writes 0xFF over the stored blocks that contain a column, so that they cannot be decoded.
+void DamageColumn(const std::string& path, int column) {
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> blocks;
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str()));
+    GDALRasterBand& band = *dataset->GetRasterBand(1);
+    int width = 0, height = 0;
+    band.GetBlockSize(&width, &height);
+    for (int row = 0; row * height < band.GetYSize(); ++row) {
+      const auto number = [&](const std::string& what) {
+        const std::string item = what + std::to_string(column / width) + "_" + std::to_string(row);
+        return std::strtoull(band.GetMetadataItem(item.c_str(), "TIFF"), nullptr, 10);
+      };
+      blocks.emplace_back(number("BLOCK_OFFSET_"), number("BLOCK_SIZE_"));
+    }
+  }
+  std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
+  for (const auto& [offset, bytes] : blocks) {
+    file.seekp(static_cast<std::streamoff>(offset));
+    file << std::string(bytes, '\xff');
+  }
+}
+
+TEST(Imagery, ATileAcrossTheEndsOfAnImageAroundTheEarthReadsNothingBetween) {
+  const TempDir dir;
+  ImageSpec spec;
+  spec.width = 720;
+  spec.height = 360;
+  spec.geo_transform = {-20, 0.5, 0, 90, 0, -0.5};
+  spec.color = [](int column, int) { return Color{column / 3, 100, 7}; };
+  const std::string plain = WriteImage(dir, spec), path = dir.File("tiled.tif");
+  {
+    const char* const options[] = {"TILED=YES", "BLOCKXSIZE=64", "BLOCKYSIZE=64", "COMPRESS=DEFLATE", nullptr};
+    const GDALDatasetUniquePtr from(GDALDataset::Open(plain.c_str()));
+    GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
+    GDALClose(driver->CreateCopy(path.c_str(), from.get(), FALSE, const_cast<char**>(options), nullptr, nullptr));
+  }
+  DamageColumn(path, 360);
+  const auto imagery = OpenImage(path);
+  // 22.5 to 0 degrees west: the image's last 2.5 degrees, then its first 20.
+  const auto picture = ReadOrFail(*imagery, {3, 7, 4}, 256);
+  ASSERT_TRUE(picture.has_value());
+  EXPECT_NEAR(At(*picture, 100, 5)[0], 238, 1);
+  EXPECT_NEAR(At(*picture, 100, 253)[0], 13, 1);
+  // The other side of the Earth shows that blocks are damaged.
+  EXPECT_FALSE(imagery->Read({3, 15, 4}, 256).has_value());
 }
 
 TEST(Imagery, AnImageOfAnotherPlaceIsRefused) {

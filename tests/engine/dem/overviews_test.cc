@@ -303,6 +303,54 @@ TEST(Overviews, OfAMosaicHaveNoStepAtTheJoint) {
   }
 }
 
+// Averages of heights and of voids, at every overview.
+RasterSpec SpecWithVoids(double nodata) {
+  RasterSpec spec = RampSpec(361, 241);
+  spec.value = [nodata](int column, int row) { return (column + row) % 50 == 7 ? nodata : 800 + column; };
+  return spec;
+}
+
+void StateNodata(const std::string& path, double nodata) {
+  const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+  ASSERT_NE(dataset, nullptr);
+  ASSERT_EQ(dataset->GetRasterBand(1)->SetNoDataValue(nodata), CE_None);
+}
+
+TEST(Overviews, MadeOfVoidsAreNotUsed) {
+  const TempDir dir;
+  const std::string after = WriteRaster(dir, SpecWithVoids(-9999), "after.tif");
+  StateNodata(after, -9999);
+  RasterSpec other_value = SpecWithVoids(-9999);
+  other_value.nodata = -1;
+  const std::string other = WriteRaster(dir, other_value, "other.tif");
+  StateNodata(other, -9999);
+  // A height that no place has is a void without any statement.
+  const std::string unstated = WriteRaster(dir, SpecWithVoids(-99999), "unstated.tif");
+  for (const auto& [path, why] :
+       {std::pair{after, "stated its nodata value"}, {other, "stated its nodata value"}, {unstated, "of its voids"}}) {
+    const auto source = OpenRasterOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_TRUE(source->layout().overview_factors.empty()) << path;
+    EXPECT_NE(source->info().overviews_unused.find(why), std::string::npos) << source->info().overviews_unused;
+    const auto heights = source->ReadAverages(8, {0, 0, 46, 31}, {});
+    ASSERT_TRUE(heights);
+    EXPECT_GE(*std::ranges::min_element(*heights), 800) << path;
+  }
+}
+
+TEST(Overviews, OfARasterThatStatesItsVoidsOrHasNoneAreUsed) {
+  const TempDir dir;
+  RasterSpec before = SpecWithVoids(-9999);
+  before.nodata = -9999;
+  const std::string without = WriteRaster(dir, RampSpec(361, 241), "without.tif");
+  StateNodata(without, -9999);
+  for (const std::string& path : {WriteRaster(dir, before, "before.tif"), without}) {
+    const auto source = OpenRasterOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->layout().overview_factors, (std::vector<int>{2, 4, 8, 16})) << source->info().overviews_unused;
+  }
+}
+
 // 3,601 samples a side: most of a tile is the same as without overviews, within the difference that other averages make
 // on steep ground.
 TEST(Overviews, OfRealGroundChangeLittle) {

@@ -53,6 +53,16 @@ TEST(UndeclaredNodata, UndeclaredSpikesAreVoids) {
   }
 }
 
+TEST(UndeclaredNodata, TwoValuesCloseTogetherAreBothVoids) {
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, Synthetic([](int col, int row) {
+                                               return col == 100 && row % 60 == 30  ? -32768
+                                                      : col == 50 && row % 40 == 20 ? -32767
+                                                                                    : Land(col, row);
+                                             })));
+  EXPECT_TRUE(source && InfoOf(*source).void_samples == 3 + 5);
+}
+
 TEST(UndeclaredNodata, CanBeSwitchedOffAndStated) {
   const TempDir dir;
   const std::string path =
