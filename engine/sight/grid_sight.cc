@@ -121,15 +121,17 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
   std::vector<RayPart> open;
   // If no raster grid comes before this one, all of its heights count.
   const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
-  for (std::size_t i = 0; i < pieces.size() && is_first; ++i) {
-    Scan scan{pieces[i], on_grid[i], surface, search, open, stop};
-    if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+  if (is_first) {
+    for (const PieceOnGrid& piece : on_grid) {
+      Scan scan{piece.track, piece, surface, search, open, stop};
+      if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+    }
   }
   auto part = parts.begin();
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
+  for (const PieceOnGrid& piece_on_grid : on_grid) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "looking along a ray was stopped");
-    const TrackPiece& piece = pieces[i];
-    Scan scan{piece, on_grid[i], surface, search, open, stop};
+    const TrackPiece& piece = piece_on_grid.track;
+    Scan scan{piece, piece_on_grid, surface, search, open, stop};
     const double length = piece.end - piece.start;
     while (part != parts.end() && part->end <= piece.start && part + 1 != parts.end()) ++part;
     for (auto p = part; p != parts.end() && p->start <= piece.end; ++p) {
