@@ -344,6 +344,49 @@ TEST(Sight, SeesTheGroundBehindPlacesWithoutAPosition) {
   }
 }
 
+// Cells with some voids, of several kilometres: a ray may touch the ground between two places that are measured.
+TEST(Sight, FindsTheLowestAndTheFirstPlaceBesideVoids) {
+  const TempDir dir;
+  RasterSpec spec{.width = 60, .height = 60, .geo_transform = {10, .08, 0, 48, 0, -.08}, .nodata = -9999};
+  spec.value = [](int col, int row) {
+    const unsigned mixed = static_cast<unsigned>(col * 73 + row * 151 + col * row * 29) * 2654435761u >> 16;
+    return mixed % 3 == 0 ? -9999.0 : static_cast<double>(mixed % 300);
+  };
+  DemOptions options;
+  options.max_void_gap = 0;
+  const auto source = OpenOrFail(WriteRaster(dir, spec), options);
+  ASSERT_TRUE(source);
+  const Region area{10.1, 43.3, 14.7, 47.9, .2, 20};
+  const std::vector<SightRay> rays = RaysIn(*source, area, Rays(400), 11);
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  const std::vector<Marched> marched = March(*source, rays, area.step_m, {});
+  std::size_t blocked = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const SightAnswer& answer = (*answers)[i];
+    if (std::isnan(answer.clearance_m)) continue;
+    EXPECT_LE(answer.clearance_m, marched[i].clearance_m + 0.01) << i;
+    EXPECT_FALSE(marched[i].is_blocked && answer.is_visible) << i;
+    if (!marched[i].is_blocked || answer.is_visible) continue;
+    ++blocked;
+    const double length_m = LengthOf(rays[i]);
+    EXPECT_LE(*answer.blocked_at * length_m, marched[i].blocked_at * length_m + 1e-3) << i;
+    // It is above the ground right before, and below it right behind. Between two cells the ground may jump.
+    std::array<double, 2> clearance_m{};
+    for (const std::size_t side : {std::size_t{0}, std::size_t{1}}) {
+      const double share = std::clamp(*answer.blocked_at + (side == 0 ? -1e-6 : 1e-6), 0.0, 1.0);
+      const SightPoint there = PointAt(rays[i], share, {});
+      const std::vector<GeoPosition> place = {{there.longitude, there.latitude}};
+      clearance_m[side] = there.height_m - source->ReadPoints(place)->front();
+    }
+    if (*answer.blocked_at > 0 && !std::isnan(clearance_m[0])) {
+      EXPECT_GT(clearance_m[0], -0.01) << i;
+    }
+    EXPECT_LT(clearance_m[1], 0.01) << i;
+  }
+  EXPECT_GT(blocked, rays.size() / 10);
+}
+
 // A rising strip of 400 blocks: the farther to the south, the less a level ray is above it, so none of them is skipped.
 TEST(Sight, KeepsFewBlocksInMemory) {
   const TempDir dir;
