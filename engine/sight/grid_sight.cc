@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/raster/grid_cells.h"
+#include "engine/sight/step_clearance.h"
 
 namespace terrace::dem {
 namespace {
@@ -36,50 +37,14 @@ double FirstBlockLine(const PieceOnGrid& on_grid, double first, double last) {
   return at;
 }
 
-// The samples of a block, cells among them without voids, and places of a ray over them.
-struct SampleView {
-  const float* heights;
-  std::int64_t stride, west, north, east, south;
-
-  std::int64_t ColumnOf(double x) const { return std::clamp(static_cast<std::int64_t>(x), west, east); }
-  std::int64_t RowOf(double y) const { return std::clamp(static_cast<std::int64_t>(y), north, south); }
-};
-struct RayPlace {
-  double x, y;  // samples from the block's first
-  double height_m;
-};
-
-// At least the clearance of a straight step of less than a sample. In a cell it is a polynomial of the second degree,
-// a t^2 + b t + c for t = 0 .. 1, which lies nowhere more than |a| / 4 below both of its ends; a is the cell's twist
-// times the way on both axes. The surface has no steps between cells, so each place is read in one of the two.
-double LeastClearance(const SampleView& samples, const RayPlace& from, const RayPlace& to) {
-  const double dx = to.x - from.x, dy = to.y - from.y, rise_m = to.height_m - from.height_m;
-  const std::int64_t column = samples.ColumnOf(from.x), row = samples.RowOf(from.y);
-  const std::int64_t to_column = samples.ColumnOf(to.x), to_row = samples.RowOf(to.y);
-  // Where it crosses a line of samples on each axis.
-  const double at_x = to_column == column ? 1 : (static_cast<double>(std::max(column, to_column)) - from.x) / dx;
-  const double at_y = to_row == row ? 1 : (static_cast<double>(std::max(row, to_row)) - from.y) / dy;
-  double least_m = std::numeric_limits<double>::infinity(), before_m = 0, before = -1;
-  const auto add = [&](std::int64_t cell_column, std::int64_t cell_row, double share) {
-    const float* const corner = samples.heights + cell_row * samples.stride + cell_column;
-    const double nw = corner[0], ne = corner[1], sw = corner[samples.stride], se = corner[samples.stride + 1];
-    const double twist = nw - ne - sw + se;
-    const double west = from.x - static_cast<double>(cell_column), north = from.y - static_cast<double>(cell_row);
-    const auto clearance = [&](double t) {
-      const double east_of = west + t * dx, south_of = north + t * dy;
-      return from.height_m + t * rise_m -
-             (nw + east_of * (ne - nw) + south_of * (sw - nw) + east_of * south_of * twist);
-    };
-    if (before < 0) before_m = clearance(0), before = 0;
-    const double after_m = clearance(share), way = share - before;
-    least_m = std::min(least_m, std::min(before_m, after_m) - std::abs(twist * dx * dy) * way * way / 4);
-    before_m = after_m, before = share;
-  };
-  const bool is_x_first = at_x <= at_y;
-  add(column, row, std::min(at_x, at_y));
-  if (before < 1) add(is_x_first ? to_column : column, is_x_first ? row : to_row, std::max(at_x, at_y));
-  if (before < 1) add(to_column, to_row, 1);
-  return least_m;
+// The first place below the tolerance between one above it and one below it.
+template <typename Clearance>
+double FirstBelow(const Clearance& clearance, double above, double below) {
+  for (int step = 0; step < 40 && above < below; ++step) {
+    const double half = (above + below) / 2;
+    (clearance(half) < -kSightTolerance ? below : above) = half;
+  }
+  return below;
 }
 
 }  // namespace
@@ -102,7 +67,36 @@ struct GridSight::Scan {
       open.push_back({start, end});
     }
   }
+  // Measures a short part with heights, whose clearance is no polynomial but has one lowest place at most.
+  template <typename Clearance>
+  void MeasureSmooth(const Clearance& clearance, double first, double last);
 };
+
+template <typename Clearance>
+void GridSight::Scan::MeasureSmooth(const Clearance& clearance, double first, double last) {
+  const auto at = [&](double s) { return clearance(s).value_or(std::numeric_limits<double>::infinity()); };
+  const Quadratic over(at(first), at((first + last) / 2), at(last));
+  double lowest = first;
+  if (over.Slope(0) < 0 && over.Slope(1) > 0) {
+    double low = first, high = last;
+    for (int step = 0; step < 30; ++step) {
+      const double left = Lerp(low, high, 0.38), right = Lerp(low, high, 0.62);
+      const bool is_on_left = at(left) < at(right);
+      (is_on_left ? high : low) = is_on_left ? right : left;
+    }
+    lowest = (low + high) / 2;
+  }
+  double above = first;
+  for (const double s : {first, lowest, last}) {
+    const double clearance_m = at(s);
+    search.Add(clearance_m, ShareOf(s));
+    if (clearance_m >= -kSightTolerance) {
+      above = s;
+    } else {
+      search.AddBlocked(ShareOf(FirstBelow(at, above, s)));
+    }
+  }
+}
 
 SightAnswer SightSearch::Answer(bool has_gaps) const {
   SightAnswer answer;
@@ -121,15 +115,17 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
   std::vector<RayPart> open;
   // If no raster grid comes before this one, all of its heights count.
   const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
-  for (std::size_t i = 0; i < pieces.size() && is_first; ++i) {
-    Scan scan{pieces[i], on_grid[i], surface, search, open, stop};
-    if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+  if (is_first) {
+    for (const PieceOnGrid& piece : on_grid) {
+      Scan scan{piece.track, piece, surface, search, open, stop};
+      if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
+    }
   }
   auto part = parts.begin();
-  for (std::size_t i = 0; i < pieces.size(); ++i) {
+  for (const PieceOnGrid& piece_on_grid : on_grid) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "looking along a ray was stopped");
-    const TrackPiece& piece = pieces[i];
-    Scan scan{piece, on_grid[i], surface, search, open, stop};
+    const TrackPiece& piece = piece_on_grid.track;
+    Scan scan{piece, piece_on_grid, surface, search, open, stop};
     const double length = piece.end - piece.start;
     while (part != parts.end() && part->end <= piece.start && part + 1 != parts.end()) ++part;
     for (auto p = part; p != parts.end() && p->start <= piece.end; ++p) {
@@ -386,18 +382,19 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
                      (scan.surface == SightSurface::kNotHoles
                           ? 0.0 * (unfilled[0] + unfilled[east] + unfilled[south] + unfilled[south + east])
                           : 0.0);
-  const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
-  if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
-    MeasureRim(scan, block, column, row, first, last);
-    return {};
-  }
-  // The lowest place of a ray in a cell may lie below both ends of its part.
+  // The lowest place of a ray in a cell may lie below both ends of its part. None of the surface lies above the largest
+  // corner.
   const double length = last - first, sag_m = std::abs(scan.piece.height_m.curvature()) * length * length / 4;
   const double slack_m = sag_m + (blocks_.includes_undulations() ? kSlack : SightBlocks::kMaxUndulation);
   const double lowest_m = std::min(scan.piece.height_m.At(first), scan.piece.height_m.At(last));
-  if (scan.search.IsSettled(lowest_m - std::max(std::max(nw, ne), std::max(sw, se)) - slack_m, scan.ShareOf(first))) {
+  const double highest_m = std::fmax(std::fmax(nw, ne), std::fmax(sw, se));  // without voids
+  const bool is_settled = scan.search.IsSettled(lowest_m - highest_m - slack_m, scan.ShareOf(first));
+  const bool is_rim = (!grid_.wraps() && (x < 0 || x > grid_.columns() - 1)) || y < 0 || y > grid_.rows() - 1;
+  if (std::isnan(all) || (is_rim && !IsInside(scan, middle))) {
+    MeasureRim(scan, block, column, row, first, last, is_settled);
     return {};
   }
+  if (is_settled) return {};
   const auto clearance = [&](double s) {
     const double east_of = std::clamp(scan.on_grid.x.At(s) - static_cast<double>(cell.west), 0.0, 1.0);
     const double south_of = std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0);
@@ -420,21 +417,17 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   // The first place below the tolerance.
   double place = 0;
   if (at_first >= -kSightTolerance) {
-    double above = 0, below = 1;
-    if (at_last >= -kSightTolerance) below = -over.Slope(0) / (2 * over.curvature());
-    for (int step = 0; step < 40; ++step) {
-      const double half = (above + below) / 2;
-      (over.At(half) < -kSightTolerance ? below : above) = half;
-    }
-    place = below;
+    const double below = at_last < -kSightTolerance ? 1 : -over.Slope(0) / (2 * over.curvature());
+    place = FirstBelow([&](double share) { return over.At(share); }, 0, below);
   }
   scan.search.AddBlocked(scan.ShareOf(Lerp(first, last, place)));
   return {};
 }
 
-// In a cell with voids the weights of the other samples count, as for heights at points (Interpolate).
+// In a cell with voids the weights of the other samples count, as for heights at points (Interpolate). If the part
+// `is_settled`, only looks for places without a height.
 void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
-                           double last) {
+                           double last, bool is_settled) {
   const double x = scan.on_grid.x.At((first + last) / 2);
   const double turn = std::floor(x) - static_cast<double>(column);  // whole turns, where columns wrap
   const double shift = grid_.wraps() ? turn : 0;
@@ -450,30 +443,29 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
                                     : blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
     return scan.piece.height_m.At(s) - *height - undulation_m;
   };
-  const auto add = [&](double s, double clearance_m) {
-    scan.search.Add(clearance_m, scan.ShareOf(s));
-    if (clearance_m < -kSightTolerance) scan.search.AddBlocked(scan.ShareOf(s));
-  };
   double before = first;
-  std::optional<double> known = clearance(first);
-  if (known) add(first, *known);
+  bool is_known = clearance(first).has_value();
   for (int i = 1; i <= kRimParts; ++i) {
     const double s = Lerp(first, last, static_cast<double>(i) / kRimParts);
-    const std::optional<double> next = clearance(s);
-    double edge = known ? s : before;  // where the heights end or begin
-    if (known.has_value() != next.has_value()) {
-      double with = known ? before : s, without = known ? s : before;
-      for (int step = 0; step < 30; ++step) {
-        edge = (with + without) / 2;
-        const std::optional<double> there = clearance(edge);
-        if (there) add(edge, *there);
-        (there ? with : without) = edge;
-      }
+    const bool is_next_known = clearance(s).has_value();
+    // Where the heights end or begin.
+    double with = is_known ? before : s, without = is_known ? s : before;
+    for (int step = 0; step < 30 && is_known != is_next_known; ++step) {
+      const double edge = (with + without) / 2;
+      (clearance(edge) ? with : without) = edge;
     }
-    if (!known) scan.Open(before, next ? edge : s);
-    if (known && !next) scan.Open(edge, s);
-    if (next) add(s, *next);
-    known = next;
+    if (is_known && is_next_known) {
+      if (!is_settled) scan.MeasureSmooth(clearance, before, s);
+    } else if (is_known) {
+      if (!is_settled) scan.MeasureSmooth(clearance, before, with);
+      scan.Open(without, s);
+    } else if (is_next_known) {
+      scan.Open(before, without);
+      if (!is_settled) scan.MeasureSmooth(clearance, with, s);
+    } else {
+      scan.Open(before, s);
+    }
+    is_known = is_next_known;
     before = s;
   }
 }

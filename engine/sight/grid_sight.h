@@ -74,8 +74,8 @@ class GridSight {
                     double size);
   Result<void> Measure(Scan& scan, double first, double last);
   Result<void> MeasureInCell(Scan& scan, double first, double last);
-  void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first,
-                  double last);
+  void MeasureRim(Scan& scan, const SightBlock& block, std::int64_t column, std::int64_t row, double first, double last,
+                  bool is_settled);
   bool IsInside(const Scan& scan, double s) const;
   std::int64_t WrappedColumn(std::int64_t column) const;
   CellRange CellsOf(const Quadratic::Range& x, const Quadratic::Range& y) const;

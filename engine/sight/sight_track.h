@@ -24,6 +24,8 @@ class Quadratic {
     double min, max;
   };
   Range Over(double first, double last) const;
+  // The same polynomial from `first` to `last`, which become 0 and 1.
+  Quadratic Part(double first, double last) const { return {At(first), At((first + last) / 2), At(last)}; }
   // The place between `first` and `last` with this value, clamped: two steps of Newton, for nearly linear ranges.
   double Solve(double value, double first, double last) const;
 
@@ -46,9 +48,11 @@ std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& option
 
 // A piece in samples: (0, 0) is the centre of the first pixel. NaN where the CRS has no such position.
 struct PieceOnGrid {
+  TrackPiece track;
   Quadratic x, y;
 };
-// On a grid that does not span 360 degrees, columns are those of the turn around the Earth nearest to the grid.
+// In order. A piece that leaves the map at one edge and enters it at another, or that leaves the part of the Earth that
+// the CRS has positions for, is divided there. Columns of a grid that wraps are continuous along the ray.
 std::vector<PieceOnGrid> OnGrid(std::span<const TrackPiece> pieces, const Georeference& georeference);
 
 }  // namespace terrace::dem

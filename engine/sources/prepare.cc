@@ -80,6 +80,9 @@ class Preparer {
       if (auto opened = OpenWriter(); !opened) return tl::unexpected(opened.error());
       if (!writer_ && Load()) return std::move(prepared_);
     }
+    if (const std::string wide = DescribeWideBlocks(dataset_); !wide.empty()) {
+      LogSource(SourceLog::Level::kWarn, path_, "{}", wide);
+    }
     auto statistics = ReadStatistics();
     if (statistics && LacksChunks()) statistics = ReadStatistics();
     if (statistics && options_.find_voids && !key_.detected.any())

@@ -274,6 +274,7 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   if (averages_) info_.min_kept_factor = averages_->min_factor();
   if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
   info_.found_voids = prepared.detected.text;
+  info_.wide_blocks = DescribeWideBlocks(dataset);
   info_.datum_in_use = vertical_.name;
   if (vertical_.geoid) info_.vertical_operation = vertical_.geoid->description();
   info_.spacing_m = spacing_.finer;

@@ -355,6 +355,24 @@ Chunk ChunkGrid::At(int index) const {
   return {col, row, std::min(kSide, width_ - col), std::min(kSide, height_ - row)};
 }
 
+std::string DescribeWideBlocks(GDALDataset& dataset) {
+  GDALRasterBand& band = *dataset.GetRasterBand(1);
+  int width = 0, height = 0;
+  band.GetBlockSize(&width, &height);
+  width = std::min(width, band.GetXSize());
+  if (width <= 2 * ChunkGrid::kSide) return {};
+  const std::int64_t blocks = DivideUp(ChunkGrid::kSide + 2 * kHalo, height) + 1;  // a chunk begins within one
+  const std::int64_t rows = std::min<std::int64_t>(blocks * height, band.GetYSize());
+  const std::int64_t needed = width * rows * GDALGetDataTypeSizeBytes(band.GetRasterDataType());
+  const std::int64_t cache = GDALGetCacheMax64();
+  if (needed <= cache) return {};
+  return fmt::format(
+      "is stored in blocks of {} x {} samples: preparing it decodes each of them {} times, unless gdal_cache_bytes "
+      "is at least {} MiB (it is {} MiB); rewrite it with `gdal_translate -co TILED=YES -co COMPRESS=DEFLATE in "
+      "out.tif`",
+      width, height, DivideUp(width, ChunkGrid::kSide), (needed >> 20) + 1, cache >> 20);
+}
+
 ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
   ChunkStatistics statistics;
   const auto blocks = [&](int pixels) { return Area(DivideUp(chunk.cols, pixels), DivideUp(chunk.rows, pixels)); };

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <mutex>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "engine/common/content_hash.h"
@@ -70,6 +71,10 @@ struct ChunkStatistics {
   // For factors of KeptFactors: for all of them or none. A void chunk has averages if an overview has heights there.
   bool has_averages(unsigned factors) const;
 };
+
+// Why reading all chunks decodes the file's blocks many times, with the remedy; empty: it does not. Chunks side by side
+// share blocks that are wider, and those of a row of chunks have to fit into GDAL's cache.
+std::string DescribeWideBlocks(GDALDataset& dataset);
 
 // Statistics of a void chunk, without averages and sums.
 ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout);

@@ -69,6 +69,7 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
                     info.height_unit));
   }
   if (!info.heights_doubted.empty()) advice.push_back(info.heights_doubted);
+  if (!info.wide_blocks.empty()) advice.push_back(info.wide_blocks);
   if (info.driver == "VRT") {
     advice.push_back(
         "a VRT, which names other files: 'terrace serve' takes it where allowed_drivers of its configuration lists "

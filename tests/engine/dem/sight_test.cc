@@ -1,5 +1,6 @@
 // Lines of sight against a march along each ray in steps of a tenth of a pixel.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -245,6 +246,145 @@ TEST(Sight, CrossesTheAntimeridianOfARasterAroundTheEarth) {
   EXPECT_FALSE((*answers)[0].is_visible);
   // 222 km sag by 3.9 km.
   EXPECT_NEAR((*answers)[1].clearance_m, 9000 - 2000 - 3863, 60);
+}
+
+// 0 but for smooth hills, and for mountains at longitude 0: a ray across the antimeridian does not see them.
+RasterSpec HillsAroundTheEarth(const std::string& crs, double half_width, double half_height) {
+  RasterSpec spec{.width = 1200, .height = 600};
+  spec.geo_transform = {-half_width, half_width / 600, 0, half_height, 0, -half_height / 300};
+  spec.crs = crs;
+  spec.value = [](int col, int row) {
+    return std::abs(col - 599.5) < 30 ? 5000 : 300 * std::sin(col / 9.0) * std::cos(row / 7.0);
+  };
+  return spec;
+}
+
+void ExpectAsMarchedAcrossTheAntimeridian(const RasterSpec& spec) {
+  SCOPED_TRACE(spec.crs);
+  const TempDir dir;
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  std::vector<SightRay> rays;
+  for (int i = 0; i < 40; ++i) {
+    const double latitude = -70 + 3.5 * i;
+    rays.push_back({{179.4 + 0.013 * i, latitude, 500}, {-179.6 + 0.011 * i, latitude + 0.1, 800}});
+    if (i % 2 == 1) std::swap(rays.back().from, rays.back().to);
+  }
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers) << answers.error().message;
+  const std::vector<Marched> marched = March(*source, rays, 100, {});
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_NEAR((*answers)[i].clearance_m, marched[i].clearance_m, 1) << rays[i].from.latitude;
+    EXPECT_EQ((*answers)[i].is_visible, !marched[i].is_blocked) << rays[i].from.latitude;
+    EXPECT_FALSE((*answers)[i].has_gaps) << rays[i].from.latitude;
+  }
+}
+
+TEST(Sight, CrossesTheAntimeridianOfProjectedRasters) {
+  constexpr double kHalfTurn = 20037508.342789244, kRootOf2 = 1.4142135623730951, kMajor = 6378137;
+  ExpectAsMarchedAcrossTheAntimeridian(HillsAroundTheEarth("EPSG:3857", kHalfTurn, kHalfTurn));
+  ExpectAsMarchedAcrossTheAntimeridian(HillsAroundTheEarth("+proj=eqc +datum=WGS84", kHalfTurn, kHalfTurn / 2));
+  ExpectAsMarchedAcrossTheAntimeridian(HillsAroundTheEarth("+proj=cea +datum=WGS84", kHalfTurn, kMajor));
+  ExpectAsMarchedAcrossTheAntimeridian(
+      HillsAroundTheEarth("+proj=moll +datum=WGS84", 2 * kRootOf2 * kMajor, kRootOf2 * kMajor));
+}
+
+// Its columns do not wrap, and the gap is shorter than a piece of a ray.
+TEST(Sight, SeesBothSidesOfANarrowGapInARasterAroundTheEarth) {
+  const TempDir dir;
+  RasterSpec spec{.width = 35999, .height = 40, .geo_transform = {-180, 0.01, 0, 0.2, 0, -0.01}};
+  spec.value = [](int col, int) { return col == 0 || col == 35998 ? 300.0 : 0.0; };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  const std::vector<SightRay> rays = {{{179.987, 0.1, 200}, {-179.997, 0.1, 350}},
+                                      {{179.987, 0.1, 350}, {-179.997, 0.1, 200}}};
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  for (const SightAnswer& answer : *answers) {
+    EXPECT_NEAR(answer.clearance_m, -100, 10);
+    EXPECT_TRUE(answer.has_gaps);
+  }
+}
+
+TEST(Sight, SeesTheGroundUpToTheEdgeOfTheProjection) {
+  const TempDir dir;
+  RasterSpec spec{.width = 512, .height = 512, .geo_transform = {-6.4e6, 25e3, 0, 6.4e6, 0, -25e3}};
+  spec.crs = "+proj=ortho +lat_0=0 +lon_0=0 +a=6378137 +b=6378137";
+  spec.value = [](int, int) { return 100.0; };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  const std::vector<SightRay> rays = {{{89.95, 0.1, 300}, {90.01, 0.1, 350}}, {{90.01, 0.1, 350}, {89.95, 0.1, 300}}};
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  for (const SightAnswer& answer : *answers) {
+    EXPECT_NEAR(answer.clearance_m, 200, 1);
+    EXPECT_TRUE(answer.has_gaps);
+  }
+}
+
+// A shift grid of the datum may end beside the raster.
+TEST(Sight, SeesTheGroundBehindPlacesWithoutAPosition) {
+  const TempDir dir;
+  RasterSpec spec{.width = 360, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}};
+  auto raster = RasterSource::Open(WriteRaster(dir, spec));
+  ASSERT_TRUE(raster) << raster.error().message;
+  std::vector<TrackPiece> pieces = PiecesOf({{178.5, 10, 0}, {-178.5, 10, 0}}, {});
+  ASSERT_GT(pieces.size(), 10u);
+  constexpr double kNowhere = std::numeric_limits<double>::quiet_NaN();
+  for (const std::size_t i : {std::size_t{0}, pieces.size() / 3, pieces.size() - 2}) {
+    pieces[i].longitude = {kNowhere, kNowhere, kNowhere};
+  }
+  const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, (*raster)->georeference());
+  for (const double share : {0.2, 0.5, 0.8, 1.0}) {
+    for (const PieceOnGrid& piece : on_grid) {
+      if (share <= piece.track.start || share > piece.track.end) continue;
+      const double s = (share - piece.track.start) / (piece.track.end - piece.track.start);
+      EXPECT_NEAR(piece.x.At(s), 358 + 3 * share, 0.01) << share;
+    }
+  }
+}
+
+// Cells with some voids, of several kilometres: a ray may touch the ground between two places that are measured.
+TEST(Sight, FindsTheLowestAndTheFirstPlaceBesideVoids) {
+  const TempDir dir;
+  RasterSpec spec{.width = 60, .height = 60, .geo_transform = {10, .08, 0, 48, 0, -.08}, .nodata = -9999};
+  spec.value = [](int col, int row) {
+    const unsigned mixed = static_cast<unsigned>(col * 73 + row * 151 + col * row * 29) * 2654435761u >> 16;
+    return mixed % 3 == 0 ? -9999.0 : static_cast<double>(mixed % 300);
+  };
+  DemOptions options;
+  options.max_void_gap = 0;
+  const auto source = OpenOrFail(WriteRaster(dir, spec), options);
+  ASSERT_TRUE(source);
+  const Region area{10.1, 43.3, 14.7, 47.9, .2, 20};
+  const std::vector<SightRay> rays = RaysIn(*source, area, Rays(400), 11);
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  const std::vector<Marched> marched = March(*source, rays, area.step_m, {});
+  std::size_t blocked = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const SightAnswer& answer = (*answers)[i];
+    if (std::isnan(answer.clearance_m)) continue;
+    EXPECT_LE(answer.clearance_m, marched[i].clearance_m + 0.01) << i;
+    EXPECT_FALSE(marched[i].is_blocked && answer.is_visible) << i;
+    if (!marched[i].is_blocked || answer.is_visible) continue;
+    ++blocked;
+    const double length_m = LengthOf(rays[i]);
+    EXPECT_LE(*answer.blocked_at * length_m, marched[i].blocked_at * length_m + 1e-3) << i;
+    // It is above the ground right before, and below it right behind. Between two cells the ground may jump.
+    std::array<double, 2> clearance_m{};
+    for (const std::size_t side : {std::size_t{0}, std::size_t{1}}) {
+      const double share = std::clamp(*answer.blocked_at + (side == 0 ? -1e-6 : 1e-6), 0.0, 1.0);
+      const SightPoint there = PointAt(rays[i], share, {});
+      const std::vector<GeoPosition> place = {{there.longitude, there.latitude}};
+      clearance_m[side] = there.height_m - source->ReadPoints(place)->front();
+    }
+    if (*answer.blocked_at > 0 && !std::isnan(clearance_m[0])) {
+      EXPECT_GT(clearance_m[0], -0.01) << i;
+    }
+    EXPECT_LT(clearance_m[1], 0.01) << i;
+  }
+  EXPECT_GT(blocked, rays.size() / 10);
 }
 
 // A rising strip of 400 blocks: the farther to the south, the less a level ray is above it, so none of them is skipped.
