@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "engine/tin/scan/triangle_rows.h"
 
@@ -115,7 +116,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
         const std::size_t k =
             static_cast<std::size_t>(row) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(column);
         const double counted = allowed.empty() ? off : off / static_cast<double>(allowed[k]);
-        if (counted <= worst || !IsInside(column, row)) continue;
+        if (counted <= worst) continue;
         const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
         if (std::find(corners.begin(), corners.end(), sample) != corners.end()) continue;
         worst = counted;
@@ -124,6 +125,11 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     });
     if (miss) error.misses.push_back(*miss);
   }
+  // A sample on an edge is the worst one of two triangles.
+  const auto in_rows = [](tin::SamplePosition p) { return std::pair(p.y, p.x); };
+  std::ranges::sort(error.misses, {}, in_rows);
+  const auto repeated = std::ranges::unique(error.misses);
+  error.misses.erase(repeated.begin(), repeated.end());
   return error;
 }
 

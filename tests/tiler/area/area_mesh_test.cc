@@ -189,6 +189,26 @@ TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
   }
 }
 
+// In space the chord between two vertices of a parallel also bulges sideways: off the ground at its samples where that
+// is steep.
+TEST_F(AreaMeshTest, KeepsTheErrorOnItsEdges) {
+  for (const double error_m : {1.0, 3.0, 10.0}) {
+    AreaRequest area{-84.4, 36.2, -84.1, 36.4, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEnu};
+    EXPECT_LE(Build(area).max_error_m, error_m + 0.01);
+  }
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const double error_m : {5.0, 20.0, 200.0}) {
+    for (const double south : {-90.0, -89.0, 60.0, 86.0, 87.5}) {
+      AreaRequest area{0, south, 40, south + 2, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef};
+      const EncodedTile encoded = Build(area);
+      EXPECT_LE(encoded.max_error_m, error_m + 0.01) << south;
+      EXPECT_LT(encoded.vertices, 400'000u) << south;
+    }
+  }
+}
+
 // An area closer to the pole than the rounding of a node still has one row of cells.
 TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
   auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
