@@ -2,6 +2,7 @@
 import contextlib
 import http.client
 import json
+import math
 import random
 import re
 import resource
@@ -38,14 +39,14 @@ class Bake(BakeCase):
         return {line["unit"]: line["outcome"] for line in lines if "unit" in line}
 
     @contextlib.contextmanager
-    def server(self):
-        process = subprocess.Popen([BINARY, "serve", "--config", self.config, "--listen", "127.0.0.1:0"], env=self.environment,
+    def server(self, *what):
+        process = subprocess.Popen([BINARY, "serve", *(what or ("--config", self.config)), "--listen", "127.0.0.1:0"], env=self.environment,
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         try:
             port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stdout.readline())[1])
             connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
 
-            def get(path, headers):
+            def get(path, headers={}):
                 connection.request("GET", f"/cells/{path}", headers=headers)
                 reply = connection.getresponse()
                 return reply.status, reply.read()
@@ -174,6 +175,14 @@ class Bake(BakeCase):
         self.assertGreater(len(baked), 2)
         self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
         self.expect_equal(updated, fresh)
+
+    def test_extensions_of_any_format_are_part_of_the_bake(self):
+        place = self.place("formats")
+        formats = ("--format", "png,terrain")
+        self.assertEqual(self.run_bake("--out", place, *formats, levels="0-2").returncode, 0)
+        other = self.run_bake("--out", place, *formats, "--extensions", "none", levels="0-2")
+        self.assertEqual(other.returncode, 2, other.stderr)
+        self.assertIn('extensions "octvertexnormals", not "none"', other.stderr)
 
     def test_shards_and_finish_make_the_same_files(self):
         place = self.place("shards")

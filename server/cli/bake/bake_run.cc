@@ -91,15 +91,15 @@ Result<tiler::Dataset> OpenDataset(const BakeArguments& arguments, const BakeInp
 
 bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Dataset& dataset,
                               const std::vector<bake::Target>& targets) {
-  const archive::Manifest& first = targets.front().manifest;
-  const tiler::TileRequest& kind = first.kind;
   std::string error = "default";
   if (arguments.error > 0) error = PlainNumber(arguments.error) + " m";
   if (arguments.fraction > 0) error = PlainNumber(arguments.fraction) + " of the level's";
-  std::string extensions;
-  for (const auto& [is_on, name] : {std::pair(kind.normals, "octvertexnormals"),
-                                    std::pair(kind.water_mask, "watermask"), std::pair(kind.metadata, "metadata")}) {
-    if (is_on) extensions += (extensions.empty() ? "" : ",") + std::string(name);
+  std::string extensions;  // of terrain; other formats have none
+  for (const auto& [extension, name] : {std::pair(&tiler::TileRequest::normals, "octvertexnormals"),
+                                        std::pair(&tiler::TileRequest::water_mask, "watermask"),
+                                        std::pair(&tiler::TileRequest::metadata, "metadata")}) {
+    const auto is_on = [wanted = extension](const bake::Target& target) { return target.manifest.kind.*wanted; };
+    if (std::ranges::any_of(targets, is_on)) extensions += (extensions.empty() ? "" : ",") + std::string(name);
   }
   return {{{"dataset", dataset.name},
            {"format", arguments.format},
