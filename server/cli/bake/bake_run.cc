@@ -216,7 +216,8 @@ int FinishAlone(const PlacedBake& bake, const std::vector<bake::UnitReport>& rep
   summary.is_complete = true;
   if (bake.arguments.form == kChunks) return kExitOk;
   summary.place = bake.arguments.out;
-  const auto exported = Export(bake.arguments, bake.place, bake.signals.token());
+  const auto exported = Export(bake.arguments, bake.place, bake.identity, bake.pipeline.datasets().front().generation,
+                               bake.signals.token());
   if (exported) return kExitOk;
   return bake.signals.signal() != 0 ? StopCode(bake.signals) : Fail(exported.error());
 }
@@ -274,13 +275,9 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const bool is_chunked = arguments.form == kChunks;
   const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
-  if (!is_chunked) {
-    if (const auto free = CheckExportPlace(arguments.out); !free) {
-      if (!RemoveIfExported(place, identity, dataset.generation)) return Fail(free.error());
-      std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
-      return kExitOk;
-    }
-  }
+  const auto is_exported = [&] { return WasExported(place, arguments, identity, dataset.generation); };
+  const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out);
+  if (!free && !is_exported()) return Fail(free.error());
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
@@ -288,6 +285,12 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const auto lock = bake::PlaceLock::Take(place, lock_name);
   if (signals.signal() != 0) return StopCode(signals);  // a store that does not answer holds it up
   if (!lock) return Fail(lock.error());
+  if (!free) {
+    if (!is_exported()) return Fail(free.error());  // another process was here before the lock
+    RemoveBake(place);
+    std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
+    return kExitOk;
+  }
   if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
     return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
   }
