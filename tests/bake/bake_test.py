@@ -176,6 +176,20 @@ class Bake(BakeCase):
         self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
         self.expect_equal(updated, fresh)
 
+    def test_update_takes_the_formats_of_a_bake_killed_between_their_manifests(self):
+        killed, updated = self.place("killed"), self.place("updated")
+        formats = ("--format", "terrain,glb")
+        self.assertEqual(self.run_bake("--out", killed, *formats, levels="0-8").returncode, 0)
+        (killed / "glb/manifest.json").unlink()
+        config = self.make_sources("newer-cell", (0, 0, 0, 1))
+        done = self.run_bake("--out", updated, "--update", killed, *formats, "--json", config=config, levels="0-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        self.assertEqual({line["format"] for line in lines if line.get("outcome") == "copied"}, {"terrain"})
+        (killed / "terrain/manifest.json").unlink()
+        none = self.run_bake("--out", self.place("none"), "--update", killed, *formats, levels="0-8")
+        self.assertEqual((none.returncode, "has no manifest.json" in none.stderr), (1, True), none.stderr)
+
     def test_extensions_of_any_format_are_part_of_the_bake(self):
         place = self.place("formats")
         formats = ("--format", "png,terrain")

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -111,7 +112,9 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
            {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options_hash)}}};
 }
 
+// A bake that was killed between two manifests has those of some formats. The others have no old units.
 Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
+  std::optional<Error> missing;
   for (bake::Target& target : targets) {
     const std::string folder = bake::ArchivePlace(place, target.manifest, false);
     target.old_place = folder;
@@ -120,13 +123,20 @@ Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& target
       target.old_place = place;
       manifest = archive::ReadManifest(place);
     }
-    if (!manifest) return MakeError(manifest.error().code, "--update: {}", manifest.error().message);
+    if (!manifest) {
+      const Error error{manifest.error().code, "--update: " + manifest.error().message};
+      if (error.code != ErrorCode::kNotFound) return tl::unexpected(error);
+      missing = error;
+      continue;
+    }
     if (manifest->units.empty()) {
       return MakeError(ErrorCode::kInvalidArgument, "--update {}: is one file without units; give a bake in chunks",
                        place);
     }
     for (const archive::UnitEntry& unit : manifest->units) target.old_units.emplace(unit.name, unit);
   }
+  const auto has_none = [](const bake::Target& target) { return target.old_units.empty(); };
+  if (missing && std::ranges::all_of(targets, has_none)) return tl::unexpected(*missing);
   return {};
 }
 
