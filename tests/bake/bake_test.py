@@ -198,6 +198,24 @@ class Bake(BakeCase):
         self.assertEqual(other.returncode, 2, other.stderr)
         self.assertIn('extensions "octvertexnormals", not "none"', other.stderr)
 
+    def test_tiles_json_promises_the_tiles_that_are_there(self):
+        chunks, folder = self.place("chunks"), self.place("folder")
+        for place, form in ((chunks, "chunks"), (folder, "folder")):
+            done = self.run_bake("--out", place, "--form", form, "--format", "png", "--bbox", "6.2,46.2,6.4,46.4", levels="4-9")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        documents = [json.loads((folder / "tiles.json").read_text())]
+        with self.server(chunks) as get:
+            documents.append(json.loads(get("tiles.json", {"Accept-Encoding": "identity"})[1]))
+            for document in documents:
+                self.assertEqual((document["minzoom"], document["maxzoom"]), (4, 9))
+                west, south, east, north = document["bounds"]
+                self.assertTrue(5.6 < west <= 6.2 and 6.4 <= east < 7.1 and 45.7 < south <= 46.2 and 46.4 <= north < 46.9, document)
+                for x, y in ((west + 1e-6, south + 1e-6), (east - 1e-6, north - 1e-6)):
+                    row = (1 - math.asinh(math.tan(math.radians(y))) / math.pi) / 2
+                    for level in range(4, 10):
+                        tile = f"{level}/{int((x + 180) / 360 * 2 ** level)}/{int(row * 2 ** level)}.png"
+                        self.assertEqual((get(tile)[0], (folder / tile).exists()), (200, True), tile)
+
     def test_shards_and_finish_make_the_same_files(self):
         place = self.place("shards")
         for shard in range(3):
