@@ -31,8 +31,9 @@ class AreaSurface {
 
   // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
   // misses are, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border: areas
-  // have no neighbours that share it. `allowed`: the bounds
-  // by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was measured until then.
+  // have no neighbours that share it. A vertex that exceeds the bound counts with the distance from its own position.
+  // `allowed`: the bounds by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was
+  // measured until then.
   proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
                                 const std::vector<geo::Vec3>& ecef, double bound_m, std::span<const float> allowed,
                                 const std::stop_token& stop) const;

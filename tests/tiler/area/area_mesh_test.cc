@@ -14,6 +14,7 @@
 #include "engine/geo/ellipsoid.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
+#include "tests/support/test_data.h"
 
 namespace terrace::tiler {
 namespace {
@@ -207,6 +208,22 @@ TEST_F(AreaMeshTest, KeepsTheErrorOnItsEdges) {
       EXPECT_LT(encoded.vertices, 400'000u) << south;
     }
   }
+}
+
+// Where the chord of a parallel and the ground's bulge meet, a thin triangle stands upright in space.
+TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
+  constexpr const char* kFile = "bigtujunga_30m_utm11.tif";
+  const auto path = test_support::TestDataPath(kFile);
+  if (!path) GTEST_SKIP() << test_support::MissingTestData(kFile);
+  auto opened = dem::DemSource::Open(*path);
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  const AreaRequest area{-180, -90, 180, 90, 5, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
+  const auto plan = PlanArea(*source_, 0.5, area, 16 * kMany);
+  ASSERT_TRUE(plan) << plan.error().message;
+  const auto mesh = BuildAreaMesh(*source_, *plan, area, {});
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_LE(mesh->max_error_m, 5.001);
 }
 
 // An area closer to the pole than the rounding of a node still has one row of cells.
