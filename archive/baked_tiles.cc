@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "archive/documents.h"
 #include "proto/compress.h"
 #include "proto/mesh/quantized_mesh.h"
 #include "proto/mesh/tile_metadata.h"
@@ -131,7 +132,10 @@ class Baked final : public tiler::BakedTiles {
     extent_.sources = static_cast<std::size_t>(dataset.sources);
     extent_.max_source_level = dataset.max_source_level;
     if (manifest.kind.format == TileFormat::kHeightPng) {
-      extent_.max_mercator_depth = manifest.max_level + (manifest.kind.side_px == 512 ? 1 : 0);
+      const int deeper = manifest.kind.side_px == 512 ? 1 : 0;
+      extent_.min_mercator_depth = manifest.min_level + deeper;
+      extent_.max_mercator_depth = manifest.max_level + deeper;
+      extent_.height_bounds = HeightBounds(manifest);
       return;
     }
     // Archives of one bake have the same tiles.

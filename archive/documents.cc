@@ -1,12 +1,17 @@
 #include "archive/documents.h"
 
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <vector>
 
 #include "archive/manifest_json.h"
 #include "archive/tile_scheme.h"
+#include "engine/dem/planned_tiles.h"
+#include "engine/geo/tile_cover.h"
 #include "proto/documents/layer_json.h"
 #include "proto/documents/tile_json.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {
@@ -29,16 +34,31 @@ std::string LayerJson(const Manifest& manifest) {
   return proto::EncodeLayerJson(layer);
 }
 
+dem::GeoBounds HeightBounds(const Manifest& manifest) {
+  const dem::GeoBounds& data = manifest.dataset.bounds;
+  if (manifest.available.empty() || manifest.available.back().empty()) return data;
+  const std::vector<geo::TileRange>& deepest = manifest.available.back();
+  const geo::TileRange all = std::accumulate(deepest.begin(), deepest.end(), deepest.front(), geo::BoundingRange);
+  const int level = static_cast<int>(manifest.available.size()) - 1;
+  const auto bounds_of = [&](std::int64_t x, std::int64_t y) {
+    return tiler::TileBounds({level, x, y}, /*is_mercator=*/true);
+  };
+  const dem::GeoBounds north_west = bounds_of(all.start_x, all.start_y), south_east = bounds_of(all.end_x, all.end_y);
+  const auto common = dem::CommonBounds(data, {north_west.west, south_east.south, south_east.east, north_west.north});
+  return common.size() == 1 ? common.front() : data;  // two: on both sides of the antimeridian, as the dataset is
+}
+
 std::string TileJson(const Manifest& manifest) {
   const BakedDataset& dataset = manifest.dataset;
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
   tiles.tile_template = "{z}/{x}/{y}.png?v=" + tiler::VersionText(TilesHash(manifest));
+  tiles.min_zoom = manifest.min_level;
   tiles.max_zoom = manifest.max_level;
   tiles.tile_size = manifest.kind.side_px;
   tiles.encoding = manifest.kind.height_encoding;
-  tiles.bounds = dataset.bounds;
+  tiles.bounds = HeightBounds(manifest);
   return proto::EncodeTileJson(tiles);
 }
 

@@ -4,11 +4,15 @@
 #include <string>
 
 #include "archive/manifest.h"
+#include "engine/common/dem_types.h"
 
 namespace terrace::archive {
 
 // layer.json of an archive of terrain tiles. Equal to the server's, if the whole dataset was baked with all extensions.
 std::string LayerJson(const Manifest& manifest);
+
+// The bounds of the deepest height tiles of an archive, within those of the dataset.
+dem::GeoBounds HeightBounds(const Manifest& manifest);
 
 // TileJSON of an archive of height tiles, with a template relative to itself.
 std::string TileJson(const Manifest& manifest);

@@ -67,25 +67,15 @@ class PartialFolder {
   // reach the disk before the folder gets its name. The name reaches the disk before the caller removes the files that
   // the folder was made from.
   Result<void> Finish() {
-    if (Result<void> synced = Sync(partial_, ::syncfs); !synced) return synced;
-    std::error_code error;
-    std::filesystem::rename(partial_, path_, error);
-    if (error) return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", path_, error.message());
-    const std::string parent = std::filesystem::path(path_).parent_path();
-    return Sync(parent.empty() ? "." : parent, ::fsync);
+    const int descriptor = ::open(partial_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    const bool is_synced = descriptor >= 0 && ::syncfs(descriptor) == 0;
+    const int reason = errno;
+    if (descriptor >= 0) ::close(descriptor);
+    if (is_synced) return Rename(partial_, path_);
+    return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", partial_, ErrorText(reason));
   }
 
  private:
-  static Result<void> Sync(const std::string& folder, int (*sync)(int)) {
-    const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-    const bool is_synced = descriptor >= 0 && sync(descriptor) == 0;
-    const int reason = errno;
-    if (descriptor >= 0) ::close(descriptor);
-    // Some file systems do not allow fsync of folders, and do not need it.
-    if (is_synced || (sync == ::fsync && reason == EINVAL)) return {};
-    return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}", folder, ErrorText(reason));
-  }
-
   const std::string path_, partial_;
   std::error_code ignored_;
 };

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <exception>
 #include <list>
 #include <mutex>
+#include <new>
 #include <thread>
 #include <utility>
 
@@ -20,6 +22,19 @@ namespace terrace::bake {
 namespace {
 
 using Clock = std::chrono::steady_clock;
+
+// What a thread of the bake throws becomes the error of its unit: without memory, or if the statistics of a source
+// cannot be read, the units of the others go on.
+template <typename Work>
+auto CatchErrors(const Work& work) -> decltype(work()) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return tl::unexpected(Error{ErrorCode::kUnavailable, "no memory"});  // short: needs none itself
+  } catch (const std::exception& thrown) {
+    return MakeError(ErrorCode::kUnavailable, "{}", thrown.what());
+  }
+}
 
 // A unit that is being baked.
 class OpenUnit {
@@ -113,7 +128,7 @@ class Run {
       }
       ++unit->under_way;
       lock.unlock();
-      const Result<void> done = BakePart(*unit, part);
+      const Result<void> done = CatchErrors([&] { return BakePart(*unit, part); });
       lock.lock();
       --unit->under_way;
       if (!done) {
@@ -154,20 +169,11 @@ class Run {
         return nullptr;
       }
       if (HasReport(index, target)) continue;
-      const Target& to = targets_[target];
-      const std::uint64_t key = UnitKey(dataset_, to.manifest, entry.unit);
-      if (!to.create && TakeFinished(index, target, key)) continue;
-      if (options_.only_verify) {
-        Report(index, {target, {entry.unit.name, key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
-        continue;
-      }
-      auto writer = to.create ? to.create() : archive::CreateUnit(to.place, entry.unit.name, {to.manifest.kind, key});
-      if (!writer) {
-        unit->outputs.push_back({target, key});
-        unit->error = writer.error();
-        continue;
-      }
-      unit->outputs.push_back({target, key, *std::move(writer)});
+      OpenUnit::Output output{target};
+      const Result<bool> is_to_do = CatchErrors([&] { return OpenOutput(index, output); });
+      if (is_to_do && !*is_to_do) continue;
+      if (!is_to_do) unit->error = is_to_do.error();
+      unit->outputs.push_back(std::move(output));
     }
     if (unit->error) {
       Close(*unit);
@@ -179,6 +185,22 @@ class Run {
     }
     for (const Part& part : PartsOf(entry.unit)) unit->parts.push_back(part);
     return unit;
+  }
+
+  // Creates the file of a target. False: it is there already, or is reported as missing.
+  Result<bool> OpenOutput(std::size_t index, OpenUnit::Output& output) {
+    const Unit& unit = plan_.units[index].unit;
+    const Target& to = targets_[output.target];
+    output.key = UnitKey(dataset_, to.manifest, unit);
+    if (!to.create && TakeFinished(index, output.target, output.key)) return false;
+    if (options_.only_verify) {
+      Report(index, {output.target, {unit.name, output.key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
+      return false;
+    }
+    auto writer = to.create ? to.create() : archive::CreateUnit(to.place, unit.name, {to.manifest.kind, output.key});
+    if (!writer) return tl::unexpected(writer.error());
+    output.writer = *std::move(writer);
+    return true;
   }
 
   // A full disk or an unreachable file server may recover.
@@ -258,7 +280,7 @@ class Run {
         output.writer = nullptr;  // removes its file
         continue;
       }
-      auto unit_file = output.writer->Finish();
+      auto unit_file = CatchErrors([&] { return output.writer->Finish(); });
       output.writer = nullptr;
       if (!unit_file) {
         unit.error = unit_file.error();

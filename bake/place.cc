@@ -132,8 +132,8 @@ bool IsContent(const std::string& name) {
 }
 
 bool IsOurs(const std::string& name) {
-  return name == kIdentityFile || name == kPlaceIdFile || name == archive::kManifestFile || name == "lost+found" ||
-         IsContent(name) || IsLock(name) || IsPartial(name);
+  return name == kIdentityFile || name == kPlaceIdFile || name == kExportFolder || name == archive::kManifestFile ||
+         name == "lost+found" || IsContent(name) || IsLock(name) || IsPartial(name);
 }
 
 // The differences between a written identity and this one, as one sentence; empty: none.
@@ -266,12 +266,6 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   return {};
 }
 
-bool HoldsFinishedBake(const std::string& place, const BakeIdentity& identity, std::uint64_t generation) {
-  const auto manifest = archive::ReadManifest(place);
-  return manifest && manifest->dataset.generation == generation &&
-         CheckSame(place, manifest->identity, identity, place).has_value();
-}
-
 namespace {
 
 // Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock
@@ -312,6 +306,8 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
     for (const fs::path& file : unknown) Remove(file);
   }
   RemoveLeftovers(place, folders);
+  std::error_code ignored;
+  fs::remove_all(fs::path(place) / kExportFolder, ignored);  // a bucket has none
   Remove(fs::path(place) / kPlaceIdFile);
   Remove(fs::path(place) / kIdentityFile);
 }

@@ -47,11 +47,11 @@ std::string ToJson(const BakeIdentity& identity);
 // or another bake; the message says what differs and what to do. kUnavailable: it cannot be read or written.
 Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
 
-// Whether the place is one archive, finished, of this bake and `generation`.
-bool HoldsFinishedBake(const std::string& place, const BakeIdentity& identity, std::uint64_t generation);
+// The folder in a place where another form of the finished bake is written before it is renamed to its own place.
+inline constexpr const char* kExportFolder = "export";
 
-// Removes what only an unfinished bake needs: the identity, unfinished files of killed processes, and locks of
-// processes of this host that have ended.
+// Removes what only an unfinished bake needs: the identity, unfinished files and exports of killed processes, and locks
+// of processes of this host that have ended.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.

@@ -141,13 +141,8 @@ Result<void> OutputFile::Finish() {
   if (Result<void> flushed = impl_->Flush(); !flushed) return flushed;
   if (impl_->place.is_object) return PutFile(impl_->descriptor, impl_->path);
   if (::fsync(impl_->descriptor) != 0) return CannotWrite(impl_->partial, errno);
-  if (::rename(impl_->partial.c_str(), impl_->path.c_str()) != 0) return CannotWrite(impl_->path, errno);
+  if (Result<void> renamed = Rename(impl_->partial, impl_->path); !renamed) return renamed;
   ::close(std::exchange(impl_->descriptor, -1));
-  // The new name must be on the disk as well. Some file systems do not allow fsync of folders, and do not need it.
-  const int folder = ::open(impl_->place.folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (folder < 0) return {};
-  ::fsync(folder);
-  ::close(folder);
   return {};
 }
 
@@ -156,6 +151,16 @@ std::uint64_t OutputFile::size() const { return impl_->size; }
 std::string OutputFile::xxh3() const {
   const dem::ContentHash hash = impl_->hasher.Hash();
   return fmt::format("{:016x}{:016x}", hash.high, hash.low);
+}
+
+// Some file systems do not allow fsync of folders, and do not need it.
+Result<void> Rename(const std::string& from, const std::string& to) {
+  if (::rename(from.c_str(), to.c_str()) != 0) return CannotWrite(to, errno);
+  const int folder = ::open(TemporaryPlaceOf(to).folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (folder < 0) return {};
+  ::fsync(folder);
+  ::close(folder);
+  return {};
 }
 
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes) {

@@ -40,6 +40,9 @@ class OutputFile {
   std::unique_ptr<Impl> impl_;
 };
 
+// Renames a complete file or folder. The new name is on the disk afterwards. kUnavailable: as OutputFile.
+Result<void> Rename(const std::string& from, const std::string& to);
+
 // Writes a file without waiting for the disk: for many small files. Makes its folder. kUnavailable: as OutputFile.
 Result<void> WriteUnsynced(const std::string& path, std::string_view bytes);
 

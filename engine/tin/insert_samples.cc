@@ -22,7 +22,7 @@ void SampleInserter::InsertInto(TinMesh& mesh, std::span<const SamplePosition> s
   const SamplePosition last = mesh.vertices[2];
   TriangleId near = 0;
   for (const SamplePosition sample : samples) {
-    TERRACE_CHECK(sample.x > 0 && sample.x < last.x && sample.y > 0 && sample.y < last.y);
+    TERRACE_CHECK(sample.x <= last.x && sample.y <= last.y);
     near = triangulation_->Locate(sample, near);
     if (triangulation_->IsCorner(sample, near)) continue;
     const Star& star = triangulation_->Insert(

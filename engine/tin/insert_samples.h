@@ -13,10 +13,10 @@ namespace terrace::tin {
 class SampleInserter {
  public:
   // Replaces the triangles whose circumcircle contains the sample, as far as they are visible from it. A Delaunay mesh
-  // stays Delaunay; any other mesh stays a valid mesh. Samples that are vertices already are skipped. Border samples
-  // fail a TERRACE_CHECK, because border vertices depend on the border's own samples alone. Preconditions: the mesh
-  // covers a rectangle once, and its first four vertices are the corners; from the second call on, it is the result of
-  // the call before.
+  // stays Delaunay; any other mesh stays a valid mesh. Samples that are vertices already are skipped. Samples on the
+  // border divide its edges: meshes that share a border with a neighbour insert none there. Preconditions: the mesh
+  // covers a rectangle once, and its first four vertices are the corners; the samples lie in the rectangle; from the
+  // second call on, the mesh is the result of the call before.
   void InsertInto(TinMesh& mesh, std::span<const SamplePosition> samples);
 
  private:

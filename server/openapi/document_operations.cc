@@ -52,7 +52,8 @@ const Operation kTileJsonOperation{
     .tag = "documents",
     .summary = "TileJSON 3.0 of the height tiles",
     .description =
-        "What the `url` of a `raster-dem` source names. Its URLs are absolute, made from the request's `Host`.",
+        "What the `url` of a `raster-dem` source names. Its URLs are absolute, made from the request's `Host`. Of a "
+        "dataset without sources, it has the levels and bounds of the archive.",
     .parameters = {kEncodingNote, kSizeNote},
     .replies = {{"application/json", "TileJson"}},
     .headers = DocumentHeaders(),

@@ -40,9 +40,7 @@ rocksdb::Options OptionsOf(const RecordDbOptions& options) {
   db.periodic_compaction_seconds = 0;
   db.write_buffer_size = FileBytes(options.capacity_bytes);
   db.max_write_buffer_number = 2;
-  // Reserve: two full buffers with their logs, the file that is written from them, preallocated logs, and one file more
-  // until the oldest is deleted.
-  db.compaction_options_fifo.max_table_files_size = options.capacity_bytes - 6 * db.write_buffer_size;
+  db.compaction_options_fifo.max_table_files_size = RecordDb::RecordBytes(options.capacity_bytes);
   db.compression = options.compress ? rocksdb::kLZ4Compression : rocksdb::kNoCompression;
   // RocksDB reserves ten of them for its other files. One shard: a file cache with 64 shards would hold up to 64 more.
   db.max_open_files =
@@ -76,6 +74,10 @@ bool IsDamaged(const rocksdb::Status& status) {
 
 // If look-ups cycle through more files than may be open, an LRU cache would always evict the file needed next.
 std::size_t RecordDb::FilesOf(std::size_t capacity_bytes) { return 4 * (capacity_bytes / FileBytes(capacity_bytes)); }
+
+// Reserve: two full buffers with their logs, the file that is written from them, preallocated logs, and one file more
+// until the oldest is deleted.
+std::size_t RecordDb::RecordBytes(std::size_t capacity_bytes) { return capacity_bytes - 6 * FileBytes(capacity_bytes); }
 
 class RecordDb::Impl {
  public:

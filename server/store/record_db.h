@@ -46,6 +46,10 @@ class RecordDb {
   // have more.
   static std::size_t FilesOf(std::size_t capacity_bytes);
 
+  // The oldest records of a store of this capacity are deleted when its record files have more bytes than this. The
+  // rest is for files that are being written.
+  static std::size_t RecordBytes(std::size_t capacity_bytes);
+
   // Empties a store that is too damaged to be opened, and then sets `*discarded`. kUnavailable: the disk does not
   // respond, or the store is open already.
   static Result<std::unique_ptr<RecordDb>> Open(const RecordDbOptions& options, bool* discarded);

@@ -1,9 +1,11 @@
 #include "server/store/shared_store.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
+#include <exception>
 #include <string_view>
 #include <utility>
 
@@ -124,7 +126,7 @@ void SharedStore::Report(const std::string& why, bool is_off) {
   if (is_off) {
     spdlog::warn("shared cache: {}; it is switched off until Redis answers, tiles are built meanwhile", why);
   } else {
-    spdlog::warn("shared cache: {}; values are read, but not written until Redis accepts writes again", why);
+    spdlog::warn("shared cache: {}; values are read, but not written until writes succeed again", why);
   }
 }
 
@@ -352,6 +354,13 @@ void SharedStore::RefuseWrites(const std::string& why) {
   Report(why, /*is_off=*/false);
 }
 
+redis::Command SharedStore::CommandOf(const Job& job) const {
+  if (!job.value) return {"UNLINK", job.name};
+  redis::Command command = {"SET", job.name, tiler::AddChecksum(job.key, job.value())};
+  if (options_.ttl.count() > 0) command.insert(command.end(), {"EX", std::to_string(options_.ttl.count())});
+  return command;
+}
+
 // One batch, in one round trip.
 void SharedStore::Write() {
   std::list<Job> jobs;
@@ -378,15 +387,12 @@ void SharedStore::Write() {
     writer_ = *std::move(opened);
   }
   std::vector<redis::Command> commands;
-  for (const Job& job : jobs) {
-    if (!job.value) {
-      commands.push_back({"UNLINK", job.name});
-      continue;
-    }
-    commands.push_back({"SET", job.name, tiler::AddChecksum(job.key, job.value())});
-    if (options_.ttl.count() > 0) {
-      commands.back().insert(commands.back().end(), {"EX", std::to_string(options_.ttl.count())});
-    }
+  try {
+    for (const Job& job : jobs) commands.push_back(CommandOf(job));
+  } catch (const std::exception& exception) {  // std::bad_alloc
+    dropped_ += values;
+    ++errors_;
+    return RefuseWrites(fmt::format("values cannot be encoded: {}", exception.what()));
   }
   const Result<std::vector<redis::Reply>> replies = writer_->CallAll(commands);
   written_at_ = Clock::now();

@@ -111,6 +111,7 @@ class SharedStore {
   void Connect();
   void Test();
   Clock::time_point NextTest() const;
+  redis::Command CommandOf(const Job& job) const;
   void Write();
   void RefuseWrites(const std::string& why);
   void Report(const std::string& why, bool is_off);

@@ -48,7 +48,9 @@ void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   view.texture = extent.texture;
   view.metadata_levels = extent.metadata_levels;
   view.floor_m = extent.floor_m;
+  view.min_mercator_depth = extent.min_mercator_depth;
   view.max_mercator_depth = extent.max_mercator_depth;
+  view.height_bounds = extent.height_bounds;
 }
 
 DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, const tiler::Dataset& dataset) {
@@ -152,5 +154,9 @@ bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, 
 }
 
 int MaxHeightLevel(const DatasetView& dataset, int size) { return dataset.max_mercator_depth - (size == 512 ? 1 : 0); }
+
+int MinHeightLevel(const DatasetView& dataset, int size) {
+  return std::max(dataset.min_mercator_depth - (size == 512 ? 1 : 0), 0);
+}
 
 }  // namespace terrace::server

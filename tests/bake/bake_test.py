@@ -2,6 +2,7 @@
 import contextlib
 import http.client
 import json
+import math
 import random
 import re
 import resource
@@ -38,14 +39,14 @@ class Bake(BakeCase):
         return {line["unit"]: line["outcome"] for line in lines if "unit" in line}
 
     @contextlib.contextmanager
-    def server(self):
-        process = subprocess.Popen([BINARY, "serve", "--config", self.config, "--listen", "127.0.0.1:0"], env=self.environment,
+    def server(self, *what):
+        process = subprocess.Popen([BINARY, "serve", *(what or ("--config", self.config)), "--listen", "127.0.0.1:0"], env=self.environment,
                                    stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         try:
             port = int(re.search(r"127\.0\.0\.1:(\d+)", process.stdout.readline())[1])
             connection = http.client.HTTPConnection("127.0.0.1", port, timeout=60)
 
-            def get(path, headers):
+            def get(path, headers={}):
                 connection.request("GET", f"/cells/{path}", headers=headers)
                 reply = connection.getresponse()
                 return reply.status, reply.read()
@@ -174,6 +175,46 @@ class Bake(BakeCase):
         self.assertGreater(len(baked), 2)
         self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
         self.expect_equal(updated, fresh)
+
+    def test_update_takes_the_formats_of_a_bake_killed_between_their_manifests(self):
+        killed, updated = self.place("killed"), self.place("updated")
+        formats = ("--format", "terrain,glb")
+        self.assertEqual(self.run_bake("--out", killed, *formats, levels="0-8").returncode, 0)
+        (killed / "glb/manifest.json").unlink()
+        config = self.make_sources("newer-cell", (0, 0, 0, 1))
+        done = self.run_bake("--out", updated, "--update", killed, *formats, "--json", config=config, levels="0-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        self.assertEqual({line["format"] for line in lines if line.get("outcome") == "copied"}, {"terrain"})
+        (killed / "terrain/manifest.json").unlink()
+        none = self.run_bake("--out", self.place("none"), "--update", killed, *formats, levels="0-8")
+        self.assertEqual((none.returncode, "has no manifest.json" in none.stderr), (1, True), none.stderr)
+
+    def test_extensions_of_any_format_are_part_of_the_bake(self):
+        place = self.place("formats")
+        formats = ("--format", "png,terrain")
+        self.assertEqual(self.run_bake("--out", place, *formats, levels="0-2").returncode, 0)
+        other = self.run_bake("--out", place, *formats, "--extensions", "none", levels="0-2")
+        self.assertEqual(other.returncode, 2, other.stderr)
+        self.assertIn('extensions "octvertexnormals", not "none"', other.stderr)
+
+    def test_tiles_json_promises_the_tiles_that_are_there(self):
+        chunks, folder = self.place("chunks"), self.place("folder")
+        for place, form in ((chunks, "chunks"), (folder, "folder")):
+            done = self.run_bake("--out", place, "--form", form, "--format", "png", "--bbox", "6.2,46.2,6.4,46.4", levels="4-9")
+            self.assertEqual(done.returncode, 0, done.stderr)
+        documents = [json.loads((folder / "tiles.json").read_text())]
+        with self.server(chunks) as get:
+            documents.append(json.loads(get("tiles.json", {"Accept-Encoding": "identity"})[1]))
+            for document in documents:
+                self.assertEqual((document["minzoom"], document["maxzoom"]), (4, 9))
+                west, south, east, north = document["bounds"]
+                self.assertTrue(5.6 < west <= 6.2 and 6.4 <= east < 7.1 and 45.7 < south <= 46.2 and 46.4 <= north < 46.9, document)
+                for x, y in ((west + 1e-6, south + 1e-6), (east - 1e-6, north - 1e-6)):
+                    row = (1 - math.asinh(math.tan(math.radians(y))) / math.pi) / 2
+                    for level in range(4, 10):
+                        tile = f"{level}/{int((x + 180) / 360 * 2 ** level)}/{int(row * 2 ** level)}.png"
+                        self.assertEqual((get(tile)[0], (folder / tile).exists()), (200, True), tile)
 
     def test_shards_and_finish_make_the_same_files(self):
         place = self.place("shards")

@@ -142,9 +142,15 @@ class SeedCache(unittest.TestCase):
         changed = json.loads(config.read_text().replace("N46E007", noise.stem))
         del changed["datasets"][0]["edits"]  # they are elsewhere
         config.write_text(json.dumps(changed))
-        full = self.seed(config, cache, "--error", "1", levels=11)
+        full = self.seed(config, cache, "--error", "1", levels=10)
         self.assertEqual(full.returncode, 1, full.stderr)
         self.assertIn("raise disk_cache.tile_bytes", full.stderr)
+        # The remedy keeps what is there: a full cache has lost nothing.
+        built = int(re.search(r"is full after ([\d,]+) of", full.stderr)[1].replace(",", ""))
+        changed["disk_cache"]["tile_bytes"] = 256 << 20
+        config.write_text(json.dumps(changed))
+        larger = self.seed(config, cache, "--error", "1", levels=10)
+        self.assertEqual((larger.returncode, json.loads(larger.stdout.splitlines()[-1])["kept_tiles"]), (0, built), larger.stderr)
         config, cache = self.config("large", tile_bytes=0)
         self.assertIn("tile_bytes is 0", self.seed(config, cache).stderr)
         config, cache = self.config("used")

@@ -188,18 +188,54 @@ class TilesetForms(unittest.TestCase):
                 self.assertEqual({path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}, self.files())
             self.assertEqual([path.name for path in self.scratch.glob(f"killed-{form}*")], [out.name])
 
+    def kill_after_rename(self, name):
+        """A run that ended between the rename of its 3TZ file and the removal of its chunks, as far as can be: the note is written before."""
+        out = self.scratch / name
+        place = out.with_name(name + ".bake")
+        # The run stops when it finds something at `out`: the note is there then, and the file is in the place.
+        process = subprocess.Popen(self.command("3tz", out), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        while process.poll() is None and not place.exists():
+            time.sleep(0.001)
+        out.write_text("not from here")
+        said = process.communicate()[1]
+        self.assertEqual((process.returncode, "is there already" in said), (2, True), said)
+        self.assertEqual((out.read_text(), (place / "manifest.json").exists()), ("not from here", True))
+        out.unlink()
+        (place / "export/3tz").rename(out)
+        return out, place
+
     def test_killed_between_the_file_and_the_end_it_removes_its_chunks(self):
-        chunks, other = (self.scratch / name for name in ("ended.3tz.bake", "other.3tz.bake"))
-        for place in (chunks, other):
-            shutil.copytree(self.place, place)
-            shutil.copy(self.file, place.with_suffix(""))
+        out, place = self.kill_after_rename("ended.3tz")
         self.bake("3tz", name="ended.3tz")
-        self.assertEqual((self.scratch / "ended.3tz").read_bytes(), self.file.read_bytes())
-        self.assertFalse(chunks.exists())
-        # The chunks of other arguments stay.
-        done = subprocess.run(self.command("3tz", other.with_suffix(""), "--no-gzip"), capture_output=True, text=True)
-        self.assertEqual((done.returncode, "is there already" in done.stderr), (2, True), done.stderr)
-        self.assertTrue((other / "manifest.json").exists())
+        self.assertEqual(out.read_bytes(), self.file.read_bytes())
+        self.assertFalse(place.exists())
+
+    def test_chunks_of_which_the_file_was_not_made_stay(self):
+        out, place = self.kill_after_rename("other.3tz")
+        old = out.rename(out.with_name("moved.3tz"))
+        shutil.copy(old, out)  # equal, but perhaps from somewhere else
+        for flags, kept in (((), out), (("--no-gzip",), old)):
+            if kept != out:
+                old.replace(out)
+            done = subprocess.run(self.command("3tz", out, *flags), capture_output=True, text=True)
+            self.assertEqual((done.returncode, "is there already" in done.stderr), (2, True), done.stderr)
+            self.assertTrue((place / "manifest.json").exists())
+        self.bake("3tz", name="other.3tz")  # the file is back
+        self.assertFalse(place.exists())
+
+    def test_killed_while_it_writes_the_file_it_leaves_nothing_beside(self):
+        out = self.scratch / "written.3tz"
+        place = out.with_name("written.3tz.bake")
+        process = subprocess.Popen(self.command("3tz", out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and not (place / "export").exists():
+            time.sleep(0.001)
+        process.kill()
+        process.wait()
+        self.assertEqual({path.name for path in self.scratch.glob("written*")} - {out.name}, {place.name} if place.exists() else set())
+        if place.exists():
+            self.bake("3tz", name=out.name)
+        self.assertEqual(out.read_bytes(), self.file.read_bytes())
+        self.assertEqual([path.name for path in self.scratch.glob("written*")], [out.name])
 
     def test_refusals(self):
         for form, flags, part in (("3tz", ("--format", "terrain"), "given more than once"),):

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <numeric>
 #include <optional>
+#include <utility>
 
 #include "engine/tin/scan/triangle_rows.h"
 
@@ -110,20 +111,33 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: as a multiple of the sample's bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
-        const double off = flat.Distance(Ecef(column, row, field.At(column, row)), Up(column, row));
-        error.max_m = std::max(error.max_m, off);
+        const geo::Vec3 at = Ecef(column, row, field.At(column, row));
+        double off = flat.Distance(at, Up(column, row));
         const std::size_t k =
             static_cast<std::size_t>(row) * static_cast<std::size_t>(field.width()) + static_cast<std::size_t>(column);
         const double counted = allowed.empty() ? off : off / static_cast<double>(allowed[k]);
-        if (counted <= worst || !IsInside(column, row)) continue;
-        const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
-        if (std::find(corners.begin(), corners.end(), sample) != corners.end()) continue;
-        worst = counted;
-        miss = sample;
+        if (counted > worst) {
+          const tin::SamplePosition sample{static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)};
+          const auto corner = std::find(corners.begin(), corners.end(), sample);
+          if (corner == corners.end()) {
+            worst = counted;
+            miss = sample;
+          } else {
+            // Beside its rounded position, the plane of a triangle that stands almost upright is anywhere.
+            const std::uint32_t vertex = triangle[static_cast<std::size_t>(corner - corners.begin())];
+            off = std::min(off, geo::Length(at - ecef[vertex]));
+          }
+        }
+        error.max_m = std::max(error.max_m, off);
       }
     });
     if (miss) error.misses.push_back(*miss);
   }
+  // A sample on an edge is the worst one of two triangles.
+  const auto in_rows = [](tin::SamplePosition p) { return std::pair(p.y, p.x); };
+  std::ranges::sort(error.misses, {}, in_rows);
+  const auto repeated = std::ranges::unique(error.misses);
+  error.misses.erase(repeated.begin(), repeated.end());
   return error;
 }
 

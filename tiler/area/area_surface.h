@@ -30,17 +30,16 @@ class AreaSurface {
   void AddCurvature(tin::GreedyOptions& options) const;
 
   // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
-  // misses are, for each triangle that exceeds the bound, the worst sample that can be inserted. `allowed`: the bounds
-  // by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was measured until then.
+  // misses are, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border: areas
+  // have no neighbours that share it. A vertex that exceeds the bound counts with the distance from its own position.
+  // `allowed`: the bounds by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was
+  // measured until then.
   proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
                                 const std::vector<geo::Vec3>& ecef, double bound_m, std::span<const float> allowed,
                                 const std::stop_token& stop) const;
 
  private:
   geo::Vec3 Up(int column, int row) const;
-  bool IsInside(int column, int row) const {  // not on the border
-    return column > 0 && row > 0 && column + 1 < window_.columns && row + 1 < window_.rows;
-  }
 
   const geo::Lattice lattice_;
   const dem::NodeWindow window_;

@@ -1,13 +1,17 @@
 #include "server/cli/bake/bake_export.h"
 
+#include <fmt/format.h>
+#include <sys/stat.h>
+
 #include <filesystem>
 #include <system_error>
 #include <vector>
 
 #include "archive/archive.h"
 #include "archive/export.h"
-#include "archive/manifest.h"
+#include "archive/files/output_file.h"
 #include "bake/place_files.h"
+#include "tiler/encoder_version.h"
 
 namespace terrace::cli {
 
@@ -23,31 +27,52 @@ Result<void> CheckExportPlace(const std::string& out) {
 
 namespace {
 
-// Removes the manifest last: as long as it is there, RemoveIfExported knows the bake.
-void RemoveBake(const std::string& baked) {
-  std::error_code ignored;
-  for (const std::string& name : bake::NamesIn(baked).value_or(std::vector<std::string>())) {
-    if (name != archive::kManifestFile) fs::remove_all(fs::path(baked) / name, ignored);
-  }
-  fs::remove_all(baked, ignored);
+// In the folder of the export. It stays there when the export is renamed.
+constexpr const char* kNoteFile = "exported.txt";
+
+// The bake, and the file or folder at `path`. Renaming keeps the inode, the size and the time; a copy, or another file
+// of the same name, differs.
+std::string NoteOf(const std::string& path, const std::string& form, const bake::BakeIdentity& identity,
+                   std::uint64_t generation) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) return {};
+  return fmt::format("{}\n{} of version {}: inode {}, {} bytes, written at {}.{:09}\n", bake::ToJson(identity), form,
+                     tiler::VersionText(generation), status.st_ino, status.st_size, status.st_mtim.tv_sec,
+                     status.st_mtim.tv_nsec);
 }
 
 }  // namespace
 
-bool RemoveIfExported(const std::string& baked, const bake::BakeIdentity& identity, std::uint64_t generation) {
-  if (!bake::HoldsFinishedBake(baked, identity, generation)) return false;
-  RemoveBake(baked);
-  return true;
+bool WasExported(const std::string& baked, const BakeArguments& arguments, const bake::BakeIdentity& identity,
+                 std::uint64_t generation) {
+  const std::string noted = bake::ReadText(fs::path(baked) / bake::kExportFolder / kNoteFile);
+  return !noted.empty() && noted == NoteOf(arguments.out, arguments.form, identity, generation);
 }
 
-Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop) {
+// The note is removed last: as long as it is there, WasExported knows the bake.
+void RemoveBake(const std::string& baked) {
+  std::error_code ignored;
+  for (const std::string& name : bake::NamesIn(baked).value_or(std::vector<std::string>())) {
+    if (name != bake::kExportFolder) fs::remove_all(fs::path(baked) / name, ignored);
+  }
+  fs::remove_all(baked, ignored);
+}
+
+// The export is written in the folder of the bake, where the next run removes what a killed process has left.
+Result<void> Export(const BakeArguments& arguments, const std::string& baked, const bake::BakeIdentity& identity,
+                    std::uint64_t generation, const std::stop_token& stop) {
   const auto archive = archive::Archive::Open(baked);
   if (!archive) return tl::unexpected(archive.error());
   const auto write = arguments.form == kSingle   ? archive::WriteSingle
                      : arguments.form == kFolder ? archive::WriteFolder
                                                  : archive::Write3tz;
-  const Result<void> written = write(**archive, arguments.out, stop);
-  if (!written) return written;
+  const fs::path folder = fs::path(baked) / bake::kExportFolder;
+  const std::string made = folder / arguments.form;
+  if (auto written = write(**archive, made, stop); !written) return written;
+  const std::string note = NoteOf(made, arguments.form, identity, generation);
+  if (auto noted = archive::WriteUnsynced(folder / kNoteFile, note); !noted) return noted;
+  if (auto free = CheckExportPlace(arguments.out); !free) return free;
+  if (auto renamed = archive::Rename(made, arguments.out); !renamed) return renamed;
   RemoveBake(baked);
   return {};
 }

@@ -14,12 +14,16 @@ namespace terrace::cli {
 // kInvalidArgument: something is there.
 Result<void> CheckExportPlace(const std::string& out);
 
-// For an `out` that is there: whether `baked` still holds the finished bake of these arguments, because the process
-// that wrote `out` ended before it had removed `baked`. If so, removes `baked`.
-bool RemoveIfExported(const std::string& baked, const bake::BakeIdentity& identity, std::uint64_t generation);
+// Whether the `out` of the arguments was made from `baked` by a process that ended before it had removed `baked`.
+bool WasExported(const std::string& baked, const BakeArguments& arguments, const bake::BakeIdentity& identity,
+                 std::uint64_t generation);
+
+// Removes a bake that was exported.
+void RemoveBake(const std::string& baked);
 
 // Converts a finished bake to the form that the arguments name, writes it to their `out`, and removes the bake.
-// kUnavailable: the place cannot be written. kCancelled: stopped.
-Result<void> Export(const BakeArguments& arguments, const std::string& baked, const std::stop_token& stop);
+// kUnavailable: the place cannot be written. kInvalidArgument: something is at `out`. kCancelled: stopped.
+Result<void> Export(const BakeArguments& arguments, const std::string& baked, const bake::BakeIdentity& identity,
+                    std::uint64_t generation, const std::stop_token& stop);
 
 }  // namespace terrace::cli

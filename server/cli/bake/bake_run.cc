@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <system_error>
 #include <utility>
 
@@ -91,15 +92,15 @@ Result<tiler::Dataset> OpenDataset(const BakeArguments& arguments, const BakeInp
 
 bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Dataset& dataset,
                               const std::vector<bake::Target>& targets) {
-  const archive::Manifest& first = targets.front().manifest;
-  const tiler::TileRequest& kind = first.kind;
   std::string error = "default";
   if (arguments.error > 0) error = PlainNumber(arguments.error) + " m";
   if (arguments.fraction > 0) error = PlainNumber(arguments.fraction) + " of the level's";
-  std::string extensions;
-  for (const auto& [is_on, name] : {std::pair(kind.normals, "octvertexnormals"),
-                                    std::pair(kind.water_mask, "watermask"), std::pair(kind.metadata, "metadata")}) {
-    if (is_on) extensions += (extensions.empty() ? "" : ",") + std::string(name);
+  std::string extensions;  // of terrain; other formats have none
+  for (const auto& [extension, name] : {std::pair(&tiler::TileRequest::normals, "octvertexnormals"),
+                                        std::pair(&tiler::TileRequest::water_mask, "watermask"),
+                                        std::pair(&tiler::TileRequest::metadata, "metadata")}) {
+    const auto is_on = [wanted = extension](const bake::Target& target) { return target.manifest.kind.*wanted; };
+    if (std::ranges::any_of(targets, is_on)) extensions += (extensions.empty() ? "" : ",") + std::string(name);
   }
   return {{{"dataset", dataset.name},
            {"format", arguments.format},
@@ -111,7 +112,9 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
            {"dataset options and encoders (hash)", fmt::format("{:016x}", dataset.options_hash)}}};
 }
 
+// A bake that was killed between two manifests has those of some formats. The others have no old units.
 Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& targets) {
+  std::optional<Error> missing;
   for (bake::Target& target : targets) {
     const std::string folder = bake::ArchivePlace(place, target.manifest, false);
     target.old_place = folder;
@@ -120,13 +123,20 @@ Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& target
       target.old_place = place;
       manifest = archive::ReadManifest(place);
     }
-    if (!manifest) return MakeError(manifest.error().code, "--update: {}", manifest.error().message);
+    if (!manifest) {
+      const Error error{manifest.error().code, "--update: " + manifest.error().message};
+      if (error.code != ErrorCode::kNotFound) return tl::unexpected(error);
+      missing = error;
+      continue;
+    }
     if (manifest->units.empty()) {
       return MakeError(ErrorCode::kInvalidArgument, "--update {}: is one file without units; give a bake in chunks",
                        place);
     }
     for (const archive::UnitEntry& unit : manifest->units) target.old_units.emplace(unit.name, unit);
   }
+  const auto has_none = [](const bake::Target& target) { return target.old_units.empty(); };
+  if (missing && std::ranges::all_of(targets, has_none)) return tl::unexpected(*missing);
   return {};
 }
 
@@ -216,7 +226,8 @@ int FinishAlone(const PlacedBake& bake, const std::vector<bake::UnitReport>& rep
   summary.is_complete = true;
   if (bake.arguments.form == kChunks) return kExitOk;
   summary.place = bake.arguments.out;
-  const auto exported = Export(bake.arguments, bake.place, bake.signals.token());
+  const auto exported = Export(bake.arguments, bake.place, bake.identity, bake.pipeline.datasets().front().generation,
+                               bake.signals.token());
   if (exported) return kExitOk;
   return bake.signals.signal() != 0 ? StopCode(bake.signals) : Fail(exported.error());
 }
@@ -274,13 +285,9 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const bool is_chunked = arguments.form == kChunks;
   const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
-  if (!is_chunked) {
-    if (const auto free = CheckExportPlace(arguments.out); !free) {
-      if (!RemoveIfExported(place, identity, dataset.generation)) return Fail(free.error());
-      std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
-      return kExitOk;
-    }
-  }
+  const auto is_exported = [&] { return WasExported(place, arguments, identity, dataset.generation); };
+  const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out);
+  if (!free && !is_exported()) return Fail(free.error());
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();
   std::string lock_name = shard.count > 1 ? fmt::format("{}-of-{}", shard.index, shard.count) : std::string();
@@ -288,6 +295,12 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const auto lock = bake::PlaceLock::Take(place, lock_name);
   if (signals.signal() != 0) return StopCode(signals);  // a store that does not answer holds it up
   if (!lock) return Fail(lock.error());
+  if (!free) {
+    if (!is_exported()) return Fail(free.error());  // another process was here before the lock
+    RemoveBake(place);
+    std::fprintf(stderr, "terrace: %s: is complete already\n", arguments.out.c_str());
+    return kExitOk;
+  }
   if (const auto claimed = bake::ClaimPlace(place, identity, dataset.generation); !claimed) {
     return signals.signal() != 0 ? StopCode(signals) : Fail(claimed.error());
   }

@@ -19,6 +19,7 @@
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/common/command.h"
 #include "server/store/disk_cache.h"
+#include "server/store/record_db.h"
 
 namespace terrace::cli {
 namespace {
@@ -32,16 +33,23 @@ struct Seed {
 
   const tiler::Dataset& dataset;
   std::shared_ptr<tiler::TileStore> store;
-  std::size_t capacity_bytes = 0;
+  std::size_t limit_bytes = 0;          // from which the cache deletes its oldest records
   std::atomic<std::uint64_t> bytes{0};  // in the cache, approximate
-  std::stop_source stop;                // requested by signals, and when the cache is full
+  std::atomic<bool> is_full{false};
+  std::stop_source stop;  // requested by signals, and when the cache is full
 
   // The key under which a server looks the tile up.
   CacheKey KeyOf(const tiler::TileRequest& request) const {
     return {request, dataset.cache_generation(), tiler::TileEditsHash(*dataset.source, request)};
   }
-  // A full cache deletes a whole file of its oldest records: the margin keeps it from that.
-  bool is_full() const { return bytes >= capacity_bytes - capacity_bytes / 8; }
+  // Counts a tile before it is inserted. False: it does not fit. The margin is for what `bytes` does not count: indexes
+  // and filters of record files.
+  bool Take(std::uint64_t more) {
+    if ((bytes += more) <= limit_bytes - limit_bytes / 8) return true;
+    is_full = true;
+    stop.request_stop();
+    return false;
+  }
 };
 
 // The key, checksum and columns of a record.
@@ -53,11 +61,9 @@ class SeedWriter final : public archive::TileWriter {
       : seed_(seed), manifest_(std::move(manifest)), dropped_before_(seed.store->stats().dropped) {}
 
   Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange&) override {
-    if (seed_.is_full()) {
-      seed_.stop.request_stop();
+    if (!seed_.Take(tile.bytes.size() + kRecordOverheadBytes)) {
       return MakeError(ErrorCode::kCancelled, "the cache is full");
     }
-    seed_.bytes += tile.bytes.size() + kRecordOverheadBytes;
     ++unit_file_.tiles;
     unit_file_.bytes += tile.bytes.size();
     seed_.store->Insert(seed_.KeyOf(bake::RequestOf(manifest_, key)), std::make_shared<const tiler::EncodedTile>(tile));
@@ -81,10 +87,11 @@ class SeedWriter final : public archive::TileWriter {
   archive::UnitFile unit_file_;
 };
 
-std::uint64_t BytesOfFiles(const std::filesystem::path& folder) {
+std::uint64_t BytesOfRecords(const std::filesystem::path& folder) {
   std::uint64_t bytes = 0;
   std::error_code ignored;
   for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() != ".sst") continue;
     const std::uintmax_t size = entry.file_size(ignored);
     if (!ignored) bytes += size;
   }
@@ -100,8 +107,9 @@ int OpenSeed(const std::string& folder, const config::DiskCacheConfig& limits, S
     return cli::Fail("--into-cache: disk_cache of the configuration has no room for tiles: tile_bytes is 0",
                      kExitUsage);
   }
+  seed.limit_bytes = server::RecordDb::RecordBytes(std::max(limits.tile_bytes, server::RecordDb::kMinCapacity));
   // Opened with a lower limit than its server's, the cache would lose tiles.
-  if (const std::uint64_t there = BytesOfFiles(std::filesystem::path(folder) / "tiles"); there > limits.tile_bytes) {
+  if (const std::uint64_t there = BytesOfRecords(std::filesystem::path(folder) / "tiles"); there > seed.limit_bytes) {
     return cli::Fail(
         fmt::format("--into-cache {}: has {} of tiles, and the limit is {} (disk_cache.tile_bytes); give the "
                     "configuration of its server with --config",
@@ -115,23 +123,23 @@ int OpenSeed(const std::string& folder, const config::DiskCacheConfig& limits, S
                      kExitUsage);
   }
   seed.store = cache->tiles;
-  seed.capacity_bytes = limits.tile_bytes;
   seed.bytes = seed.store->stats().bytes;
   if (seed.store->stats().on) return kExitOk;
   return cli::Fail(fmt::format("--into-cache {}: cannot be opened; see the warning above", folder), kExitFailure);
 }
 
 // Prints the result of a run that was not stopped. Returns the exit code.
-int ReportSeed(const BakeArguments& arguments, const Seed& seed, const bake::UnitPlan& plan,
-               const std::vector<bake::UnitReport>& reports, const bake::Counters& counters) {
+int ReportSeed(const BakeArguments& arguments, const config::DiskCacheConfig& limits, const Seed& seed,
+               const bake::UnitPlan& plan, const std::vector<bake::UnitReport>& reports,
+               const bake::Counters& counters) {
   const std::string& folder = arguments.into_cache;
   const std::uint64_t built = counters.tiles, kept = counters.skipped;
-  if (seed.is_full()) {
-    return cli::Fail(fmt::format("{}: is full after {} of {} tiles; raise disk_cache.tile_bytes ({} now) in the "
-                                 "configuration of the server, and give it with --config, or limit --levels or --bbox",
-                                 folder, Grouped(built + kept), Grouped(plan.tiles),
-                                 Bytes(static_cast<double>(seed.capacity_bytes))),
-                     kExitFailure);
+  if (seed.is_full) {
+    return cli::Fail(
+        fmt::format("{}: is full after {} of {} tiles; raise disk_cache.tile_bytes ({} now) in the "
+                    "configuration of the server, and give it with --config, or limit --levels or --bbox",
+                    folder, Grouped(built + kept), Grouped(plan.tiles), Bytes(static_cast<double>(limits.tile_bytes))),
+        kExitFailure);
   }
   bool is_whole = true;
   for (const bake::UnitReport& report : reports) {
@@ -196,7 +204,7 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
                  Grouped(counters.tiles).c_str());
     return 128 + signals.signal();
   }
-  return ReportSeed(arguments, seed, plan, reports, counters);
+  return ReportSeed(arguments, limits, seed, plan, reports, counters);
 }
 
 }  // namespace terrace::cli

@@ -93,11 +93,29 @@ TEST(SampleInserter, GoesOnAsIfItBeganAnew) {
   }
 }
 
-TEST(InsertSamplesDeathTest, RefusesBorderSamples) {
+TEST(InsertSamples, DividesBorderEdges) {
   const HeightField field = HillField(33, 33, 2);
   GreedyTriangulation tin(field);
-  const SamplePosition on_border{32, 4};
-  EXPECT_DEATH(InsertSamples(tin.Mesh(), {&on_border, 1}), "check failed");
+  EXPECT_TRUE(tin.Run({20}));
+  Random random(6);
+  std::vector<SamplePosition> samples;
+  for (int i = 0; i < 60; ++i) {
+    const auto along = static_cast<std::uint16_t>(random.Below(33)), across = static_cast<std::uint16_t>(32 * (i % 2));
+    samples.push_back(i % 4 < 2 ? SamplePosition{along, across} : SamplePosition{across, along});
+  }
+  const TinMesh mesh = InsertSamples(tin.Mesh(), samples);
+  EXPECT_TRUE(CoversExactly(field, mesh));
+  EXPECT_TRUE(IsDelaunay(mesh));
+  for (const SamplePosition sample : samples) {
+    EXPECT_NE(std::find(mesh.vertices.begin(), mesh.vertices.end(), sample), mesh.vertices.end());
+  }
+}
+
+TEST(InsertSamplesDeathTest, RefusesSamplesBesideTheMeshAndOtherMeshes) {
+  const HeightField field = HillField(33, 33, 2);
+  GreedyTriangulation tin(field);
+  const SamplePosition beside{33, 4};
+  EXPECT_DEATH(InsertSamples(tin.Mesh(), {&beside, 1}), "check failed");
   const SamplePosition inside{7, 9};
   SampleInserter inserter;
   TinMesh mesh = tin.Mesh(), other = mesh;

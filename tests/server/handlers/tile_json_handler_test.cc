@@ -48,6 +48,15 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
   EXPECT_EQ(response.vary_more, "Forwarded");
 }
 
+TEST_F(TileJsonHandlerTest, PromisesTheTilesOfAnArchiveAlone) {
+  EXPECT_EQ(Parse(Get("/a%20b/tiles.json"))["minzoom"], 0);
+  datasets_[0].min_mercator_depth = 4;
+  datasets_[0].height_bounds = {1, 2, 3, 4};
+  const auto json = Parse(Get("/a%20b/tiles.json"));
+  EXPECT_EQ(json["minzoom"], 4);
+  EXPECT_EQ(json["bounds"], nlohmann::json({1.0, 2.0, 3.0, 4.0}));
+}
+
 TEST_F(TileJsonHandlerTest, WritesParametersIntoTheTemplate) {
   const auto json = Parse(Get("/a%20b/tiles.json?size=512&encoding=terrarium&v=3"));
   EXPECT_EQ(json["tiles"][0],

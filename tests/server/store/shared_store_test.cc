@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <functional>
+#include <new>
 #include <thread>
 #include <vector>
 
@@ -156,6 +157,21 @@ TEST(SharedStore, DoesNotWriteOnAConnectionThatWasIdle) {
   Await([&] { return tier.stats().written == 2 || !tier.stats().on; });
   EXPECT_EQ(tier.stats().written, 2U);
   EXPECT_EQ(tier.stats().switched_off, 0U);
+}
+
+TEST(SharedStore, AValueThatCannotBeEncodedIsDropped) {
+  FakeRedis redis;
+  SharedStoreOptions options = OptionsOf(redis, 1);
+  options.retry_after = milliseconds(1);
+  SharedStore tier(options);
+  Await([&] { return tier.stats().on; });
+  tier.Keep(
+      "key", []() -> std::string { throw std::bad_alloc(); }, 5);
+  Await([&] { return tier.stats().dropped == 1; });
+  EXPECT_EQ(tier.stats().errors, 1U);
+  tier.Keep(
+      "key", [] { return std::string("value"); }, 5);
+  Await([&] { return tier.stats().written == 1; });
 }
 
 TEST(SharedStore, ReleasesOnlyItsOwnLeases) {

@@ -14,6 +14,7 @@
 #include "engine/geo/ellipsoid.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/support/source_dir.h"
+#include "tests/support/test_data.h"
 
 namespace terrace::tiler {
 namespace {
@@ -187,6 +188,42 @@ TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
     const EncodedTile encoded = Build({-20, 80, 20, 90, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef});
     EXPECT_LE(encoded.max_error_m, error_m + 0.01);
   }
+}
+
+// In space the chord between two vertices of a parallel also bulges sideways: off the ground at its samples where that
+// is steep.
+TEST_F(AreaMeshTest, KeepsTheErrorOnItsEdges) {
+  for (const double error_m : {1.0, 3.0, 10.0}) {
+    AreaRequest area{-84.4, 36.2, -84.1, 36.4, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEnu};
+    EXPECT_LE(Build(area).max_error_m, error_m + 0.01);
+  }
+  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  for (const double error_m : {5.0, 20.0, 200.0}) {
+    for (const double south : {-90.0, -89.0, 60.0, 86.0, 87.5}) {
+      AreaRequest area{0, south, 40, south + 2, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef};
+      const EncodedTile encoded = Build(area);
+      EXPECT_LE(encoded.max_error_m, error_m + 0.01) << south;
+      EXPECT_LT(encoded.vertices, 400'000u) << south;
+    }
+  }
+}
+
+// Where the chord of a parallel and the ground's bulge meet, a thin triangle stands upright in space.
+TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
+  constexpr const char* kFile = "bigtujunga_30m_utm11.tif";
+  const auto path = test_support::TestDataPath(kFile);
+  if (!path) GTEST_SKIP() << test_support::MissingTestData(kFile);
+  auto opened = dem::DemSource::Open(*path);
+  ASSERT_TRUE(opened) << opened.error().message;
+  source_ = *std::move(opened);
+  const AreaRequest area{-180, -90, 180, 90, 5, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
+  const auto plan = PlanArea(*source_, 0.5, area, 16 * kMany);
+  ASSERT_TRUE(plan) << plan.error().message;
+  const auto mesh = BuildAreaMesh(*source_, *plan, area, {});
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_LE(mesh->max_error_m, 5.001);
 }
 
 // An area closer to the pole than the rounding of a node still has one row of cells.
