@@ -324,7 +324,7 @@ class Bake(BakeCase):
                 (("--out", file), "0-11", "is a file"),
                 (("--out", reference), "0-10", 'levels "0-11", not "0-10"'),
                 (("--out", reference, "--no-gzip"), "0-11", 'gzip "yes", not "no"'),
-                (("--out", other, "--finish", "--form", "single"), "0-9", "needs all units in one run --form chunks"),
+                (("--out", other, "--finish", "--form", "single"), "0-9", "needs all units in one run"),
                 (("--out", reference, "--error", "5"), "0-11", 'error "default", not "5 m"'),
                 (("--out", other), "0-30", "from 0 to 24"),
                 (("--out", other), "5-3", "--levels 5-3"),

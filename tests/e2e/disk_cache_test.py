@@ -370,7 +370,7 @@ class DiskCache(unittest.TestCase):
             with Server(*self.flags()) as server:
                 self.assertEqual(crawl(server.port, some)[1]["disk"], found, unfinished)
                 self.assertEqual((self.directory / "lock").stat().st_size, 0)
-                self.assertEqual("2 starts ended while it was opened" in server.text(), found == 0)
+                self.assertEqual("the last 2 starts ended" in server.text(), found == 0)
                 server.stop()
         self.assertEqual((foreign / "0.png").read_text(), "dear")
         shutil.rmtree(self.directory)
