@@ -48,7 +48,7 @@ TEST(ParseJsonText, RefusesAnObjectOfManyKeys) {
   EXPECT_EQ(ParseJsonText(text + "}", errors).size(), 1000u);
   EXPECT_THAT(errors, testing::IsEmpty());
   EXPECT_TRUE(ParseJsonText(text + ",\n\"more\": 0}", errors).is_discarded());
-  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1001, column 6: an object with more than 1000 keys")));
+  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1001, column 6: more than 1000 keys in one object")));
 }
 
 TEST(ParseJsonText, RefusesADeepText) {
@@ -57,8 +57,8 @@ TEST(ParseJsonText, RefusesADeepText) {
   std::vector<ConfigError> errors;
   EXPECT_TRUE(ParseJsonText(text + "[", errors).is_discarded());
   EXPECT_TRUE(ParseJsonText(text + "{", errors).is_discarded());
-  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1, column 301: lists or objects more than 100 deep"),
-                                  IsError("", "line 1, column 301: lists or objects more than 100 deep")));
+  EXPECT_THAT(errors, ElementsAre(IsError("", "line 1, column 301: lists or objects nested more than 100 deep"),
+                                  IsError("", "line 1, column 301: lists or objects nested more than 100 deep")));
   std::string end;
   for (int i = 0; i < 50; ++i) end += "]}";
   EXPECT_FALSE(ParseJsonText(text + end, errors).is_discarded());
