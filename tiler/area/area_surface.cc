@@ -136,8 +136,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
   // A sample on an edge is the worst one of two triangles.
   const auto in_rows = [](tin::SamplePosition p) { return std::pair(p.y, p.x); };
   std::ranges::sort(error.misses, {}, in_rows);
-  const auto repeated = std::ranges::unique(error.misses);
-  error.misses.erase(repeated.begin(), repeated.end());
+  error.misses.erase(std::unique(error.misses.begin(), error.misses.end()), error.misses.end());
   return error;
 }
 
