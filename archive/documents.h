@@ -8,7 +8,8 @@
 
 namespace terrace::archive {
 
-// layer.json of an archive of terrain tiles. Equal to the server's, if the whole dataset was baked with all extensions.
+// layer.json of an archive of terrain tiles. Equal to the server's except for the version, if the whole dataset was
+// baked with all extensions.
 std::string LayerJson(const Manifest& manifest);
 
 // The bounds of the deepest height tiles of an archive, within those of the dataset.

@@ -2,8 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <set>
@@ -17,7 +17,6 @@
 #include "engine/edits/edit_shape.h"
 #include "engine/edits/read_edits.h"
 #include "engine/geo/mercator_grid.h"
-#include "engine/mosaic/window_values.h"
 #include "engine/raster/grid_cells.h"
 
 namespace terrace::dem {
@@ -166,29 +165,6 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
   return {};
 }
 
-namespace {
-
-// The averages between which the corners of a cell of nodes lie. Nothing if a corner has no position.
-std::optional<GridWindow> SamplesAround(const NodeCells& nodes, std::size_t i, std::size_t j) {
-  constexpr std::int64_t kLast = std::numeric_limits<std::int64_t>::max();
-  std::int64_t west = kLast, north = kLast, east = -kLast, south = -kLast;
-  for (const auto& [column, row] : {std::pair{i, j}, {i + 1, j}, {i, j + 1}, {i + 1, j + 1}}) {
-    const Position at = nodes.positions().At(column, row);
-    if (!std::isfinite(at.x) || !std::isfinite(at.y)) return std::nullopt;
-    const GridCell cell = nodes.At(column, row);
-    west = std::min(west, cell.column), east = std::max(east, cell.column + 1);
-    north = std::min(north, cell.row), south = std::max(south, cell.row + 1);
-  }
-  return GridWindow{west, north, east - west + 1, south - north + 1};
-}
-
-bool Contains(const GridWindow& window, const GridWindow& other) {
-  return other.column >= window.column && other.column + other.columns <= window.column + window.columns &&
-         other.row >= window.row && other.row + other.rows <= window.row + window.rows;
-}
-
-}  // namespace
-
 template <typename NodeGrid>
 std::vector<std::size_t> DemSource::Impl::EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const {
   if (edits == nullptr) return {};
@@ -225,28 +201,6 @@ Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWi
     return &known.emplace(edit.replacement, std::move(result)).first->second;
   };
   return edits->Apply(node_grid, window, which, heights, replaced, stop, error_m);
-}
-
-// Averages hide voids between nodes.
-std::vector<std::uint8_t> DemSource::Impl::VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
-                                                     std::span<const PartTrace> traces) const {
-  const std::vector<std::size_t> order = GridsAt(BoxOf(lattice, window));
-  const auto columns = static_cast<std::size_t>(window.columns - 1), rows = static_cast<std::size_t>(window.rows - 1);
-  std::vector<std::uint8_t> cells(columns * rows, 1);
-  for (std::size_t k = 0; k < traces.size(); ++k) {
-    const GridTrace& trace = traces[k].trace;
-    if (traces[k].part || trace.window.columns == 0) continue;
-    const RasterGrid& grid = grids[order[k]];
-    const bool has_voids = grid.Ranges(PixelsOf(trace.window, trace.factor)).has_voids;
-    for (std::size_t cell = 0; cell < cells.size(); ++cell) {
-      if (cells[cell] == 0) continue;
-      const auto around = SamplesAround(trace.cells, cell % columns, cell / columns);
-      if (!around) continue;
-      const bool is_known = !has_voids && Contains(trace.window, *around);
-      cells[cell] = !is_known && grid.Ranges(PixelsOf(*around, trace.factor)).has_voids ? 1 : 0;
-    }
-  }
-  return cells;
 }
 
 template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;

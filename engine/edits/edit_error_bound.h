@@ -8,7 +8,7 @@
 //   |S' - h'| <= (1 - w0) e + (w1 - w0) d + w1 tau.
 // For an offset t - s is constant. For carving and raising max(0, +-(s - t)) takes the place of t - s; where it changes
 // its sign in the cell, w1 d is added, and e is not reduced. Where a replacement has no height at a corner of the cell,
-// w0 is 0, because samples may keep their heights.
+// or voids in it, w0 is 0, because samples may keep their heights.
 #pragma once
 
 #include <cstdint>

@@ -79,6 +79,7 @@ TileBoxes BoxesOf(const Georeference& georeference, const geo::Lattice& lattice,
 
 BlockRange RasterGrid::Ranges(const Box& pixels) const {
   if (!wraps_) return RangesInTurn(pixels);
+  // Columns beyond an end are those at the other end.
   BlockRange range;
   const double turn = columns_;
   for (const double shift : {0.0, -turn, turn}) {
