@@ -56,7 +56,7 @@ std::string NameInQueue(const bake::UnitPlan::Entry& entry, const std::vector<ba
 void PrintMessage(const std::string& message) { std::fprintf(stderr, "terrace: %s\n", message.c_str()); }
 
 Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
-  auto place = JobPlaceOf(bake.arguments);
+  auto place = JobConnectionOf(bake.arguments);
   if (!place) return tl::unexpected(place.error());
   const auto place_id = bake::PlaceId(bake.place);
   if (!place_id) return tl::unexpected(place_id.error());
@@ -124,7 +124,7 @@ int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
 
 }  // namespace
 
-Result<bake::JobConnection> JobPlaceOf(const BakeArguments& arguments) {
+Result<bake::JobConnection> JobConnectionOf(const BakeArguments& arguments) {
   bake::JobConnection place;
   if (auto checked = bake::CheckJobName(arguments.job); !checked) return tl::unexpected(checked.error());
   auto address = redis::ParseAddress(arguments.queue);

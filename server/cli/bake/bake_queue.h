@@ -13,8 +13,8 @@
 
 namespace terrace::cli {
 
-// The place of the job, with its credentials. kInvalidArgument: the flags are wrong; the message has no secret.
-Result<bake::JobConnection> JobPlaceOf(const BakeArguments& arguments);
+// How to reach the job, with its credentials. kInvalidArgument: the flags are wrong; the message has no secret.
+Result<bake::JobConnection> JobConnectionOf(const BakeArguments& arguments);
 
 // What Redis says of a unit or a worker, for people: anybody may have written it. At most 200 bytes, without control
 // characters.

@@ -76,7 +76,7 @@ std::string StatusText(const bake::JobStatus& status, const std::string& job) {
 
 int ShowStatus(const BakeArguments& arguments, const StatusView& view) {
   std::signal(SIGPIPE, SIG_IGN);
-  const auto place = JobPlaceOf(arguments);
+  const auto place = JobConnectionOf(arguments);
   if (!place) return Fail(place.error());
   std::unique_ptr<redis::Connection> connection;
   const bool is_screen = view.watch && !view.json && ::isatty(STDOUT_FILENO) != 0;
