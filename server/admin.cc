@@ -11,7 +11,8 @@
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
-#include "server/reply_record.h"
+#include "server/query/mesh_query.h"
+#include "server/telemetry/reply_record.h"
 
 namespace terrace::server {
 namespace {

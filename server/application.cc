@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "server/http/http_error.h"
-#include "server/reply_record.h"
 #include "server/routes.h"
+#include "server/telemetry/reply_record.h"
 
 namespace terrace::server {
 namespace {
@@ -42,7 +42,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
       : application_(application), peer_(Canonical(peer)) {}
 
   Admission Admit(Request& request, std::chrono::milliseconds longest_wait) override {
-    AdmissionControl& admission_control = application_.parts_.frontend.admission_control;
+    AdmissionControl& admission_control = application_.parts_.access.admission_control;
     context_.request = &request;
     client_ = admission_control.Identify(request, peer_, context_);
     Result<Route> route = Routes().Match(request.target);
@@ -97,7 +97,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   std::optional<Response> Refuse() const {
     std::optional<Response> refusal = RefuseMethod(context_.route.row->takes_post());
     if (refusal) return refusal;
-    refusal = application_.parts_.frontend.admission_control.Refuse(context_);
+    refusal = application_.parts_.access.admission_control.Refuse(context_);
     if (refusal) refusal->labels.route = context_.route.row->label;
     return refusal;
   }
@@ -183,7 +183,7 @@ std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::a
 
 std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
   const asio::ip::address address = Canonical(peer);
-  return parts_.frontend.admission_control.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
+  return parts_.access.admission_control.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
 }
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {

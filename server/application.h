@@ -12,9 +12,9 @@
 #include <optional>
 #include <string>
 
+#include "server/access/admission_control.h"
+#include "server/access/client_access.h"
 #include "server/api/request_context.h"
-#include "server/frontend/admission_control.h"
-#include "server/frontend/frontend.h"
 #include "server/handlers/handlers.h"
 #include "server/http/application.h"
 #include "server/telemetry/access_log.h"
@@ -27,7 +27,7 @@ namespace terrace::server {
 
 // What the application uses to answer and report requests; outlives it.
 struct ApplicationParts {
-  Frontend& frontend;
+  ClientAccess& access;
   TileService& tiles;
   Metrics& metrics;
   MetricsPage& metrics_page;
@@ -66,7 +66,7 @@ class TerrainApplication final : public Application, public ProcessState {
   class Handler;
   using HandlersPtr = std::shared_ptr<const Handlers>;
 
-  bool draining() const override { return parts_.frontend.connections.draining(); }
+  bool draining() const override { return parts_.access.connections.draining(); }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { return parts_.metrics_page.Get(); }
 
   HandlersPtr Make(CatalogPtr catalog, config::Config config) const;

@@ -19,8 +19,8 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # A room is a module. The order is core <- {geo, tin}; geo <- DEM <- dem; {geo, tin} <- proto; {dem, proto} <- tiler <- archive
 # <- {bake, server}, and core <- config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
 # itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
-# jobs <- tiles; http <- query; {http, tiles} <- {telemetry, api}; {telemetry, api} <- frontend; {query, api} <- documents
-# <- handlers; {frontend, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
+# jobs <- tiles; http <- query <- api; {http, tiles} <- {telemetry, api}; {telemetry, api} <- access; api <- documents
+# <- handlers; {access, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
 # mesh, info, bake} <- cli, and bake <- cli/bake.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
@@ -49,8 +49,8 @@ VALUES = {"engine/common/dem_types.h", "engine/tin/criterion.h", "proto/gltf/glt
 FLY = ["fly/scene", "fly/select", "fly/content", "fly/tree", "fly/http", "fly/flight", "fly/report"]
 HTTP = ["server/net", "server/http"]
 TILES = ENGINE + ["server/jobs", "server/tiles"]
-API = TILES + HTTP + ["server/openapi", "server/api"]
-SERVER = API + ["server/store", "server/telemetry", "server/query", "server/frontend", "server/documents", "server/handlers"]
+API = TILES + HTTP + ["server/query", "server/openapi", "server/api"]
+SERVER = API + ["server/store", "server/telemetry", "server/access", "server/documents", "server/handlers"]
 MODULES = {
     "engine/core": [],
     "engine/geo": ["engine/core"],
@@ -88,10 +88,10 @@ MODULES = {
     "server/telemetry": TILES + HTTP,
     "server/query": ENGINE + ["server/http"],
     "server/openapi": [],
-    "server/api": TILES + HTTP + ["server/openapi"],
-    "server/frontend": API + ["server/telemetry"],
+    "server/api": TILES + HTTP + ["server/query", "server/openapi"],
+    "server/access": API + ["server/telemetry"],
     "server/documents": API,
-    "server/handlers": API + ["server/query", "server/documents"],
+    "server/handlers": API + ["server/documents"],
     "server/reload": ENGINE + ["config/file", "server/tiles"],
     "server": SERVER,
     "server/cli/common": SERVER + ["server", "server/reload"],

@@ -1,5 +1,5 @@
-// The tile formats, one row each: suffix of its URLs, parameters, and headers of replies. Also the parts that all
-// formats share: parameters, codings, errors. tiler/encoders.h has the encoders.
+// The tile formats, one row each: suffix of its URLs, parameters, and headers of replies. Also what all formats share:
+// codings and errors. tiler/encoders.h has the encoders.
 #pragma once
 
 #include <cstdint>
@@ -11,10 +11,9 @@
 
 #include "engine/core/result.h"
 #include "proto/documents/map_picture.h"
-#include "proto/gltf/glb_tile.h"
-#include "proto/gltf/texture.h"
 #include "proto/media_type.h"
 #include "server/api/request_context.h"
+#include "server/query/tile_query.h"
 #include "server/tiles/catalog.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/requested_error.h"
@@ -23,29 +22,6 @@
 namespace terrace::server {
 
 using tiler::ErrorStep;
-using tiler::RequestedError;
-
-struct TileParameters {
-  RequestedError requested;
-  std::vector<std::string> extensions;  // every `extensions` value
-  std::optional<proto::GlbCompression> compression;
-  std::optional<proto::TextureFormat> texture;
-};
-
-// Parses the parameters of URLs of tiles (`allow_at_least`), of .glb tiles (`allow_compression`) and of layer.json. `v`
-// and `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
-// below it, so error, fraction, compression and texture may be repeated there with the same value. kInvalidArgument,
-// with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
-// or an invalid value.
-Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
-
-struct HeightTileParameters {
-  proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
-  int size = tiler::kSidesPx[0];
-};
-
-// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
-Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 struct TileFormatRow {
   tiler::TileFormat format;

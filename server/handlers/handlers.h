@@ -129,12 +129,6 @@ Answer AnswerSight(const Handlers& handlers, const RequestContext& context);
 
 // GET /{dataset}/mesh
 Answer AnswerArea(const Handlers& handlers, const RequestContext& context);
-// Reads `bbox=west,south,east,north` and `error=METRES`, both required; `format=glb|obj|ply`,
-// `coordinates=enu|ecef|geographic`; `v` may be repeated. west > east: the box crosses the antimeridian.
-// kInvalidArgument: the message is for the client.
-Result<tiler::AreaRequest> ParseAreaRequest(std::string_view query);
-// Reads `west,south,east,north`; west > east: the box crosses the antimeridian. Errors: as above.
-Result<dem::GeoBounds> ParseBox(std::string_view text);
 
 // GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
 DocumentAnswer DescribeLayer(const Handlers& handlers, const RequestContext& context);

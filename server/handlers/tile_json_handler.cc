@@ -4,7 +4,7 @@
 
 #include "proto/documents/tile_json.h"
 #include "server/api/caching.h"
-#include "server/api/map_parameters.h"
+#include "server/api/map_formats.h"
 #include "server/api/tile_formats.h"
 #include "server/documents/document.h"
 #include "server/handlers/handlers.h"

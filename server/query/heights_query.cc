@@ -1,9 +1,7 @@
 #include "server/query/heights_query.h"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <string>
 #include <utility>
 
 #include "engine/core/bytes.h"

@@ -27,7 +27,7 @@
 #include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
-#include "server/handlers/handlers.h"
+#include "server/query/mesh_query.h"
 #include "tiler/area/area_mesh.h"
 
 namespace terrace::cli {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "server/handlers/handlers.h"
+#include "server/query/mesh_query.h"
 
 namespace terrace::server {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "config/common/token_hash.h"
-#include "server/frontend/admission_control.h"
+#include "server/access/admission_control.h"
 
 namespace terrace::server {
 namespace {

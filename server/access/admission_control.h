@@ -14,9 +14,9 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
+#include "server/access/client_address.h"
+#include "server/access/rate_limiter.h"
 #include "server/api/request_context.h"
-#include "server/frontend/client_address.h"
-#include "server/frontend/rate_limiter.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
 

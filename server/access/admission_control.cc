@@ -1,4 +1,4 @@
-#include "server/frontend/admission_control.h"
+#include "server/access/admission_control.h"
 
 #include <fmt/format.h>
 

@@ -6,8 +6,8 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
+#include "server/access/admission_control.h"
 #include "server/asio/asio.h"
-#include "server/frontend/admission_control.h"
 #include "server/http/cors.h"
 #include "server/net/connection_set.h"
 #include "server/net/tls.h"
@@ -15,11 +15,11 @@
 
 namespace terrace::server {
 
-struct Frontend {
+struct ClientAccess {
   // Errors quote the option's value, or name the file.
-  static Result<std::unique_ptr<Frontend>> Open(const config::Config& config);
+  static Result<std::unique_ptr<ClientAccess>> Open(const config::Config& config);
 
-  Frontend(const config::Config& config, AdmissionOptions admission);
+  ClientAccess(const config::Config& config, AdmissionOptions admission);
 
   ConnectionSet connections;
   TransferBudget transfers;

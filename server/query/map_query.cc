@@ -1,23 +1,18 @@
-#include "server/api/map_parameters.h"
+#include "server/query/map_query.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <utility>
+#include <cstdint>
+#include <iterator>
 #include <vector>
 
 #include "server/http/text.h"
+#include "server/query/tile_query.h"
 #include "tiler/map/contour_tile.h"
-#include "tiler/tile/tile_bounds.h"
 
 namespace terrace::server {
 namespace {
-
-bool IsImagery(tiler::TileFormat format) {
-  return format == tiler::TileFormat::kImagery || format == tiler::TileFormat::kGeodeticImagery;
-}
 
 // A reader of one parameter's value. kInvalidArgument: the message begins with what the value must be.
 using SetParameter = Result<void> (*)(std::string_view text, MapTileParameters& parameters);
@@ -98,11 +93,6 @@ constexpr MapParameterRow kRows[] = {
 
 }  // namespace
 
-Result<void> SetTileSize(int& size, std::string_view text) {
-  static_assert(tiler::kSidesPx == std::array{256, 512});
-  return SetOneOf(size, "size", text, {{"256", 256}, {"512", 512}});
-}
-
 Result<MapTileParameters> ParseMapParameters(std::string_view query, tiler::TileFormat format, bool in_tile_json) {
   std::vector<const char*> names;
   std::vector<SetParameter> set;
@@ -132,67 +122,6 @@ std::string MapTileQuery(const MapTileParameters& parameters) {
   if (map.interval_cm != 0) add("interval", map.interval_cm / 100.0);
   if (parameters.size != defaults.size) add("size", parameters.size);
   return query;
-}
-
-int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size) {
-  const int above = size == 512 ? 1 : 0;
-  switch (format) {
-    case tiler::TileFormat::kImagery:
-      return std::max(dataset.imagery->max_mercator_depth - above, 0);
-    case tiler::TileFormat::kGeodeticImagery:
-      return std::max(dataset.imagery->max_geodetic_level - above, 0);
-    default:
-      return MaxHeightLevel(dataset, size);
-  }
-}
-
-int MinMapLevel(const MapTileParameters& parameters) {
-  if (parameters.map.interval_cm == 0) return 0;
-  int level = 0;
-  while (tiler::MinIntervalCm(level) > parameters.map.interval_cm) ++level;
-  return level;
-}
-
-dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format) {
-  return IsImagery(format) ? dataset.imagery->bounds : dataset.bounds;
-}
-
-Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format) {
-  if (!IsImagery(format) || dataset.imagery) return {};
-  return MakeError(ErrorCode::kNotFound, "the dataset has no imagery; its option \"imagery\" names an image");
-}
-
-Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile) {
-  if (Result<void> has = CheckHasImagery(dataset, tile.format); !has) return has;
-  const Result<MapTileParameters> parameters = ParseMapParameters(query, tile.format);
-  if (!parameters) return tl::unexpected(parameters.error());
-  const bool is_there =
-      tile.key.level <= MaxMapLevel(dataset, tile.format, parameters->size) &&
-      Intersects(MapBounds(dataset, tile.format), tiler::TileBounds(tile.key, tiler::IsMercator(tile.format)));
-  if (!is_there) {
-    return MakeError(ErrorCode::kNotFound,
-                     "the dataset has no such tile; the tiles.json of this layer tells the bounds and levels of what "
-                     "it has");
-  }
-  const proto::PictureFormat picture = tile.map.picture;
-  tile.map = parameters->map;
-  tile.map.picture = picture;
-  if (tile.format != tiler::TileFormat::kContours) {
-    tile.side_px = parameters->size;
-    return {};
-  }
-  const std::uint32_t least = tiler::MinIntervalCm(tile.key.level);
-  if (tile.map.interval_cm == 0) tile.map.interval_cm = tiler::DefaultIntervalCm(tile.key.level);
-  if (tile.map.interval_cm < least) {
-    return MakeError(ErrorCode::kInvalidArgument, "interval must be at least {} m at level {}", least / 100.0,
-                     tile.key.level);
-  }
-  return {};
-}
-
-std::string_view MapTileType(const tiler::TileRequest& tile) {
-  return tile.format == tiler::TileFormat::kContours ? "application/vnd.mapbox-vector-tile"
-                                                     : proto::MediaTypeOf(tile.map.picture);
 }
 
 }  // namespace terrace::server

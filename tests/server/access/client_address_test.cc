@@ -1,4 +1,4 @@
-#include "server/frontend/client_address.h"
+#include "server/access/client_address.h"
 
 #include <gtest/gtest.h>
 

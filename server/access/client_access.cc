@@ -1,4 +1,4 @@
-#include "server/frontend/frontend.h"
+#include "server/access/client_access.h"
 
 #include <spdlog/spdlog.h>
 
@@ -9,13 +9,13 @@
 
 namespace terrace::server {
 
-Frontend::Frontend(const config::Config& config, AdmissionOptions admission)
+ClientAccess::ClientAccess(const config::Config& config, AdmissionOptions admission)
     : connections(config.max_connections, config.max_connections_per_client),
       transfers(config.transfer_bytes),
       admission_control(std::move(admission)),
       cors(config.cors_origins) {}
 
-Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
+Result<std::unique_ptr<ClientAccess>> ClientAccess::Open(const config::Config& config) {
   AdmissionOptions admission;
   Result<AddressRanges> trusted = AddressRanges::Parse(config.trusted_proxies);
   if (!trusted) return tl::unexpected(std::move(trusted.error()));
@@ -36,9 +36,9 @@ Result<std::unique_ptr<Frontend>> Frontend::Open(const config::Config& config) {
     if (!opened) return tl::unexpected(std::move(opened.error()));
     tls = *std::move(opened);
   }
-  auto frontend = std::make_unique<Frontend>(config, std::move(admission));
-  frontend->tls = std::move(tls);
-  return frontend;
+  auto opened = std::make_unique<ClientAccess>(config, std::move(admission));
+  opened->tls = std::move(tls);
+  return opened;
 }
 
 asio::awaitable<void> WatchCertificate(TlsContext* tls) {

@@ -1,4 +1,6 @@
-#include "server/reply_record.h"
+#include "server/telemetry/reply_record.h"
+
+#include "server/http/application.h"
 
 namespace terrace::server {
 

@@ -1,4 +1,4 @@
-#include "server/frontend/rate_limiter.h"
+#include "server/access/rate_limiter.h"
 
 #include <gtest/gtest.h>
 

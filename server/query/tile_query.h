@@ -1,0 +1,44 @@
+// Parsed parameters of URLs of tiles. Pure.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "engine/core/result.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
+
+namespace terrace::server {
+
+using tiler::RequestedError;
+
+struct TileParameters {
+  RequestedError requested;
+  std::vector<std::string> extensions;  // every `extensions` value
+  std::optional<proto::GlbCompression> compression;
+  std::optional<proto::TextureFormat> texture;
+};
+
+// Parses the parameters of URLs of tiles (`allow_at_least`), of .glb tiles (`allow_compression`) and of layer.json. `v`
+// and `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
+// below it, so error, fraction, compression and texture may be repeated there with the same value. kInvalidArgument,
+// with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
+// or an invalid value.
+Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
+
+struct HeightTileParameters {
+  proto::HeightEncoding encoding = proto::HeightEncoding::kMapbox;
+  int size = tiler::kSidesPx[0];
+};
+
+// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
+Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
+
+// The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kSidesPx.
+Result<void> SetTileSize(int& size, std::string_view text);
+
+}  // namespace terrace::server
