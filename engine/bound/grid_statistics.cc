@@ -40,11 +40,11 @@ Box GridStatistics::BoxAround() const {
       if (std::abs(x - last) > turn_ / 2 && turn_ > 0) x += turn_ * std::round((last - x) / turn_);
       if (i == 0) of_row = x;
       last = x;
-      hull = {std::min(hull.west, x), std::min(hull.south, p.y), std::max(hull.east, x), std::max(hull.north, p.y)};
+      hull = {std::min(hull.min_x, x), std::min(hull.min_y, p.y), std::max(hull.max_x, x), std::max(hull.max_y, p.y)};
     }
   }
   const double halo = 4.0 * trace_.factor;
-  return {hull.west - halo, hull.south - halo, hull.east + halo, hull.north + halo};
+  return {hull.min_x - halo, hull.min_y - halo, hull.max_x + halo, hull.max_y + halo};
 }
 
 std::vector<std::size_t> GridStatistics::MembersAround() const {
@@ -53,7 +53,7 @@ std::vector<std::size_t> GridStatistics::MembersAround() const {
   for (const double turns : {0, -1, 1}) {
     if (turns != 0 && turn_ == 0) break;
     const double shift = turns * turn_;
-    const auto here = grid_.MembersAt({around_.west + shift, around_.south, around_.east + shift, around_.north});
+    const auto here = grid_.MembersAt({around_.min_x + shift, around_.min_y, around_.max_x + shift, around_.max_y});
     members.insert(members.end(), here.begin(), here.end());
   }
   std::ranges::sort(members);
@@ -62,10 +62,10 @@ std::vector<std::size_t> GridStatistics::MembersAround() const {
 }
 
 bool GridStatistics::IsAround(const Box& pixels) const {
-  const double middle = (around_.west + around_.east) / 2;
-  const double shift = turn_ > 0 ? turn_ * std::round((middle - (pixels.west + pixels.east) / 2) / turn_) : 0;
-  return pixels.west + shift >= around_.west && pixels.east + shift <= around_.east && pixels.south >= around_.south &&
-         pixels.north <= around_.north;
+  const double middle = (around_.min_x + around_.max_x) / 2;
+  const double shift = turn_ > 0 ? turn_ * std::round((middle - (pixels.min_x + pixels.max_x) / 2) / turn_) : 0;
+  return pixels.min_x + shift >= around_.min_x && pixels.max_x + shift <= around_.max_x &&
+         pixels.min_y >= around_.min_y && pixels.max_y <= around_.max_y;
 }
 
 template <typename Visit>

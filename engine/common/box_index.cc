@@ -17,7 +17,7 @@ using Point = boost::geometry::model::point<double, 2, boost::geometry::cs::cart
 using Rectangle = boost::geometry::model::box<Point>;
 using Value = std::pair<Rectangle, std::size_t>;
 
-Rectangle RectangleOf(const Box& box) { return {{box.west, box.south}, {box.east, box.north}}; }
+Rectangle RectangleOf(const Box& box) { return {{box.min_x, box.min_y}, {box.max_x, box.max_y}}; }
 
 Value ValueOf(const BoxIndex::Entry& entry) { return {RectangleOf(entry.box), entry.value}; }
 

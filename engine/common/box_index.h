@@ -7,11 +7,11 @@
 
 namespace terrace::dem {
 
-// In pixels or in degrees. In pixels y is the row, so that `south` is the first row, and `north` the last.
+// In degrees, or in pixels; then y is the row.
 struct Box {
-  double west = 0, south = 0, east = 0, north = 0;
+  double min_x = 0, min_y = 0, max_x = 0, max_y = 0;
 
-  void Grow(double x, double y) { west -= x, east += x, south -= y, north += y; }
+  void Grow(double x, double y) { min_x -= x, max_x += x, min_y -= y, max_y += y; }
 };
 
 // An R-tree. Thread-safe as long as no entries are removed. An empty index finds nothing.

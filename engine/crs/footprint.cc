@@ -1,6 +1,7 @@
 #include "engine/crs/footprint.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace terrace::dem {
@@ -22,8 +23,13 @@ std::vector<Position> Outline(double width, double height) {
 // Also if the pole is so close that two points of the outline may lie on both sides of it, or beside the raster by
 // rounding.
 bool HoldsPole(const Georeference& georeference, double latitude) {
-  Position pole{0, latitude};
-  georeference.ToPixels({&pole, 1});
+  std::array<Position, 4> poles{{{0, latitude}, {90, latitude}, {180, latitude}, {-90, latitude}}};
+  georeference.ToPixels(poles);
+  const Position& pole = poles[0];
+  // On a map where the pole is a line, the outline has the extent of the raster.
+  for (const Position& other : poles) {
+    if (!(std::hypot(other.x - pole.x, other.y - pole.y) < 1)) return false;
+  }
   const auto holds = [](double place, int side) {
     const double margin = std::max(static_cast<double>(side) / kPointsPerSide, 1e-6);
     return place >= -margin && place <= side + margin;

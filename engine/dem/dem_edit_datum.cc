@@ -35,19 +35,19 @@ Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
   // The finest geoid models have nodes two kilometres apart.
   constexpr double kStep_m = 500, kMaxSteps = 64;
   const Box& reach = edit.reach;
-  const double width = (reach.east - reach.west) * plane.east_m, height = (reach.north - reach.south) * plane.north_m;
+  const double width = (reach.max_x - reach.min_x) * plane.east_m, height = (reach.max_y - reach.min_y) * plane.north_m;
   const auto steps = [&](double metres) { return std::clamp(std::ceil(metres / kStep_m), 1.0, kMaxSteps); };
   auto patch = std::make_shared<EditUndulations>();
-  patch->south_west = {(reach.west - plane.longitude) * plane.east_m, (reach.south - plane.latitude) * plane.north_m};
+  patch->south_west = {(reach.min_x - plane.longitude) * plane.east_m, (reach.min_y - plane.latitude) * plane.north_m};
   patch->columns = static_cast<std::size_t>(steps(width)) + 1;
   patch->rows = static_cast<std::size_t>(steps(height)) + 1;
   patch->step_x = width / steps(width);
   patch->step_y = height / steps(height);
   const Geoid::Reader reader(**geoid);
   for (std::size_t j = 0; j < patch->rows; ++j) {
-    const double latitude = reach.south + static_cast<double>(j) * patch->step_y / plane.north_m;
+    const double latitude = reach.min_y + static_cast<double>(j) * patch->step_y / plane.north_m;
     for (std::size_t i = 0; i < patch->columns; ++i) {
-      const double longitude = reach.west + static_cast<double>(i) * patch->step_x / plane.east_m;
+      const double longitude = reach.min_x + static_cast<double>(i) * patch->step_x / plane.east_m;
       const double metres = reader.At({std::remainder(longitude, 360), latitude});
       if (!std::isfinite(metres))
         return fmt::format("its heights are orthometric, and {} has none there", (*geoid)->name());

@@ -24,15 +24,15 @@ namespace {
 
 bool Meets(const Box& box, const GeoBounds& bounds) {
   const double east = bounds.west > bounds.east ? bounds.east + 360 : bounds.east;
-  if (box.north < bounds.south || box.south > bounds.north) return false;
+  if (box.max_y < bounds.south || box.min_y > bounds.north) return false;
   return std::ranges::any_of(std::array{-360.0, 0.0, 360.0},
-                             [&](double turn) { return box.east + turn >= bounds.west && box.west + turn <= east; });
+                             [&](double turn) { return box.max_x + turn >= bounds.west && box.min_x + turn <= east; });
 }
 
 GeoPosition MiddleOf(const Edit& edit) { return {edit.plane.longitude, edit.plane.latitude}; }
 
 // Latitude and longitude in each other's place.
-Box Swapped(const Box& box) { return {box.south, box.west, box.north, box.east}; }
+Box Swapped(const Box& box) { return {box.min_y, box.min_x, box.max_y, box.max_x}; }
 
 EditFault FaultOf(const Edit& edit, std::string message) {
   return {edit.file, edit.feature, MiddleOf(edit), std::move(message)};
@@ -41,10 +41,10 @@ EditFault FaultOf(const Edit& edit, std::string message) {
 // Positions on a grid over the polygon that lie inside it.
 std::vector<GeoPosition> PositionsInside(const Edit& edit) {
   constexpr int kAcross = 32;
-  const double west = edit.reach.west + edit.blend_m / edit.plane.east_m;
-  const double east = edit.reach.east - edit.blend_m / edit.plane.east_m;
-  const double south = edit.reach.south + edit.blend_m / edit.plane.north_m;
-  const double north = edit.reach.north - edit.blend_m / edit.plane.north_m;
+  const double west = edit.reach.min_x + edit.blend_m / edit.plane.east_m;
+  const double east = edit.reach.max_x - edit.blend_m / edit.plane.east_m;
+  const double south = edit.reach.min_y + edit.blend_m / edit.plane.north_m;
+  const double north = edit.reach.max_y - edit.blend_m / edit.plane.north_m;
   std::vector<GeoPosition> inside;
   for (int j = 0; j < kAcross; ++j) {
     const double latitude = south + (north - south) * (j + 0.5) / kAcross;

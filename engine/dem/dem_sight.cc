@@ -18,8 +18,8 @@ Box BoxAround(std::span<const TrackPiece> pieces) {
   Box box{360, 90, -360, -90};
   for (const TrackPiece& piece : pieces) {
     const Quadratic::Range x = piece.longitude.Over(0, 1), y = piece.latitude.Over(0, 1);
-    box = {std::min(box.west, x.min), std::min(box.south, y.min), std::max(box.east, x.max),
-           std::max(box.north, y.max)};
+    box = {std::min(box.min_x, x.min), std::min(box.min_y, y.min), std::max(box.max_x, x.max),
+           std::max(box.max_y, y.max)};
   }
   return box;
 }

@@ -20,16 +20,16 @@ int LevelFor(const Edit& edit, double error_fraction, int deepest) {
 std::vector<geo::TileRange> TilesTouching(const Edit& edit, int level) {
   constexpr std::int64_t kMaxBoxes = 64;  // along an axis
   const double east_m = edit.blend_m / edit.plane.east_m, north_m = edit.blend_m / edit.plane.north_m;
-  const Box box{edit.reach.west + east_m, edit.reach.south + north_m, edit.reach.east - east_m,
-                edit.reach.north - north_m};
+  const Box box{edit.reach.min_x + east_m, edit.reach.min_y + north_m, edit.reach.max_x - east_m,
+                edit.reach.max_y - north_m};
   const auto at = [](double degrees, double side) { return static_cast<std::int64_t>(std::floor(degrees / side)); };
   int coarser = 0;
   double side = 0;
   std::int64_t west = 0, east = 0, south = 0, north = 0;
   for (;; ++coarser) {
     side = std::ldexp(180, coarser - level);
-    west = at(box.west + 180, side), east = at(box.east + 180, side);
-    south = std::max<std::int64_t>(at(box.south + 90, side), 0), north = at(box.north + 90, side);
+    west = at(box.min_x + 180, side), east = at(box.max_x + 180, side);
+    south = std::max<std::int64_t>(at(box.min_y + 90, side), 0), north = at(box.max_y + 90, side);
     north = std::min(north, geo::TileRows(level - coarser) - 1);
     if (coarser == level || std::max(east - west, north - south) < kMaxBoxes) break;
   }

@@ -22,7 +22,7 @@ BoxIndex IndexOfEdits(const std::vector<Edit>& edits) {
   for (std::size_t i = 0; i < edits.size(); ++i) {
     const Box& box = edits[i].reach;
     for (const int turn : {-360, 0, 360})
-      entries.push_back({{box.west + turn, box.south, box.east + turn, box.north}, i});
+      entries.push_back({{box.min_x + turn, box.min_y, box.max_x + turn, box.max_y}, i});
   }
   return BoxIndex(entries);
 }
@@ -33,8 +33,8 @@ struct EmptyBox {
   Box box;
 
   bool Contains(std::uint64_t number, const Box& degrees) const {
-    return set == number && degrees.west >= box.west && degrees.east <= box.east && degrees.south >= box.south &&
-           degrees.north <= box.north;
+    return set == number && degrees.min_x >= box.min_x && degrees.max_x <= box.max_x && degrees.min_y >= box.min_y &&
+           degrees.max_y <= box.max_y;
   }
 };
 thread_local EmptyBox last_empty;

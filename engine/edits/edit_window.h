@@ -33,16 +33,16 @@ class WindowAxes {
     const auto rows = static_cast<int>(latitudes_.size()), columns = static_cast<int>(longitudes_.size());
     const bool ascends = rows < 2 || latitudes_.front() < latitudes_.back();
     const auto below = std::ranges::partition_point(
-        latitudes_, [&](double latitude) { return ascends ? latitude < box.south : latitude > box.north; });
+        latitudes_, [&](double latitude) { return ascends ? latitude < box.min_y : latitude > box.max_y; });
     const auto above = std::ranges::partition_point(
-        latitudes_, [&](double latitude) { return ascends ? latitude <= box.north : latitude >= box.south; });
+        latitudes_, [&](double latitude) { return ascends ? latitude <= box.max_y : latitude >= box.min_y; });
     const int first_row = std::max(static_cast<int>(below - latitudes_.begin()) - 1, 0);
     const int last_row = std::min(static_cast<int>(above - latitudes_.begin()), rows - 1);
     std::vector<Part> parts;
     int beyond = -1;  // columns of the last part
     for (const double turn : {-360.0, 0.0, 360.0}) {
-      const double first = std::floor((box.west + turn - west_) / step_),
-                   last = std::ceil((box.east + turn - west_) / step_);
+      const double first = std::floor((box.min_x + turn - west_) / step_),
+                   last = std::ceil((box.max_x + turn - west_) / step_);
       if (last < 0 || first > columns - 1 || first_row > last_row) continue;
       const Part part{std::max(std::max(static_cast<int>(std::max(first, 0.0)), 0), beyond + 1),
                       static_cast<int>(std::min(last, columns - 1.0)), first_row, last_row};

@@ -131,7 +131,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   ReadHeights(*terrain);
   if (has_failed()) return std::nullopt;
   Complete(edit_);
-  if (edit_.reach.south < -kFurthestLatitude || edit_.reach.north > kFurthestLatitude) {
+  if (edit_.reach.min_y < -kFurthestLatitude || edit_.reach.max_y > kFurthestLatitude) {
     Fail("reaches a pole; edits end at 89.9 degrees");
   }
   if (has_failed()) return std::nullopt;

@@ -13,10 +13,10 @@ namespace {
 
 constexpr Box kNowhereBox{1e300, 1e300, -1e300, -1e300};
 
-Box Grown(const Box& box, double by) { return {box.west - by, box.south - by, box.east + by, box.north + by}; }
+Box Grown(const Box& box, double by) { return {box.min_x - by, box.min_y - by, box.max_x + by, box.max_y + by}; }
 
 bool Holds(const Box& box, const Position& p) {
-  return (p.x >= box.west) & (p.x <= box.east) & (p.y >= box.south) & (p.y <= box.north);
+  return (p.x >= box.min_x) & (p.x <= box.max_x) & (p.y >= box.min_y) & (p.y <= box.max_y);
 }
 
 }  // namespace
@@ -55,16 +55,17 @@ std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) cons
 std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions) const {
   std::vector<std::uint8_t> inside(positions.columns() * positions.rows());
   Box extent = kNowhereBox;
-  for (const double x : positions.x()) extent.west = std::min(extent.west, x), extent.east = std::max(extent.east, x);
+  for (const double x : positions.x())
+    extent.min_x = std::min(extent.min_x, x), extent.max_x = std::max(extent.max_x, x);
   for (const double y : positions.y())
-    extent.south = std::min(extent.south, y), extent.north = std::max(extent.north, y);
+    extent.min_y = std::min(extent.min_y, y), extent.max_y = std::max(extent.max_y, y);
   std::vector<std::uint8_t> columns(positions.columns());
   for (const std::size_t i : index_.Find(Grown(extent, 2 * kEdgeTolerance))) {
     const Box box = Grown(BoxOf(boxes_[i]), kEdgeTolerance);
     std::size_t first = columns.size(), end = 0;
     for (std::size_t c = 0; c < columns.size(); ++c) {
       const double x = positions.x()[c];
-      columns[c] = x >= box.west && x <= box.east ? 1 : 0;
+      columns[c] = x >= box.min_x && x <= box.max_x ? 1 : 0;
       if (columns[c] != 0) first = std::min(first, c), end = c + 1;
     }
     if (first >= end) continue;  // between two columns
@@ -72,7 +73,7 @@ std::vector<std::uint8_t> GridCover::InsideOfAxes(const NodePositions& positions
                                       columns.begin() + static_cast<std::ptrdiff_t>(end),
                                       0) == columns.begin() + static_cast<std::ptrdiff_t>(end);
     for (std::size_t j = 0; j < positions.rows(); ++j) {
-      if (!(positions.y()[j] >= box.south && positions.y()[j] <= box.north)) continue;
+      if (!(positions.y()[j] >= box.min_y && positions.y()[j] <= box.max_y)) continue;
       std::uint8_t* const row = inside.data() + j * columns.size();
       if (is_one_run) {
         std::fill(row + first, row + end, std::uint8_t{1});
@@ -90,7 +91,7 @@ std::vector<std::uint8_t> GridCover::Inside(std::span<const Position> positions)
   std::vector<std::uint8_t> inside(positions.size());
   const PositionExtent known = ExtentOf(positions);
   const Box extent{known.min.x, known.min.y, known.max.x, known.max.y};
-  if (extent.west > extent.east) return inside;
+  if (extent.min_x > extent.max_x) return inside;
   const std::vector<std::size_t> near = index_.Find(Grown(extent, 2 * kEdgeTolerance));
   if (near.size() == 1) {
     const Box box = Grown(BoxOf(boxes_[near.front()]), kEdgeTolerance);

@@ -46,14 +46,14 @@ std::optional<Box> ProjectedBox(const Georeference& georeference, const geo::Lat
   Box box{nodes[0].x, nodes[0].y, nodes[0].x, nodes[0].y};
   for (const Position& node : nodes) {
     if (std::isnan(node.x)) return std::nullopt;
-    box.west = std::min(box.west, node.x);
-    box.east = std::max(box.east, node.x);
-    box.south = std::min(box.south, node.y);
-    box.north = std::max(box.north, node.y);
+    box.min_x = std::min(box.min_x, node.x);
+    box.max_x = std::max(box.max_x, node.x);
+    box.min_y = std::min(box.min_y, node.y);
+    box.max_y = std::max(box.max_y, node.y);
   }
   // From level 5 down, the tile's edges deviate by less than an eighth of the tile between nodes that are a quarter of
   // it apart.
-  box.Grow((box.east - box.west) / 8, (box.north - box.south) / 8);
+  box.Grow((box.max_x - box.min_x) / 8, (box.max_y - box.min_y) / 8);
   return box;
 }
 
@@ -65,7 +65,7 @@ struct TileBoxes {
 
 TileBoxes BoxesOf(const Georeference& georeference, const geo::Lattice& lattice, const geo::TileKey& key, int width,
                   int height, bool wraps) {
-  const auto leaves = [&](const Box& box) { return box.west < 0 || box.east > width; };
+  const auto leaves = [&](const Box& box) { return box.min_x < 0 || box.max_x > width; };
   if (georeference.is_geographic_grid() && georeference.is_affine()) {
     TileBoxes tile{GeographicBoxes(georeference, lattice, key)};
     tile.leaves_columns = !wraps && std::ranges::all_of(tile.boxes, leaves);
@@ -83,30 +83,31 @@ BlockRange RasterGrid::Ranges(const Box& pixels) const {
   BlockRange range;
   const double turn = columns_;
   for (const double shift : {0.0, -turn, turn}) {
-    const Box part{std::max(pixels.west + shift, 0.0), pixels.south, std::min(pixels.east + shift, turn), pixels.north};
-    if (part.west < part.east || (shift == 0 && part.west == part.east)) range.Add(RangesInTurn(part));
+    const Box part{std::max(pixels.min_x + shift, 0.0), pixels.min_y, std::min(pixels.max_x + shift, turn),
+                   pixels.max_y};
+    if (part.min_x < part.max_x || (shift == 0 && part.min_x == part.max_x)) range.Add(RangesInTurn(part));
   }
   return range;
 }
 
 BlockRange RasterGrid::RangesInTurn(const Box& pixels) const {
   if (members_.size() == 1) {
-    return members_.front().raster->RangeIn(pixels.west, pixels.south, pixels.east, pixels.north);
+    return members_.front().raster->RangeIn(pixels.min_x, pixels.min_y, pixels.max_x, pixels.max_y);
   }
   BlockRange range;
   const double turn = wraps_ ? columns_ : 0;
   for (const std::size_t i : member_index_.Find(pixels)) {
     for (const double shift : {0.0, -turn, turn}) {
       const double x = static_cast<double>(members_[i].column) + shift, y = static_cast<double>(members_[i].row);
-      range.Add(members_[i].raster->RangeIn(pixels.west - x, pixels.south - y, pixels.east - x, pixels.north - y));
+      range.Add(members_[i].raster->RangeIn(pixels.min_x - x, pixels.min_y - y, pixels.max_x - x, pixels.max_y - y));
       if (turn == 0) break;
     }
   }
   const auto pixel = [](double position, int count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(position), 0.0, count - 1.0));
   };
-  const geo::TileRange wanted{pixel(pixels.west, width_), pixel(pixels.south, height_), pixel(pixels.east, width_),
-                              pixel(pixels.north, height_)};
+  const geo::TileRange wanted{pixel(pixels.min_x, width_), pixel(pixels.min_y, height_), pixel(pixels.max_x, width_),
+                              pixel(pixels.max_y, height_)};
   range.has_voids |= !cover_.Covers(wanted);
   return range;
 }
@@ -118,7 +119,7 @@ std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) con
     const Box wide{west - halo, north - halo, east + halo, south + halo};
     return Ranges(wide).has_holes || voids_.SharesHole(wide);
   };
-  if (options_.voids != HoleFill::kSmooth || !has_holes(box.west, box.south, box.east, box.north)) {
+  if (options_.voids != HoleFill::kSmooth || !has_holes(box.min_x, box.min_y, box.max_x, box.max_y)) {
     return std::nullopt;
   }
   // The holes end where a surrounding band has none.
@@ -129,20 +130,20 @@ std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) con
   };
   const double west = wraps_ ? -columns_ : 0, east = wraps_ ? 2.0 * columns_ : width_;
   for (bool grown = true; grown;) {
-    const double x = RangeTable::kBlock + (box.east - box.west) / 4,
-                 y = RangeTable::kBlock + (box.north - box.south) / 4;
-    const bool at_west = has_holes(box.west - x, box.south - y, box.west, box.north + y);
-    const bool at_east = has_holes(box.east, box.south - y, box.east + x, box.north + y);
-    const bool at_north = has_holes(box.west - x, box.south - y, box.east + x, box.south);
-    const bool at_south = has_holes(box.west - x, box.north, box.east + x, box.north + y);
-    grown = grow(box.west, west, -x, at_west);
-    grown |= grow(box.east, east, x, at_east);
-    grown |= grow(box.south, 0, -y, at_north);
-    grown |= grow(box.north, height_, y, at_south);
+    const double x = RangeTable::kBlock + (box.max_x - box.min_x) / 4,
+                 y = RangeTable::kBlock + (box.max_y - box.min_y) / 4;
+    const bool at_west = has_holes(box.min_x - x, box.min_y - y, box.min_x, box.max_y + y);
+    const bool at_east = has_holes(box.max_x, box.min_y - y, box.max_x + x, box.max_y + y);
+    const bool at_north = has_holes(box.min_x - x, box.min_y - y, box.max_x + x, box.min_y);
+    const bool at_south = has_holes(box.min_x - x, box.max_y, box.max_x + x, box.max_y + y);
+    grown = grow(box.min_x, west, -x, at_west);
+    grown |= grow(box.max_x, east, x, at_east);
+    grown |= grow(box.min_y, 0, -y, at_north);
+    grown |= grow(box.max_y, height_, y, at_south);
   }
   // Holes are filled from averages beside them by at least the factor; large holes by factors up to a sixtieth of their
   // size. Includes a margin of averages, and the samples from which small voids beside the hole are filled.
-  const double size = std::max(box.east - box.west, box.north - box.south);
+  const double size = std::max(box.max_x - box.min_x, box.max_y - box.min_y);
   const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
   box.Grow(reach, reach);
   return box;
@@ -163,8 +164,8 @@ std::vector<std::size_t> RasterGrid::MembersBelow(const geo::TileKey& top, const
     constexpr double kHalo = 1.0 / 16;
     const double reach = 12 * factor + options_.max_void_gap + 2;
     const double feather = options_.feather_m > 0 ? Feather(factor) : 0;
-    box.Grow((box.east - box.west) * kHalo + reach + feather / spacing_.east,
-             (box.north - box.south) * kHalo + reach + feather / spacing_.north);
+    box.Grow((box.max_x - box.min_x) * kHalo + reach + feather / spacing_.east,
+             (box.max_y - box.min_y) * kHalo + reach + feather / spacing_.north);
     const auto add = [&](const Box& in) {
       for (const std::size_t member : member_index_.Find(in)) members.insert(member);
     };
@@ -195,7 +196,7 @@ void RasterGrid::AddTo(ContentHasher& hasher) const {
 bool RasterGrid::MayBlend(const Box& pixels, int factor) const {
   Box wide = pixels;
   wide.Grow(Feather(factor) / spacing_.east + 2 * factor, Feather(factor) / spacing_.north + 2 * factor);
-  return wide.south < 0 || wide.north > height_ || (!wraps_ && (wide.west < 0 || wide.east > width_)) ||
+  return wide.min_y < 0 || wide.max_y > height_ || (!wraps_ && (wide.min_x < 0 || wide.max_x > width_)) ||
          Ranges(wide).has_voids;
 }
 
@@ -219,7 +220,7 @@ GridRange RasterGrid::RangeOf(const geo::Lattice& lattice, const geo::TileKey& k
   BlockRange blocks;
   bool blends = false;
   for (Box& box : tile.boxes) {
-    leaves |= box.south < 0 || box.north > height_;
+    leaves |= box.min_y < 0 || box.max_y > height_;
     if (options_.feather_m > 0) {
       blends |= MayBlend(box, factor);
     }

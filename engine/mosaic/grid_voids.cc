@@ -236,9 +236,9 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
 bool GridVoids::SharesHole(const Box& pixels) const {
   return std::ranges::any_of(shared_, [&](const geo::TileRange& range) {
     const auto meets = [&](double shift) {
-      return pixels.east + shift >= static_cast<double>(range.start_x) &&
-             pixels.west + shift <= static_cast<double>(range.end_x + 1) &&
-             pixels.north >= static_cast<double>(range.start_y) && pixels.south <= static_cast<double>(range.end_y + 1);
+      return pixels.max_x + shift >= static_cast<double>(range.start_x) &&
+             pixels.min_x + shift <= static_cast<double>(range.end_x + 1) &&
+             pixels.max_y >= static_cast<double>(range.start_y) && pixels.min_y <= static_cast<double>(range.end_y + 1);
     };
     const auto turn = static_cast<double>(turn_);
     return meets(0) || (turn_ > 0 && (meets(turn) || meets(-turn)));

@@ -159,7 +159,7 @@ void RasterGrid::IndexMembers() {
     const Box box = BoxOf(member.pixels());
     for (const std::int64_t shift : {std::int64_t{0}, -turn, turn}) {
       const auto x = static_cast<double>(shift);
-      entries.push_back({{box.west + x, box.south, box.east + x, box.north}, i});
+      entries.push_back({{box.min_x + x, box.min_y, box.max_x + x, box.max_y}, i});
       if (turn == 0) break;
     }
   }
@@ -231,7 +231,6 @@ GridWindow RasterGrid::Grown(const GridWindow& window, int halo, int factor) con
 }
 
 bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
-  if (wraps_) return false;  // columns beyond the last one are others
   // Small voids are filled from samples around them. Averages by overviews reach up to three averages into a void
   // (cubic splines, each overview made from the one before), and heights are interpolated between averages.
   const GridWindow around = Grown(window, options_.max_void_gap / factor + 6, factor);

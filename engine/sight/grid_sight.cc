@@ -23,6 +23,8 @@ constexpr double kWalked = 256;
 constexpr double kSlack = 1e-6;
 // Parts of a cell with voids: its heights are no polynomial.
 constexpr int kRimParts = 16;
+// Of a part: a stretch without heights that is shorter is one place.
+constexpr double kPlace = 1e-6;
 
 double Lerp(double first, double second, double weight) { return first + weight * (second - first); }
 
@@ -454,13 +456,15 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
       const double edge = (with + without) / 2;
       (clearance(edge) ? with : without) = edge;
     }
+    // A single place: beyond the outermost samples, and along a line of them, only the place of a void has no height.
+    const bool is_place = std::abs(without - (is_known ? s : before)) <= kPlace * (s - before);
     if (is_known && is_next_known) {
       if (!is_settled) scan.MeasureSmooth(clearance, before, s);
     } else if (is_known) {
       if (!is_settled) scan.MeasureSmooth(clearance, before, with);
-      scan.Open(without, s);
+      if (!is_place) scan.Open(without, s);
     } else if (is_next_known) {
-      scan.Open(before, without);
+      if (!is_place) scan.Open(before, without);
       if (!is_settled) scan.MeasureSmooth(clearance, with, s);
     } else {
       scan.Open(before, s);

@@ -137,12 +137,15 @@ GridBox BoxOf(const std::vector<GridPoint>& points) {
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width) {
   constexpr double kFinestStepMetres = 0x1p-16;
   const double cell_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees());
-  const double step_m = std::max(PowerOfTwoAtMost(std::min(error_m / 32, cell_m / 64)), kFinestStepMetres);
-  if (width == PositionWidth::k16Bits) return step_m;
-  // Half the diagonal of a cube of 2^-7 m is 7 mm. A tile's side is at most 2^23 steps: FitsFloats.
-  constexpr double kBorderStepMetres = 0x1p-7;
+  // A tile's side is at most 2^23 steps: a step that does not fit would be doubled, but not by the neighbour
+  // (FitsFloats).
   const double side_m = cell_m * lattice.cells;
-  return std::min(step_m, PowerOfTwoAtMost(std::max(kBorderStepMetres, side_m / 0x1p22)));
+  const double fitting_m = PowerOfTwoAtMost(side_m / 0x1p22);
+  const double step_m = std::max({PowerOfTwoAtMost(std::min(error_m / 32, cell_m / 64)), fitting_m, kFinestStepMetres});
+  if (width == PositionWidth::k16Bits) return step_m;
+  // Half the diagonal of a cube of 2^-7 m is 7 mm.
+  constexpr double kBorderStepMetres = 0x1p-7;
+  return std::min(step_m, std::max(kBorderStepMetres, fitting_m));
 }
 
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {

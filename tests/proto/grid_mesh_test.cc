@@ -35,6 +35,19 @@ TEST(GridStep, IsAPowerOfTwoWithinItsShareOfTheError) {
   }
 }
 
+// A small error_fraction makes the ladder finer. A step that does not fit would be doubled, but not by the neighbour.
+TEST(GridStep, FitsAtTheSmallestErrorFraction) {
+  for (int level = 0; level <= geo::kMaxLevel; ++level) {
+    const double error = geo::LadderError(level, geo::kFinestStep) / 10;  // error_fraction 0.05 instead of 0.5
+    for (const PositionWidth width : {PositionWidth::k16Bits, PositionWidth::kFloat}) {
+      const double grid = GridStep({level, 256}, error, width);
+      EXPECT_LT(TileSide(level), std::exp2(23) * grid) << level;
+      // Edges are refined to 15/16 of the error; rounding takes the rest.
+      EXPECT_LE(std::sqrt(3.0) / 2 * grid, std::max(error / 16, std::exp2(-16))) << level;
+    }
+  }
+}
+
 // Rounding moves a point by at most half of a cube's diagonal.
 TEST(GridStep, KeepsFloatsWithinACentimetreOfTheBorder) {
   for (int level = 9; level <= geo::kMaxLevel; ++level) {

@@ -73,6 +73,20 @@ TEST(Footprint, AroundAPoleHasAllLongitudes) {
   EXPECT_EQ(source->Available(4), (std::vector<geo::TileRange>{{0, 0, 31, 3}}));
 }
 
+// On a cylindrical map the pole is a line: a raster that ends near it keeps its extent.
+TEST(Footprint, NearAPoleThatIsALineHasTheExtentOfTheRaster) {
+  const TempDir dir;
+  constexpr double kDegree = 20'037'508.342789244 / 180;  // of EPSG:4087, metres
+  RasterSpec spec{.width = 400, .height = 80, .crs = "EPSG:4087"};
+  spec.geo_transform = {-10 * kDegree, .05 * kDegree, 0, 89.95 * kDegree, 0, -.05 * kDegree};
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_NE(source, nullptr);
+  const GeoBounds bounds = source->info().bounds;
+  EXPECT_NEAR(bounds.west, -10, .1);
+  EXPECT_NEAR(bounds.east, 10, .1);
+  EXPECT_NEAR(bounds.north, 89.95, .1);
+}
+
 TEST(Footprint, ReachesWhereverReadFindsHeights) {
   for (const std::string name :
        {"bigtujunga_30m_utm11.tif", "greenland_80N_100m_custom_tm.tif", "lidar_slovenia_1m_nodata.tif"}) {

@@ -338,6 +338,30 @@ TEST(Overviews, MadeOfVoidsAreNotUsed) {
   }
 }
 
+// Kernels with negative weights exceed the range of heights beside cliffs. It does not mean that voids were averaged.
+TEST(Overviews, OfCliffsByKernelsThatOvershootAreUsed) {
+  for (const char* resampling : {"AVERAGE", "CUBIC", "LANCZOS"}) {
+    const TempDir dir;
+    RasterSpec spec = RampSpec(361, 241);
+    spec.nodata = -9999;
+    spec.overviews = {};
+    spec.value = [](int column, int row) {
+      if (column < 40 && row < 40) return -9999;
+      return (column / 30 + row / 30) % 2 == 0 ? 0 : 100;
+    };
+    const std::string path = WriteRaster(dir, spec);
+    {
+      const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+      const std::vector<int> factors = {2, 4, 8};
+      ASSERT_EQ(dataset->BuildOverviews(resampling, 3, factors.data(), 0, nullptr, GDALDummyProgress, nullptr),
+                CE_None);
+    }
+    const auto source = OpenRasterOrFail(path);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->layout().overview_factors, (std::vector<int>{2, 4, 8})) << source->info().overviews_unused;
+  }
+}
+
 TEST(Overviews, OfARasterThatStatesItsVoidsOrHasNoneAreUsed) {
   const TempDir dir;
   RasterSpec before = SpecWithVoids(-9999);

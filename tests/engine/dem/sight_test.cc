@@ -387,6 +387,27 @@ TEST(Sight, FindsTheLowestAndTheFirstPlaceBesideVoids) {
   EXPECT_GT(blocked, rays.size() / 10);
 }
 
+// Beyond the outermost samples, rows have the heights of the rim: there a void is a single place on a ray.
+TEST(Sight, DoesNotSeeTheGroundBelowThroughAVoidOfTheRim) {
+  const TempDir dir;
+  RasterSpec top{.width = 60, .height = 60, .geo_transform = {10, .01, 0, 46, 0, -.01}};
+  top.nodata = -9999;
+  top.value = [](int col, int row) { return col == 59 && row == 30 ? -9999.0 : 10.0; };
+  RasterSpec below{.width = 60, .height = 60, .geo_transform = {9.99, .011, 0, 46.01, 0, -.011}};
+  below.value = [](int, int) { return 5000.0; };
+  const std::vector<DemFile> files = {{WriteRaster(dir, top, "top.tif")}, {WriteRaster(dir, below, "below.tif")}};
+  const std::vector<SightRay> rays = {{{10.598, 45.642, 400}, {10.598, 45.748, 400}}};
+  for (const std::size_t count : {1, 2}) {
+    const auto source = OpenOrFail(std::vector<DemFile>(files.begin(), files.begin() + count), {.max_void_gap = 0});
+    ASSERT_TRUE(source);
+    const auto answers = source->LookAlong(rays, {});
+    ASSERT_TRUE(answers);
+    EXPECT_TRUE(answers->front().is_visible);
+    EXPECT_NEAR(answers->front().clearance_m, 387.3, 1);
+    EXPECT_FALSE(answers->front().has_gaps);
+  }
+}
+
 // A rising strip of 400 blocks: the farther to the south, the less a level ray is above it, so none of them is skipped.
 TEST(Sight, KeepsFewBlocksInMemory) {
   const TempDir dir;
