@@ -95,12 +95,21 @@ std::vector<bool> CutHoles(const std::vector<std::uint8_t>& left_out, const std:
   triangles = std::move(left);
   std::vector<bool> hangs(rim.size());
   for (std::size_t k = 0; k < rim.size(); ++k) hangs[k] = edges.contains({rim[k], rim[(k + 1) % rim.size()]});
-  if (triangles.empty()) hangs.front() = true;
   return hangs;
 }
 
 bool HasMergedCorners(const Triangle& t, const std::vector<GridPoint>& points) {
   return points[t[0]] == points[t[1]] || points[t[1]] == points[t[2]] || points[t[2]] == points[t[0]];
+}
+
+// The first of the rim's edges whose ends are apart, alone. Beside a pole, where nodes of a row coincide, it may be far
+// along the rim. The western side always has one, because rows are at least 64 steps apart.
+std::vector<bool> FirstEdge(const std::vector<std::uint32_t>& rim, const std::vector<GridPoint>& points) {
+  std::vector<bool> edges(rim.size());
+  std::size_t k = 0;
+  while (k + 1 < rim.size() && points[rim[k]] == points[rim[k + 1]]) ++k;
+  edges[k] = true;
+  return edges;
 }
 
 // Merges vertices with equal position and normal to the lowest of their numbers.
@@ -231,10 +240,15 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
   }
   std::vector<Triangle> triangles = mesh.triangles;
   const std::vector<bool> hangs = left_out.empty() ? std::vector<bool>() : CutHoles(left_out, rim, triangles);
-  HangSkirt(rim, static_cast<std::uint32_t>(points.size()), hangs, triangles);
-  if (std::erase_if(triangles, [&](const Triangle& t) { return HasMergedCorners(t, all); }) > 0) {
-    Weld(all, all_normals, triangles);
+  const auto first_foot = static_cast<std::uint32_t>(points.size());
+  HangSkirt(rim, first_foot, hangs, triangles);
+  const auto is_merged = [&](const Triangle& t) { return HasMergedCorners(t, all); };
+  bool merges = std::erase_if(triangles, is_merged) > 0;
+  if (triangles.empty()) {
+    HangSkirt(rim, first_foot, FirstEdge(rim, points), triangles);
+    merges = std::erase_if(triangles, is_merged) > 0;
   }
+  if (merges) Weld(all, all_normals, triangles);
 
   VertexOrder order = OrderByFirstUse(triangles, all.size());
   GridMesh grid;

@@ -81,8 +81,8 @@ struct GridMesh {
 //
 // Triangles with two equal corners are left out. Where points coincide, as in a pole's row, edges collapse in both
 // neighbours and the surface stays closed. `left_out`: by triangle, 1 for those in holes, which get no skirts; empty:
-// none. If all are left out, the skirt of one edge of the rim is kept, because decoders expect a triangle. `points` and
-// `normals` have one entry per vertex.
+// none. If no triangle is left, the skirt of one edge of the rim is kept, because decoders expect a triangle. `points`
+// and `normals` have one entry per vertex.
 GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
                       const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
                       const std::vector<std::uint8_t>& left_out = {});

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
+#include "proto/gltf/glb_tile.h"
 #include "proto/mesh/skirt.h"
 #include "tests/proto/ground.h"
 
@@ -244,6 +245,27 @@ TEST(MakeGridMesh, IsClosedAtThePoles) {
         if (grid.origin[0] + p[0] == 0 && grid.origin[1] + p[1] == 0) on_axis.insert(p);
       }
       EXPECT_EQ(on_axis.size(), level == 0 ? 4u : 2u);  // each pole and the skirt's foot below it
+    }
+  }
+}
+
+// Beside a pole the first edges of the rim have no length. Clients expect a triangle.
+TEST(MakeGridMesh, KeepsATriangleOfTilesInHoles) {
+  constexpr int kCells = 32;
+  const tin::TinMesh mesh = RegularMesh(kCells, 1);
+  for (const geo::TileKey key : {geo::TileKey{3, 5, 0}, geo::TileKey{14, 16394, 14}, geo::TileKey{14, 16394, 16383},
+                                 geo::TileKey{14, 16394, 8000}}) {
+    const GlobalGround ground(key, kCells, [](std::int64_t, std::int64_t) { return 100; });
+    const double error = geo::LadderError(key.level, geo::kCoarsestStep);
+    const double step = GridStep(ground.lattice, error, PositionWidth::k16Bits);
+    const std::vector<geo::Vec3> up(mesh.vertices.size(), geo::Vec3{0, 0, 1});
+    for (const bool all : {true, false}) {  // or all but one, which may have no area
+      std::vector<std::uint8_t> left_out(mesh.triangles.size(), 1);
+      left_out[0] = all ? 1 : 0;
+      const GridMesh grid = MakeGridMesh(ground.view(), mesh, SnapVertices(ground.view(), mesh, step), up, step,
+                                         SkirtDepth(key.level, error), left_out);
+      ASSERT_FALSE(grid.triangles.empty()) << geo::ToString(key);
+      EXPECT_TRUE(EncodeGlb(grid, {}).has_value()) << geo::ToString(key);
     }
   }
 }
