@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "engine/raster/node_rows.h"
+#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {

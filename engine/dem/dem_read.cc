@@ -9,7 +9,7 @@
 #include "engine/core/check.h"
 #include "engine/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/raster/node_rows.h"
+#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {

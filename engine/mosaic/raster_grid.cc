@@ -14,6 +14,7 @@
 #include "engine/mosaic/window_values.h"
 #include "engine/raster/grid_cells.h"
 #include "engine/raster/node_rows.h"
+#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "engine/raster/node_rows.h"
+#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {

@@ -47,24 +47,6 @@ class NodeRows {
 // one entry per height.
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
 
-// Returns `count` NaNs.
-std::vector<float> VoidHeights(std::size_t count);
-
-// Makes all heights equal to one.
-void FillWith(float height, std::span<float> heights);
-
-// Replaces each NaN.
-void ReplaceVoids(std::span<float> heights, float by);
-
-// Whether a height is NaN.
-bool HasVoids(std::span<const float> heights);
-
-std::size_t CountVoids(std::span<const float> heights);
-
-// Marks the nodes whose height is wanted: 1 where `inside` is 1 and the height is NaN, else 0. Returns whether there is
-// one. Precondition: all spans have one entry per node.
-bool WantVoids(std::span<const std::uint8_t> inside, std::span<const float> heights, std::span<std::uint8_t> wanted);
-
 // The places of nodes, in samples: column + weight and row + weight of GridAxes::CellAt. NaN if the node's height is
 // NaN. Returns false if another node got NaN, because a place is not between 0 and `limit` or is near the end of an
 // axis, or because columns wrap: use CellAt for it. Precondition: all spans have one entry per node.

@@ -15,7 +15,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/common/lru_block_cache.h"
 #include "engine/core/errno_text.h"
-#include "engine/raster/node_rows.h"
+#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {
