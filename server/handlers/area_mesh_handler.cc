@@ -60,7 +60,7 @@ asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestConte
   }
   response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", mesh->times));
   response.body = std::make_shared<const std::string>(std::move(mesh->bytes));
-  co_return response;
+  co_return Conditional(std::move(response), *context.request);
 }
 
 }  // namespace
@@ -82,7 +82,7 @@ Answer AnswerArea(const Handlers& handlers, const RequestContext& context) {
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, context.route.query, coding);
   response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
   response.vary = "Accept-Encoding";
-  if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
+  if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   return BuildArea(handlers, context, *dataset, *area, *plan, coding, std::move(response));
 }
 

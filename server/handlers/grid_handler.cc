@@ -171,7 +171,8 @@ asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContex
       co_await handlers.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
   if (!made) co_return co_await RefusePoints(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
-  co_return co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
+  Response reply = co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
+  co_return Conditional(std::move(reply), *context.request);
 }
 
 }  // namespace
@@ -200,7 +201,7 @@ Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
     response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
     response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
   }
-  if (MatchesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
+  if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   auto shared = std::make_shared<const GridQuery>(*std::move(query));
   return MakeGrid(handlers, context, *dataset, std::move(shared), coding, std::move(response));
 }

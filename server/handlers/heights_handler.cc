@@ -106,7 +106,7 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
       response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
       response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
     }
-    if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+    if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
 
   std::shared_ptr<const CertifiedPoints> certified;
@@ -134,7 +134,7 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
     return made;
   };
   Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
-  co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
+  co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 
 }  // namespace

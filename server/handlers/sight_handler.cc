@@ -125,7 +125,7 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
   if (request.method != Method::kPost) {
     response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
     response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
-    if (MatchesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
+    if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
@@ -149,7 +149,7 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
   };
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
-  co_return co_await FinishPointReply(std::move(response), std::move(made), view, request.id);
+  co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 
 }  // namespace

@@ -141,4 +141,8 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
   return false;
 }
 
+bool NamesEtag(std::string_view if_none_match, std::string_view etag) {
+  return Trim(if_none_match) != "*" && MatchesEtag(if_none_match, etag);
+}
+
 }  // namespace terrace::server

@@ -79,4 +79,8 @@ Response Conditional(Response response, const Request& request);
 // RFC 9110, section 13.1.2: a list of ETags, weakly compared, or "*".
 bool MatchesEtag(std::string_view if_none_match, std::string_view etag);
 
+// Like MatchesEtag, but "*" does not match: for replies that are not made yet. A client that names the ETag has had the
+// reply; with "*" the request may still be refused (RFC 9110, section 13.2.1).
+bool NamesEtag(std::string_view if_none_match, std::string_view etag);
+
 }  // namespace terrace::server

@@ -121,6 +121,20 @@ TEST_F(ServerTest, RepliesThatDependOnFilesOfProjHaveNoETag) {
   }
 }
 
+// RFC 9110, section 13.2.1: a precondition does not hide that the request itself is refused.
+TEST_F(ServerTest, AnyEtagDoesNotTurnARefusalIntoUnmodified) {
+  read_points_ = [](std::uint32_t, std::span<const dem::GeoPosition> points, dem::HeightDatum, std::stop_token) {
+    return Result<std::vector<float>>(std::vector<float>(points.size(), 7.0f));
+  };
+  Start();
+  const std::string grid = "/maui/grid?bbox=0,0,1,1&height=2";
+  for (const char* fields : {"", "If-None-Match: *\r\n"}) {
+    EXPECT_EQ(Fetch(port(), grid + "&width=1", fields).status, 400);
+  }
+  EXPECT_EQ(Fetch(port(), grid + "&width=2", "If-None-Match: *\r\n").status, 304);
+  EXPECT_EQ(Fetch(port(), "/maui/heights?locations=1,2", "If-None-Match: *\r\n").status, 304);
+}
+
 TEST_F(ServerTest, TellsTheVersionsOfItsDatasets) {
   Start();
   EXPECT_NE(Fetch(port(), "/datasets").body.find(std::string(R"("version":")") + kMauiVersion + '"'),
