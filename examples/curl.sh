@@ -21,8 +21,8 @@ get "$server/$dataset/layer.json"
 get "$server/$dataset/tiles.json"
 
 # The height at the centre of the dataset, and the tile of the deepest level there.
-bounds=$(curl -fsS "$server/$dataset/tiles.json" | sed 's/.*"bounds":\[\([^]]*\)\].*/\1/')
-middle=$(echo "$bounds" | awk -F, '{ printf "%.6f,%.6f", ($2 + $4) / 2, ($1 + $3) / 2 }')
+bounds=$(curl -fsS "$server/datasets" | sed 's/.*"name":"'"$dataset"'"[^}]*"bounds":\[\([^]]*\)\].*/\1/')
+middle=$(echo "$bounds" | awk -F, '{ lon = ($1 + $3 + 360 * ($1 > $3)) / 2; printf "%.6f,%.6f", ($2 + $4) / 2, lon - 360 * (lon > 180) }')
 get "$server/$dataset/heights?locations=$middle&certify=deepest"
 tile=$(curl -fsS "$server/$dataset/heights?locations=$middle&certify=deepest" | sed 's/.*"tile":"\([^"]*\)".*/\1/')
 

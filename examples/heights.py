@@ -62,7 +62,8 @@ def main():
     if name not in datasets:
         sys.exit(f"{arguments.server} has no dataset {name}; it has {', '.join(datasets)}")
     west, south, east, north = datasets[name]["bounds"]
-    places = arguments.places or [f"{(south + north) / 2},{(west + east + 360 * (west > east)) / 2}"]
+    middle = (west + east + 360 * (west > east)) / 2  # across the antimeridian west is above east
+    places = arguments.places or [f"{(south + north) / 2},{middle - 360 * (middle > 180)}"]
 
     reply, _ = fetch(f"{arguments.server}/{name}/heights?certify=deepest&locations={'|'.join(places)}")
     for result in json.loads(reply)["results"]:

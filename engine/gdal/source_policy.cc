@@ -113,9 +113,9 @@ Result<void> SetSourcePolicy(const SourcePolicy& policy) {
   for (const std::string& prefix : settled->prefixes) {
     if (!prefix.starts_with("/vsi") || !prefix.ends_with('/') || std::ranges::count(prefix, '/') < 3) {
       return MakeError(ErrorCode::kInvalidArgument,
-                       "allowed prefix \"{}\": must name a remote folder and end with '/', such as "
+                       "allowed_prefixes: entry {} must name a remote folder and end with '/', such as "
                        "\"/vsis3/bucket/\" or \"/vsicurl/https://example.org/dems/\"",
-                       prefix);
+                       &prefix - settled->prefixes.data());  // not quoted: it may hold a secret, as signed URLs do
     }
   }
   State& state = TheState();

@@ -3,8 +3,10 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <cstdio>
 #include <exception>
+#include <new>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,9 +80,16 @@ int main(int argc, char** argv) {
     if (opened < 0 || opened > STDERR_FILENO) break;
   }
   try {
+    std::signal(SIGXFSZ, SIG_IGN);  // writing beyond a file size limit fails, as on a full disk
     // Before there are threads.
     terrace::dem::ClearGdalEnvironment();
     return terrace::cli::Run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    std::fputs(
+        "terrace: there is not enough memory for this; free some, raise the limit (ulimit -v, MemoryMax= of "
+        "systemd), or ask for less: a larger --max-error, a smaller --bbox, fewer --threads\n",
+        stderr);
+    return terrace::cli::kExitFailure;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "terrace: %s\n", error.what());
     return terrace::cli::kExitFailure;

@@ -165,7 +165,7 @@ Result<void> AccessLog::Try(config::AccessLogForm form, const std::filesystem::p
   const std::filesystem::path target = std::filesystem::read_symlink(file, ignored);
   const std::filesystem::path made = target.empty() ? file : file.parent_path() / target;
   if (why == ENOENT && ::access(made.parent_path().c_str(), W_OK | X_OK) == 0) return {};
-  errno = why;
+  if (why != ENOENT) errno = why;  // else access() has said why the file cannot be created
   return CannotOpen(file);
 }
 

@@ -32,7 +32,7 @@ const panel = new Panel({
   whole: () => lookAt(state.dataset, kFlightSeconds),
   token: () => ask("Datasets that the token opens are added to the list."),
   fraction: (fraction) => refetch(fraction),
-  exaggeration: (factor) => { globe.exaggeration = factor; remember(); },
+  exaggeration: (factor) => { globe.exaggeration = factor; state.draft?.stretch(); remember(); },
   contours: (on) => setSwitches({ ...state, contours: on }),
   wireframe: (on) => setSwitches({ ...state, wireframe: on }),
   tiles3d: (on) => { setSwitches({ ...state, tiles3d: on, right: undefined }); return show(); },
@@ -76,9 +76,20 @@ function coarserThan(fraction) {
   return fractionOfStep(stepOfFraction(fraction * kCoarser));
 }
 
+// A picked place, a measurement and a draft belong to one dataset.
+function leave(next) {
+  if (state.pickedOn !== undefined && state.pickedOn !== next.name) {
+    openTool()?.end();
+    globe.overlay.setMarker("picked", undefined);
+    read(undefined);
+  }
+  state.pickedOn = next.name;
+}
+
 async function show() {
   const { dataset } = state;
   if (!dataset) return;
+  leave(dataset);
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);

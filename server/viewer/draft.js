@@ -61,6 +61,11 @@ export class Draft {
     return this.#change();
   }
 
+  // The exaggeration has changed.
+  stretch() {
+    if (this.isOpen) this.#drawSurface();
+  }
+
   get height() {
     return byId("draft-height").valueAsNumber || 0;
   }

@@ -233,7 +233,10 @@ Result<BakeInput> InputOf(const BakeArguments& arguments, std::vector<config::Co
     if (!source) return tl::unexpected(source.error());
     input.dataset.sources.push_back(*std::move(source));
   }
-  if (!arguments.dataset.empty()) input.dataset.name = arguments.dataset;
+  if (!arguments.dataset.empty()) {
+    config::SetDatasetOption("name", arguments.dataset, directory, input.dataset, errors);
+    if (!errors.empty()) return MakeError(ErrorCode::kInvalidArgument, "the command");
+  }
   if (input.dataset.name.empty()) input.dataset.name = DatasetNameOf(arguments.dems.front());
   return input;
 }

@@ -53,7 +53,7 @@ UnfinishedFile::UnfinishedFile(std::string path) : path_(std::move(path)) {
   path_.copy(path_of_file.data(), path_.size());
   path_of_file[path_.size()] = '\0';
   has_file.store(true);
-  for (const int number : {SIGINT, SIGTERM, SIGHUP}) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE}) {
     struct sigaction before {};
     if (::sigaction(number, nullptr, &before) != 0 || before.sa_handler == SIG_IGN) continue;
     ::signal(number, RemoveAndEnd);

@@ -98,6 +98,17 @@ Result<void> CheckReadable(const config::DatasetConfig& dataset) {
   return read(dataset.water.mask, ", or for a sea level a number of metres");
 }
 
+Result<void> CheckEditFiles(const config::DatasetConfig& dataset) {
+  for (const std::string& file : dataset.edits) {
+    std::error_code ignored;
+    const std::filesystem::file_status status = std::filesystem::status(file, ignored);
+    if (!std::filesystem::exists(status) || std::filesystem::is_regular_file(status)) continue;
+    return MakeError(ErrorCode::kInvalidArgument, "dataset {}: edits: {}: not a regular file; name a GeoJSON file",
+                     dataset.name, file);
+  }
+  return {};
+}
+
 Result<void> CheckSourcePolicy(const config::DatasetConfig& dataset) {
   const auto checked = [&](const Result<void>& allowed) -> Result<void> {
     if (allowed) return {};

@@ -23,6 +23,9 @@ std::string NameOf(const config::DatasetConfig& dataset);
 // Checks that all local files of the dataset, including masks and images, exist and are readable, without opening them.
 // The error names the first one that is not.
 Result<void> CheckReadable(const config::DatasetConfig& dataset);
+// Checks that the edits of a served dataset, which are watched and read again, are regular files. Opening a pipe
+// without a writer would wait forever.
+Result<void> CheckEditFiles(const config::DatasetConfig& dataset);
 // Checks that the source policy in force (dem::SetSourcePolicy) allows all files of the dataset.
 Result<void> CheckSourcePolicy(const config::DatasetConfig& dataset);
 

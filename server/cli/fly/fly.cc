@@ -58,6 +58,9 @@ int RunFly(const FlyArguments& arguments) {
   if (!options) return Fail(options.error().message, kExitUsage);
   const Result<std::vector<fly::Requirement>> requirements = fly::ParseRequirements(arguments.require);
   if (!requirements) return Fail(requirements.error().message, kExitUsage);
+  if (!arguments.report.empty() && arguments.report == arguments.urls) {
+    return Fail("--report and --urls name the same file; give two", kExitUsage);
+  }
   for (const std::string& path : {arguments.report, arguments.urls}) {
     if (const Result<void> writable = CheckWritable(path, arguments.path); !writable) {
       return Fail(writable.error());

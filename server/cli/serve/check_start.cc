@@ -42,6 +42,7 @@ int CheckStart(const config::Config& config, const config::Config& served,
   for (const config::DatasetConfig& dataset : config.datasets) {
     const Result<void> readable = CheckReadable(dataset);
     note(readable && policy ? CheckSourcePolicy(dataset) : readable);
+    if (readable) note(CheckEditFiles(dataset));
   }
   for (const Error& error : errors) std::fprintf(stderr, "terrace: %s\n", error.message.c_str());
   if (!policy) return kExitUsage;

@@ -21,6 +21,7 @@
 #include "server/cli/common/command.h"
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
+#include "server/cli/common/source_files.h"
 #include "server/cli/serve/descriptor_plan.h"
 #include "server/cli/serve/log.h"
 #include "server/cli/serve/service_manager.h"
@@ -174,6 +175,9 @@ server::Reloader::Hooks ServeRun::MakeHooks() {
   hooks.stop = stop_opening_.get_token();
   hooks.open = [cache = cache_, shares = shares_, end = hooks.stop](const config::DatasetConfig& wanted,
                                                                     const std::stop_token& stop) {
+    if (Result<void> files = CheckEditFiles(wanted); !files) {
+      return Result<tiler::Dataset>(tl::unexpected(std::move(files).error()));
+    }
     std::stop_source either;
     const auto request = [&either] { either.request_stop(); };
     const std::stop_callback on_stop(stop, request), on_end(end, request);

@@ -3,6 +3,7 @@ import json
 import os
 import pathlib
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -42,10 +43,32 @@ class WrittenFiles(unittest.TestCase):
     def test_a_full_disk_is_told_with_the_file(self):
         out = self.folder / "a.obj"
         limit = 1000  # as a full disk: a write beyond it fails
-        full = run("mesh", SAMPLE, "--out", out, "--max-error", 5, restore_signals=False,
+        full = run("mesh", SAMPLE, "--out", out, "--max-error", 5,
                    preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)))
         self.assertEqual((full.returncode, full.stderr), (1, f"terrace: {out}: writing the mesh failed; is the disk full?\n"))
         self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_nothing_is_left_when_the_reader_of_messages_has_gone(self):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = subprocess.run([BINARY, "mesh", SAMPLE, "--out", self.folder / "a.glb", "--max-error", "5"],
+                              stdout=writer, stderr=writer, timeout=60)
+        os.close(writer)
+        self.assertEqual(done.returncode, -signal.SIGPIPE)
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_edits_of_a_server_are_regular_files(self):
+        pipe = self.folder / "edits.geojson"
+        os.mkfifo(pipe)
+        for edits in (pipe, self.folder):
+            done = run("serve", SAMPLE, "--edits", edits, "--check-config")
+            self.assertEqual((done.returncode, done.stderr), (1, f"terrace: dataset jacksboro: edits: {edits}: not a regular file; name a GeoJSON file\n"))
+
+    def test_a_secret_in_a_wrong_prefix_is_not_quoted(self):
+        done = run("serve", SAMPLE, "--allowed-prefixes", "/vsicurl/https://h.example/d?sig=SECRET", "--check-config")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("allowed_prefixes: entry 0", done.stderr)
+        self.assertNotIn("SECRET", done.stderr)
 
     def test_a_pipe_is_not_replaced(self):
         pipe, link = self.folder / "pipe", self.folder / "a.obj"
