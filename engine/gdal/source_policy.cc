@@ -115,7 +115,7 @@ Result<void> SetSourcePolicy(const SourcePolicy& policy) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "allowed_prefixes: entry {} must name a remote folder and end with '/', such as "
                        "\"/vsis3/bucket/\" or \"/vsicurl/https://example.org/dems/\"",
-                       &prefix - settled->prefixes.data());  // not quoted: it may hold a secret, as signed URLs do
+                       &prefix - settled->prefixes.data() + 1);  // not quoted: signed URLs are secrets
     }
   }
   State& state = TheState();

@@ -19,12 +19,13 @@ const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
-// of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are
-// missing. `isGone`: the server has no more this dataset.
+// of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local
+// mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the server does not have this dataset any more.
+// `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
-                refreshing: undefined, problems: [] };
+                refreshing: undefined, problems: [], shown: undefined };
 
 const panel = new Panel({
   dataset: (name) => choose(name),
@@ -76,20 +77,20 @@ function coarserThan(fraction) {
   return fractionOfStep(stepOfFraction(fraction * kCoarser));
 }
 
-// A picked place, a measurement and a draft belong to one dataset.
-function leave(next) {
-  if (state.pickedOn !== undefined && state.pickedOn !== next.name) {
+// What was picked, measured or drawn belongs to one dataset.
+function clearToolsOfAnother(dataset) {
+  if (state.shown !== undefined && state.shown !== dataset.name) {
     openTool()?.end();
     globe.overlay.setMarker("picked", undefined);
     read(undefined);
   }
-  state.pickedOn = next.name;
+  state.shown = dataset.name;
 }
 
 async function show() {
   const { dataset } = state;
   if (!dataset) return;
-  leave(dataset);
+  clearToolsOfAnother(dataset);
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);

@@ -185,6 +185,8 @@ describe('the viewer', () => {
 
   it('flies to another dataset', async () => {
     const from = await page.evaluate(() => terrace.globe.camera);
+    await page.mouse.click(520, 320);
+    await page.waitForFunction(() => terrace.state.picked);
     await page.locator('#dataset').selectOption(other.name);
     await page.waitForTimeout(3000);
     const drawn = await settle(page);
@@ -192,6 +194,8 @@ describe('the viewer', () => {
     assert.ok(Math.hypot(to[0] - from[0], to[1] - from[1], Math.log10(to[2] / from[2])) > 0.5, `${from} to ${to}`);
     assert.ok(drawn.tiles > 1 && page.requested.some((asked) => asked.includes(`/${other.name}/0/0/0.terrain`)));
     assert.ok(new Set(await picture(page)).size > 150);
+    assert.equal(await page.evaluate(() => terrace.state.picked), undefined, 'a place of the other dataset');
+    assert.equal((await page.locator('#readout').innerText()).trim(), '');
   });
 
   it('has raised no error and asked no other host', () => assert.deepEqual(page.wrongs, []));

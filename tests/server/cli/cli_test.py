@@ -216,7 +216,7 @@ class Config(unittest.TestCase):
         for code, options, words in ((1, {"data_roots": ["empty"]}, ["dataset a", "outside of the data roots"]),
                                      (2, {"data_roots": ["nowhere"]}, ["nowhere", "no folder"]),
                                      (2, {"allowed_drivers": ["Foo"]}, ["Foo", "no format"]),
-                                     (2, {"allowed_prefixes": ["http://x"]}, ["http://x", "/vsi"]),
+                                     (2, {"allowed_prefixes": ["http://x"]}, ["allowed_prefixes", "/vsi"]),
                                      (1, {"disk_cache": {"directory": "file"}}, ["disk_cache", "Not a directory"]),
                                      (1, {"viewer": "nowhere"}, ["viewer", "nowhere", "no folder"]),
                                      (1, {"viewer": "nowhere", "access_log": "json", "access_log_file": "no/x.log",

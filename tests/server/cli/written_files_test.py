@@ -67,7 +67,7 @@ class WrittenFiles(unittest.TestCase):
     def test_a_secret_in_a_wrong_prefix_is_not_quoted(self):
         done = run("serve", SAMPLE, "--allowed-prefixes", "/vsicurl/https://h.example/d?sig=SECRET", "--check-config")
         self.assertEqual(done.returncode, 2)
-        self.assertIn("allowed_prefixes: entry 0", done.stderr)
+        self.assertIn("allowed_prefixes: entry 1", done.stderr)
         self.assertNotIn("SECRET", done.stderr)
 
     def test_a_pipe_is_not_replaced(self):
