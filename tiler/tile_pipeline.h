@@ -1,4 +1,4 @@
-// Builds a tile: from a request to bytes, in one blocking function. The server, tests and benchmarks use it.
+// Builds a tile: from a request to bytes, in one blocking function.
 #pragma once
 
 #include <array>

@@ -12,7 +12,7 @@
 namespace terrace::config {
 namespace {
 
-constexpr std::size_t kMinTokenLength = 16, kMaxTokenLength = 256, kHashDigits = 64;
+constexpr std::size_t kMaxTokenBytes = 256, kHashDigits = 64;
 constexpr double kMaxRequests = 1e6;
 
 bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
@@ -24,10 +24,10 @@ bool ConsistsOf(std::string_view text, std::string_view others) {
 
 // RFC 6750 lets a Bearer token have these characters.
 std::string CheckToken(const std::string& text) {
-  const bool fits = text.size() >= kMinTokenLength && text.size() <= kMaxTokenLength;
+  const bool fits = text.size() >= kMinTokenBytes && text.size() <= kMaxTokenBytes;
   if (fits && ConsistsOf(text, "-._~+/=")) return {};
   return fmt::format("must be {} to {} letters, digits or any of -._~+/=; openssl rand -hex 24 makes one",
-                     kMinTokenLength, kMaxTokenLength);
+                     kMinTokenBytes, kMaxTokenBytes);
 }
 
 std::string CheckHash(const std::string& text) {

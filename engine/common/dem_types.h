@@ -56,8 +56,8 @@ struct DemOptions {
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
   // Metres: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};
-  std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources and in collars; default:
-                                     // a height at or below the lowest one
+  std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources, in collars, and with
+                                     // HoleFill::kFloor in holes; default: a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;
   int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
@@ -81,7 +81,8 @@ struct DemFile {
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres above the ellipsoid; if the source's vertical datum is unknown, as the source has them.
+// Metres. Where it is a range of heights and no datum is named: above the ellipsoid, or as the source has them if its
+// vertical datum is unknown.
 struct HeightRange {
   double min = 0;
   double max = 0;

@@ -33,11 +33,10 @@ struct GridContent {
 
 class DemSource::Impl {
  public:
-  // `what`: names the request in messages. `traces`, below, unless null, receives the traces of the raster grids that
-  // were read, in order.
+  // `what`: names the request in messages.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
                                        const std::stop_token& stop) const;
-  // The same before the edits.
+  // The same before the edits. `traces`: unless null, receives the traces of the raster grids that were read, in order.
   Result<std::vector<float>> ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
                                           const std::string& what, const std::stop_token& stop,
                                           std::vector<PartTrace>* traces = nullptr) const;
@@ -55,23 +54,24 @@ class DemSource::Impl {
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
   std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;
 
-  // Defined in dem_edits.cc. ApplyEdits takes heights above the ellipsoid; `error_m`: as for EditSet::Apply.
+  // Edits. Defined in dem_edits.cc, if no other file is named.
   Result<void> OpenEdits(const DemOptions& options);
-  void AddDeeperLevels(double error_fraction);
+  void AddDeeperLevels(double error_fraction);  // dem_deeper.cc
   // These complete an edit with what the sources tell, and return what is wrong with it; empty: nothing. `opened`: the
   // replacements by path, as indexes.
   Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
-  // Of an edit with orthometric heights.
+  // Of an edit with orthometric heights. dem_edit_datum.cc.
   Result<std::string> AddUndulations(Edit& edit) const;
   // Of a flatten without a height.
   Result<std::string> AddFlatHeight(Edit& edit, const std::stop_token& stop) const;
   // Of a replace.
   Result<std::string> OpenReplacement(Edit& edit, const DemOptions& options,
                                       std::map<std::string, std::size_t>& opened);
+  // `heights`: above the ellipsoid. `error_m`: as for EditSet::Apply.
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
-  // ReplacedHeights::void_cells. `traces`: of this source, for the window.
+  // ReplacedHeights::void_cells. `traces`: of this source, for the window. void_cells.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
                                       std::span<const PartTrace> traces) const;
   // The edits that may reach the nodes of a window.

@@ -29,7 +29,7 @@ std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRas
   std::vector<SourceExtent> extents;
   for (const PlannedRaster& raster : rasters) {
     SourceSpacing spacing;
-    spacing.finer = std::min(raster.east, raster.north);
+    spacing.finer = std::min(raster.east_step_m, raster.north_step_m);
     extents.push_back({Footprint::Of(raster.bounds), DeepestLevel(spacing, error_fraction, std::nullopt)});
   }
   return AvailableTiles(extents);

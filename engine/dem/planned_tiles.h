@@ -19,7 +19,7 @@ std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
 // The properties of a raster that decide which tiles exist.
 struct PlannedRaster {
   GeoBounds bounds;
-  double east = 0, north = 0;  // metres on the ground between samples
+  double east_step_m = 0, north_step_m = 0;  // on the ground, between samples
 };
 
 // DemSource::Availability of a dataset of these rasters. Precondition: not empty.

@@ -1,4 +1,5 @@
-// Bounds on the heights that a tile can take from a raster grid, from the block table only.
+// What is known of a raster grid without reading samples: bounds on heights by the block tables, boxes around holes,
+// the members below a tile, and the content hash.
 #include <algorithm>
 #include <cmath>
 #include <optional>

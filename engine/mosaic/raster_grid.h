@@ -39,8 +39,8 @@ struct GridRange {
 
 // What Fill read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
-  // Between averages by `factor`. Valid where `heights` is not NaN. Nodes far from the raster grid may have no
-  // position.
+  // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
+  // raster grid may have no position.
   NodeCells cells;
   // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending also for
   // nodes that other raster grids filled, if their cell lies in `window` and has a sample.
@@ -179,18 +179,18 @@ class RasterGrid {
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
   Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
-  // A window with small voids filled. `measured`, unless it is null: becomes the window before filling; is not
-  // changed if there are no voids.
+  // A window with small voids filled.
   struct Bridged {
     std::vector<float> heights;
     std::uint64_t voids = 0;  // before
   };
+  // `measured`: unless null, becomes the window before filling; is not changed if there are no voids.
   Result<Bridged> ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
                               std::vector<float>* measured = nullptr) const;
   Result<std::vector<float>> ReadAround(int factor, const GridWindow& wide, const GridWindow& core,
                                         const std::vector<float>& known, const std::stop_token& stop) const;
-  // The same with smooth surfaces in the holes that are left (grid_holes.cc); empty where there are none.
-  // Precondition: `bridged` is what ReadBridged gives.
+  // The window of ReadBridged with smooth surfaces in the holes that are left (grid_holes.cc); empty where there are
+  // none. Precondition: `bridged` is what ReadBridged gives.
   Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                        const std::stop_token& stop) const;
   Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,

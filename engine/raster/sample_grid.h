@@ -1,4 +1,4 @@
-// The source at the resolution of a level: its samples, or averages of aligned blocks of factor x factor samples.
+// How to read a raster: its layout, its axes, and its averages of aligned blocks of factor x factor samples.
 #pragma once
 
 #include <gdal_priv.h>
@@ -15,7 +15,7 @@
 
 namespace terrace::dem {
 
-// The properties of a raster that are needed to read it. Immutable after Open.
+// The properties of a raster that are needed to read it.
 struct RasterLayout {
   // `crs_unit`: as for SampleRules::Of.
   static RasterLayout Of(GDALDataset& dataset, const Georeference& georeference, const std::string& crs_unit);

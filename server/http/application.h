@@ -31,7 +31,8 @@ struct Admission {
 // A reply, or a coroutine that makes one.
 using Answer = std::variant<Response, asio::awaitable<Response>>;
 
-// A reply whose last byte was passed to the kernel. Valid only during the call.
+// A reply that was sent, or one with status 499 if the client left before there was a reply. Its references are valid
+// until CountReply returns.
 struct SentReply {
   const Request& request;
   const Response& response;

@@ -35,7 +35,8 @@ struct HeightTileParameters {
   int size = tiler::kSidesPx[0];
 };
 
-// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated.
+// Parses `encoding` and `size` of height tiles and of their TileJSON. `v` may be repeated. kInvalidArgument, with a
+// message for the client: an unknown or repeated parameter, or an invalid value.
 Result<HeightTileParameters> ParseHeightTileParameters(std::string_view query);
 
 // The pixels along an edge of a Web Mercator tile. kInvalidArgument: not one of tiler::kSidesPx.

@@ -13,6 +13,7 @@
 #include <system_error>
 #include <utility>
 
+#include "config/common/token_hash.h"
 #include "engine/core/errno_text.h"
 #include "server/telemetry/redact.h"
 
@@ -60,7 +61,7 @@ std::string TargetOf(const ReplyRecord& record) {
 
 // HTTP's methods are shorter than tokens.
 std::string_view MethodOf(const ReplyRecord& record) {
-  return record.method.size() < kMinTokenBytes ? record.method : "...";
+  return record.method.size() < config::kMinTokenBytes ? record.method : "...";
 }
 
 // The peer without its port. IPv6 addresses contain colons.

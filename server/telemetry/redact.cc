@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "config/common/token_hash.h"
 #include "server/http/text.h"
 
 namespace terrace::server {
@@ -149,7 +150,7 @@ std::string ShownPath(std::string_view path, bool is_known) {
   for (std::size_t at = 0; at < plain.size();) {
     const std::size_t slash = std::min(plain.find('/', at), plain.size());
     const std::string_view segment = plain.substr(at, slash - at);
-    shown += is_known || segment.size() < kMinTokenBytes ? segment : kLeftOut;
+    shown += is_known || segment.size() < config::kMinTokenBytes ? segment : kLeftOut;
     if (slash < plain.size()) shown += '/';
     at = slash + 1;
   }

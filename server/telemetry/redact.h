@@ -22,7 +22,4 @@ std::string RedactTarget(std::string_view target, bool is_known);
 // The same for a Referer: scheme, host and the plain part of an unknown path; empty if it is not a URL.
 std::string RedactReferer(std::string_view referer);
 
-// The minimum length of a token.
-inline constexpr std::size_t kMinTokenBytes = 16;
-
 }  // namespace terrace::server

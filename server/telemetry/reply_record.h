@@ -9,8 +9,7 @@ namespace terrace::server {
 
 struct SentReply;  // server/http/application.h
 
-// A reply whose last byte was passed to the kernel. Valid only during the call. Text sent by the client may contain any
-// bytes.
+// A reply that was sent, or status 499. Views of the SentReply. Text sent by the client may contain any bytes.
 struct ReplyRecord {
   std::string_view method;
   std::string_view target;  // as sent by the client; logged in the form of RedactTarget

@@ -1,6 +1,7 @@
 // Options of a tile's refinement. With them the tile keeps every error bound, and its edges match those of its
-// neighbours. They depend on the level, the tile's own border samples, and the height ranges of the neighbours. They do
-// not depend on the error: a refinement serves every error (engine/tin/refinement.h).
+// neighbours. They depend on the level and row of the tile, its border samples, and the height ranges of the
+// neighbours. They do not depend on the error: a refinement serves every error (engine/tin/refinement.h).
+// RefineOptionsOf (tile_mesher.h) adds the criterion and the limits of edits.
 #pragma once
 
 #include "engine/tin/greedy.h"

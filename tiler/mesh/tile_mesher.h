@@ -48,7 +48,9 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice);
 tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
                                    tin::Criterion criterion);
 
-// Replays the refinement to the error and runs the drop pass if the options ask for it. The mesh is not yet quantized.
+// Makes the mesh for the error: replays the refinement, or, if that has more vertices than the format allows, inserts
+// anew at a larger error inside. Then the drop pass, if the options ask for it, and WithInnerVertices. The mesh is not
+// quantized yet.
 // `refinement` as for MeshTile. kCancelled: stopped.
 Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
                                 const tin::Refinement& refinement, const MeshOptions& mesh_options,

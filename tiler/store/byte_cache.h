@@ -45,8 +45,8 @@ class ByteCache {
  public:
   using ValuePtr = std::shared_ptr<const Value>;
 
-  // Bytes of an entry in addition to its charge: list node, index node and bucket, control block, and half of a ghost's
-  // nodes.
+  // Bytes of an entry in addition to its value's, part of its charge: list node, index node and bucket, control block,
+  // and half of a ghost's nodes.
   static constexpr std::size_t kEntryOverheadBytes = 640;
 
   // 0 bytes: off; Find never finds anything. A value must fit into one shard; the largest are about 2 MB.

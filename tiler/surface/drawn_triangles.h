@@ -9,7 +9,7 @@
 
 namespace terrace::tiler {
 
-// All triangles of a tile.
+// All triangles of a tile, with the positions of its vertices.
 DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile);
 
 // The triangles of a finished tile. kUnavailable: the bytes are not such a tile.
