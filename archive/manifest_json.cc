@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "engine/core/parse_number.h"
+#include "engine/geo/error_ladder.h"
 #include "tiler/encoder_version.h"
 
 namespace terrace::archive {
@@ -144,7 +145,9 @@ void ReadKind(const Json& json, Manifest& manifest) {
   if (std::ranges::find(tiler::kSidesPx, kind.side_px) == tiler::kSidesPx.end()) {
     throw Wrong("size must be 256 or 512");
   }
-  for (const Json& step : json.at("error_steps")) manifest.error_steps.push_back(WholeOf<int>(step, -1000, 1000));
+  for (const Json& step : json.at("error_steps")) {
+    manifest.error_steps.push_back(WholeOf<int>(step, geo::kCoarsestStep, geo::kFinestStep));
+  }
   if (!manifest.error_steps.empty() &&
       manifest.error_steps.size() != static_cast<std::size_t>(manifest.max_level) + 1) {
     throw Wrong("error_steps must have an entry for each level");
@@ -181,6 +184,11 @@ void ReadAvailable(const Json& json, Manifest& manifest) {
   if (manifest.available.size() != static_cast<std::size_t>(manifest.max_level) + 1 ||
       json.size() != manifest.available.size()) {
     throw Wrong("available must have an entry for each level");
+  }
+  // The trees of a tileset have no gaps.
+  const bool has_tileset = manifest.kind.format == tiler::TileFormat::kGlb;
+  if (has_tileset && std::ranges::any_of(manifest.available, [](const auto& level) { return level.empty(); })) {
+    throw Wrong("available must have a tile of each level");
   }
 }
 

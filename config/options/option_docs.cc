@@ -53,7 +53,7 @@ std::vector<std::string> ValuesOf(const Json& schema) {
   return {type == "array" ? "list" : type};
 }
 
-// The placeholder of the value in the help states its unit.
+// The word for the value in the help states its unit.
 std::string UnitOf(std::string_view value) {
   constexpr std::array<std::pair<std::string_view, std::string_view>, 2> kUnits = {
       {{"METRES", " metres"}, {"SECONDS", " seconds"}}};

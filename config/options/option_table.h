@@ -20,7 +20,7 @@ inline constexpr const char* kSchemaKey = "$schema";
 template <typename Target>
 struct Option {
   std::string_view key;
-  std::string_view value = {};    // placeholder for the value in --help: "BYTES"
+  std::string_view value = {};    // word for the value in --help: "BYTES"
   std::string_view section = {};  // of docs/configuration.md; only for options at the top level of the file
   std::string_view help;          // one line without a full stop, for --help, the schema and the reference
   std::string_view details = {};  // Markdown that the reference appends to it, without a full stop

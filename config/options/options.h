@@ -15,7 +15,7 @@ std::string FlagOf(std::string_view key);
 
 struct OptionInfo {
   std::string_view key;    // in the JSON file: "cache_bytes"
-  std::string_view value;  // placeholder for the value in help texts: "BYTES"
+  std::string_view value;  // word for the value in help texts: "BYTES"
   std::string_view help;   // one line
   bool has_flag = false;
   std::string default_value;          // as JSON; empty: none

@@ -107,7 +107,7 @@ Json QueryParameter(const Operation& operation, const ParameterNote& note) {
 
 Json ParametersOf(const DocumentedUrl& url) {
   Json parameters = Json::array();
-  for (const std::string_view name : PlaceholdersOf(url.pattern)) parameters.push_back(PathParameter(url, name));
+  for (const std::string_view name : VariablesOf(url.pattern)) parameters.push_back(PathParameter(url, name));
   if (url.takes_any_query) return parameters;
   parameters.push_back(RefTo("parameters", "v"));
   if (url.operation == nullptr) return parameters;
@@ -237,7 +237,7 @@ Json Components() {
 
 }  // namespace
 
-std::vector<std::string_view> PlaceholdersOf(std::string_view pattern) {
+std::vector<std::string_view> VariablesOf(std::string_view pattern) {
   std::vector<std::string_view> names;
   for (std::size_t at = 0; (at = pattern.find('{', at)) != std::string_view::npos;) {
     const std::size_t end = std::min(pattern.find('}', at), pattern.size());
@@ -247,7 +247,7 @@ std::vector<std::string_view> PlaceholdersOf(std::string_view pattern) {
   return names;
 }
 
-std::optional<std::string> ValueIn(std::string_view target, std::string_view pattern, std::string_view placeholder) {
+std::optional<std::string> ValueIn(std::string_view target, std::string_view pattern, std::string_view variable) {
   target = target.substr(0, target.find('?'));
   std::optional<std::string> found;
   while (!pattern.empty()) {
@@ -262,7 +262,7 @@ std::optional<std::string> ValueIn(std::string_view target, std::string_view pat
     // A value ends before the next character of the pattern.
     const std::size_t end = pattern.empty() ? target.size() : target.find(pattern.front());
     if (end == std::string_view::npos) return std::nullopt;
-    if (name == placeholder) found = std::string(target.substr(0, end));
+    if (name == variable) found = std::string(target.substr(0, end));
     target.remove_prefix(end);
   }
   return target.empty() ? found : std::nullopt;

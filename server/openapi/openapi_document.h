@@ -24,10 +24,10 @@ struct DocumentedUrl {
 // The document as JSON; equal for equal URLs.
 std::string WriteOpenApi(const std::vector<DocumentedUrl>& urls);
 
-// The placeholders of a pattern in their order: "dataset", "z", "x", "y".
-std::vector<std::string_view> PlaceholdersOf(std::string_view pattern);
+// The variables (RFC 6570) of a pattern in their order: "dataset", "z", "x", "y".
+std::vector<std::string_view> VariablesOf(std::string_view pattern);
 
-// The value that a target has for a placeholder of the pattern; nothing if they do not match. The query does not count.
-std::optional<std::string> ValueIn(std::string_view target, std::string_view pattern, std::string_view placeholder);
+// The value that a target has for a variable of the pattern; nothing if they do not match. The query does not count.
+std::optional<std::string> ValueIn(std::string_view target, std::string_view pattern, std::string_view variable);
 
 }  // namespace terrace::server

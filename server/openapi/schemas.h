@@ -12,7 +12,7 @@ struct NamedSchema {
 };
 std::span<const NamedSchema> Schemas();
 
-// A placeholder of a URL's pattern.
+// A variable of a URL's pattern.
 struct PathNote {
   std::string_view name, meaning, schema;
 };

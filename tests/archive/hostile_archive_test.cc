@@ -5,6 +5,7 @@
 
 #include "archive/archive.h"
 #include "archive/pmtiles/pmtiles_file.h"
+#include "archive/static_tileset.h"
 #include "archive/tile_scheme.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
@@ -160,6 +161,44 @@ TEST_F(HostileArchiveTest, ManifestCutShortOrFlipped) {
       ASSERT_EQ((*found)->tile.bytes, InventedTile(key).bytes);
     }
   }
+}
+
+// What a tileset is made of comes from the manifest: it must not end the process.
+TEST_F(HostileArchiveTest, TilesetOfAWrongManifest) {
+  Manifest good = WriteUnits(place_, keys_);
+  good.kind.format = tiler::TileFormat::kGlb;
+  good.max_level = good.dataset.max_level = good.dataset.max_source_level = 1;
+  good.available.resize(2);
+  good.error_steps = {0, 0};
+  const auto tileset_of = [&](const Manifest& manifest) {
+    EXPECT_TRUE(WriteManifest(place_, manifest));
+    const auto archive = Archive::Open(place_);
+    if (!archive) return std::string();
+    std::string tileset;
+    const auto take = [&](const std::string& path, std::string_view bytes, bool) -> Result<void> {
+      if (path == "tileset.json") tileset = bytes;
+      return {};
+    };
+    static_cast<void>(ForEachFileOfTileset(**archive, /*has_versions=*/false, take, {}));
+    return tileset;
+  };
+  for (const dem::GeoBounds& bounds : {dem::GeoBounds{10, -33, 11, -32}, {400, -33, 401, -32}, {180, -33, 190, -32}}) {
+    Manifest manifest = good;
+    manifest.dataset.bounds = bounds;
+    std::erase_if(manifest.available[1], [](const geo::TileRange& range) { return range.start_x > 0; });
+    EXPECT_NE(tileset_of(manifest), "") << bounds.west;
+  }
+  for (const std::size_t level : {0, 1}) {
+    Manifest manifest = good;
+    manifest.available[level].clear();
+    EXPECT_EQ(tileset_of(manifest), "") << level;
+  }
+  for (const int step : {-1000, -17, 25, 1000}) {
+    Manifest manifest = good;
+    manifest.error_steps = {0, step};
+    EXPECT_EQ(tileset_of(manifest), "") << step;
+  }
+  EXPECT_NE(tileset_of(good), "");
 }
 
 }  // namespace

@@ -371,6 +371,15 @@ class Bake(BakeCase):
                 self.assertIn((level, x ^ 1, y), tiles)
         self.assertIn((11, int(186.3 / 180 * 2048), int(136.3 / 180 * 2048)), tiles)
 
+    def test_a_folder_that_is_named_by_dots_is_refused_before_the_bake(self):
+        empty = self.place("dots")
+        empty.mkdir()
+        for name in (f"{empty}/.", f"{empty}/new/.."):
+            done = self.run_bake("--out", name, "--form", "folder", levels="0-2")
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("needs its name; give a new folder", done.stderr)
+        self.assertEqual(list(empty.iterdir()), [])
+
     def test_the_other_forms_hold_the_same_tiles(self):
         _, tiles = archive(self.reference)
         folder, single = self.place("folder"), self.place("single.pmtiles")

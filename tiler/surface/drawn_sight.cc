@@ -80,8 +80,7 @@ class MeshWalk {
     Clearances clearances;
     const int parts = std::max(1, static_cast<int>(std::ceil(dem::LengthOf(ray) / kPartLength)));
     for (int i = 0; i < parts; ++i) {
-      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
-      const Result<void> done = AddPart(ray, static_cast<double>(i) / parts, 1.0 / parts, clearances);
+      const Result<void> done = AddPart(ray, static_cast<double>(i) / parts, 1.0 / parts, clearances, stop);
       if (!done) return tl::unexpected(done.error());
     }
     return clearances.Answer();
@@ -108,12 +107,15 @@ class MeshWalk {
   }
 
   // Divides a part of a ray where it leaves a bucket of a mesh.
-  Result<void> AddPart(const dem::SightRay& ray, double start, double length, Clearances& clearances) {
+  Result<void> AddPart(const dem::SightRay& ray, double start, double length, Clearances& clearances,
+                       const std::stop_token& stop) {
     const auto at = [&](double s) { return dem::PointAt(ray, start + s * length, options_); };
     const dem::SightPoint first = at(0), last = at(1);
     const double east = std::remainder(last.longitude - first.longitude, 360), north = last.latitude - first.latitude;
     constexpr double kMinStep = 1e-6;
     for (double s = 0;;) {
+      // Near a pole a part passes many buckets.
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
       const double inside = std::min(1.0, s + kMinStep / 2);
       const dem::GeoPosition here{std::remainder(first.longitude + inside * east, 360),
                                   first.latitude + inside * north};

@@ -18,6 +18,12 @@ namespace terrace::cli {
 namespace fs = std::filesystem;
 
 Result<void> CheckExportPlace(const std::string& out) {
+  const fs::path name = fs::path(out).filename();
+  if (name == "." || name == "..") {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "--out {}: the tiles replace the folder when all are done, which needs its name; give a new folder", out);
+  }
   std::error_code error;
   const bool is_taken = fs::is_directory(out, error) ? !fs::is_empty(out, error) : fs::exists(out, error);
   if (!is_taken) return {};

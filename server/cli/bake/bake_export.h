@@ -11,7 +11,7 @@
 
 namespace terrace::cli {
 
-// kInvalidArgument: something is there.
+// kInvalidArgument: something is there, or the last part of the path is "." or "..".
 Result<void> CheckExportPlace(const std::string& out);
 
 // Whether the `out` of the arguments was made from `baked` by a process that ended before it had removed `baked`.

@@ -222,7 +222,7 @@ TEST(Router, DescribesEachUrl) {
       const Result<Route> route = Routes().Match(example.target);
       ASSERT_TRUE(route) << example.target;
       EXPECT_EQ(route->row->takes_post() || example.body_type.empty(), true) << example.target;
-      for (const std::string_view name : PlaceholdersOf(url.pattern)) {
+      for (const std::string_view name : VariablesOf(url.pattern)) {
         EXPECT_TRUE(ValueIn(example.target, url.pattern, name)) << example.target << " " << name;
       }
     }
