@@ -19,16 +19,13 @@ namespace {
 using tiler::TileFormat;
 using tiler::TileRequest;
 
-proto::QuantizedMeshOptions ExtensionsOf(const TileRequest& request) {
-  return {request.normals, request.water_mask, request.metadata};
-}
-
 // The extensions that the archive's tile has.
-proto::QuantizedMeshOptions ExtensionsIn(const Manifest& manifest, const geo::TileKey& key) {
+proto::TileExtensions ExtensionsIn(const Manifest& manifest, const geo::TileKey& key) {
   const BakedDataset& dataset = manifest.dataset;
-  return {manifest.kind.normals, manifest.kind.water_mask,
-          manifest.kind.metadata &&
-              proto::CarriesMetadata(key, dataset.metadata_levels, dataset.max_source_level, manifest.available)};
+  proto::TileExtensions extensions = manifest.kind.extensions;
+  extensions.metadata = extensions.metadata && proto::CarriesMetadata(key, dataset.metadata_levels,
+                                                                      dataset.max_source_level, manifest.available);
+  return extensions;
 }
 
 // Whether the archive's tiles are what the request asks for, except for their coding and for extensions that can be
@@ -44,9 +41,8 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
   if (request.format == TileFormat::kGlb) {
     return request.compression == kind.compression && request.texture == kind.texture;
   }
-  const proto::QuantizedMeshOptions extensions = ExtensionsIn(manifest, request.key);
-  return request.normals <= extensions.normals && request.water_mask <= extensions.water_mask &&
-         request.metadata <= extensions.metadata;
+  const proto::TileExtensions extensions = ExtensionsIn(manifest, request.key);
+  return (extensions | request.extensions) == extensions;
 }
 
 // The bytes of the archive's tile in the coding that the request asks for, without extensions that it does not name.
@@ -54,7 +50,7 @@ bool IsOfKind(const Manifest& manifest, const TileRequest& request) {
 std::optional<std::string> AsRequested(std::string bytes, const Manifest& manifest, const TileRequest& request) {
   constexpr std::size_t kMaxTileBytes = std::size_t{1} << 30;
   const bool is_smaller =
-      request.format == TileFormat::kQuantizedMesh && ExtensionsOf(request) != ExtensionsIn(manifest, request.key);
+      request.format == TileFormat::kQuantizedMesh && request.extensions != ExtensionsIn(manifest, request.key);
   if (!is_smaller && request.coding == manifest.kind.coding) return bytes;
   if (manifest.kind.coding == tiler::Coding::kGzip) {
     std::optional<std::string> plain = proto::Gunzip(bytes, kMaxTileBytes);
@@ -62,7 +58,7 @@ std::optional<std::string> AsRequested(std::string bytes, const Manifest& manife
     bytes = *std::move(plain);
   }
   if (is_smaller) {
-    std::optional<std::string> kept = proto::KeepExtensions(bytes, ExtensionsOf(request));
+    std::optional<std::string> kept = proto::KeepExtensions(bytes, request.extensions);
     if (!kept) return std::nullopt;
     bytes = *std::move(kept);
   }
@@ -147,9 +143,9 @@ class Baked final : public tiler::BakedTiles {
       if (manifest.kind.texture != proto::TextureFormat::kNone) extent_.texture = manifest.kind.texture;
       return;
     }
-    extent_.normals = manifest.kind.normals;
-    extent_.water_mask = manifest.kind.water_mask;
-    if (manifest.kind.metadata) extent_.metadata_levels = dataset.metadata_levels;
+    extent_.normals = manifest.kind.extensions.normals;
+    extent_.water_mask = manifest.kind.extensions.water_mask;
+    if (manifest.kind.extensions.metadata) extent_.metadata_levels = dataset.metadata_levels;
   }
 
   const std::vector<std::shared_ptr<const Archive>> archives_;

@@ -28,9 +28,9 @@ std::string LayerJson(const Manifest& manifest) {
   layer.version = tiler::VersionText(TilesHash(manifest));
   layer.available = manifest.available;
   layer.bounds = dataset.bounds;
-  layer.normals = manifest.kind.normals;
-  layer.water_mask = manifest.kind.water_mask;
-  if (manifest.kind.metadata) layer.metadata_levels = dataset.metadata_levels;
+  layer.normals = manifest.kind.extensions.normals;
+  layer.water_mask = manifest.kind.extensions.water_mask;
+  if (manifest.kind.extensions.metadata) layer.metadata_levels = dataset.metadata_levels;
   return proto::EncodeLayerJson(layer);
 }
 

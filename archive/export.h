@@ -1,4 +1,4 @@
-// Other forms of an archive. A bake writes one file per unit (tile_writer.h), the form `chunks`. These functions read
+// Other forms of an archive. A bake writes one file per unit (unit_writer.h), the form `chunks`. These functions read
 // the files and write the other form in one deterministic pass. `out` appears by rename when it is complete.
 // kCancelled: stopped.
 #pragma once

@@ -70,25 +70,16 @@ struct Manifest {
   }
 };
 
-// Levels 0 .. kTopLevels - 1 are the unit "top"; each tile of level kTopLevels is the root of a further unit.
-inline constexpr int kTopLevels = 7;
-
 // The formats in the order of their folders, and the folders' names.
 inline constexpr Names<tiler::TileFormat, 3> kFormatNames = {{{"terrain", tiler::TileFormat::kQuantizedMesh},
                                                               {"glb", tiler::TileFormat::kGlb},
                                                               {"png", tiler::TileFormat::kHeightPng}}};
 
 // The name of a format in kFormatNames.
-std::string FolderOf(tiler::TileFormat format);
+inline std::string FolderOf(tiler::TileFormat format) { return std::string(NameIn(kFormatNames, format)); }
 
-// The unit of a tile: "top" or "7-X-Y". UnitRoot is its inverse: the root's key, nothing for "top".
-// kInvalidArgument: no such name.
-std::string UnitNameOf(const geo::TileKey& key);
-Result<std::optional<geo::TileKey>> UnitRoot(std::string_view name);
-
-// Paths relative to the archive's place: "manifest.json"; "top.pmtiles", "units/7-X-Y.pmtiles".
+// Relative to the archive's place.
 inline constexpr const char* kManifestFile = "manifest.json";
-std::string UnitPath(std::string_view name);
 
 // A hash of what the archive's tiles are and which there are: of the dataset's generation, the kind, the errors and the
 // available tiles. The version in documents of the archive is that of this hash. All forms of a bake have the same.

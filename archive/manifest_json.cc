@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "archive/unit_name.h"
 #include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
 #include "tiler/encoder_version.h"
@@ -113,8 +114,9 @@ BakedDataset ReadDataset(const Json& json) {
 
 Json KindJson(const tiler::TileRequest& kind, const std::vector<int>& error_steps) {
   // All members are named, so that a new one fails to compile until it is added here.
-  const auto& [dataset, key, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, side_px, map] = kind;
+  const auto& [dataset, key, error_step, format, compression, texture, coding, extensions, height_encoding, side_px,
+               map] = kind;
+  const auto& [normals, water_mask, metadata] = extensions;
   static_cast<void>(dataset), static_cast<void>(key), static_cast<void>(error_step);
   static_cast<void>(map);  // archives have no tiles for maps
   Json json;
@@ -135,9 +137,9 @@ void ReadKind(const Json& json, Manifest& manifest) {
   tiler::TileRequest& kind = manifest.kind;
   kind.format = ValueOf(kFormatNames, json.at("format"));
   kind.coding = ValueOf(kCodingNames, json.at("coding"));
-  kind.normals = json.at("octvertexnormals").get<bool>();
-  kind.water_mask = json.at("watermask").get<bool>();
-  kind.metadata = json.at("metadata").get<bool>();
+  kind.extensions.normals = json.at("octvertexnormals").get<bool>();
+  kind.extensions.water_mask = json.at("watermask").get<bool>();
+  kind.extensions.metadata = json.at("metadata").get<bool>();
   kind.compression = ValueOf(proto::kGlbCompressionNames, json.at("compression"));
   kind.texture = ValueOf(proto::kTextureFormatNames, json.at("texture"));
   kind.height_encoding = ValueOf(proto::kHeightEncodingNames, json.at("encoding"));
@@ -185,10 +187,9 @@ void ReadAvailable(const Json& json, Manifest& manifest) {
       json.size() != manifest.available.size()) {
     throw Wrong("available must have an entry for each level");
   }
-  // The trees of a tileset have no gaps.
-  const bool has_tileset = manifest.kind.format == tiler::TileFormat::kGlb;
-  if (has_tileset && std::ranges::any_of(manifest.available, [](const auto& level) { return level.empty(); })) {
-    throw Wrong("available must have a tile of each level");
+  // The trees of a tileset begin there.
+  if (manifest.kind.format == tiler::TileFormat::kGlb && manifest.available.front().empty()) {
+    throw Wrong("available must have a tile of level 0");
   }
 }
 

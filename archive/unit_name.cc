@@ -1,9 +1,8 @@
-// Names and paths of the files of an archive.
+#include "archive/unit_name.h"
+
 #include <fmt/format.h>
 
 #include <charconv>
-
-#include "archive/manifest.h"
 
 namespace terrace::archive {
 namespace {
@@ -24,8 +23,6 @@ bool TakeHyphen(std::string_view& text) {
 }
 
 }  // namespace
-
-std::string FolderOf(tiler::TileFormat format) { return std::string(NameIn(kFormatNames, format)); }
 
 std::string UnitNameOf(const geo::TileKey& key) {
   if (key.level < kTopLevels) return std::string(kTop);

@@ -1,3 +1,5 @@
+#include "archive/unit_writer.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,16 +13,16 @@
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/pmtiles/pmtiles_writer.h"
 #include "archive/tile_scheme.h"
-#include "archive/tile_writer.h"
+#include "archive/unit_name.h"
 #include "engine/common/content_hash.h"
 #include "tiler/tile/tile_bounds.h"
 
 namespace terrace::archive {
 namespace {
 
-class UnitWriter final : public TileWriter {
+class PmtilesUnitWriter final : public UnitWriter {
  public:
-  UnitWriter(std::string name, const UnitOptions& options, PmtilesWriter writer)
+  PmtilesUnitWriter(std::string name, const UnitOptions& options, PmtilesWriter writer)
       : name_(std::move(name)), options_(options), writer_(std::move(writer)) {}
 
   Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange& range) override {
@@ -65,7 +67,7 @@ Result<std::string> HashOfFile(const std::string& path) {
 
 }  // namespace
 
-Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const std::string& name,
+Result<std::unique_ptr<UnitWriter>> CreateUnit(const std::string& place, const std::string& name,
                                                const UnitOptions& options) {
   const Result<std::optional<geo::TileKey>> root = UnitRoot(name);
   if (!root) return tl::unexpected(root.error());
@@ -73,7 +75,7 @@ Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const s
   if (!file_options) return tl::unexpected(file_options.error());
   Result<PmtilesWriter> writer = PmtilesWriter::Create(place + "/" + UnitPath(name), *file_options);
   if (!writer) return tl::unexpected(std::move(writer.error()));
-  return std::make_unique<UnitWriter>(name, options, *std::move(writer));
+  return std::make_unique<PmtilesUnitWriter>(name, options, *std::move(writer));
 }
 
 Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {

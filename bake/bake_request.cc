@@ -70,7 +70,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const BakeReque
     case tiler::TileFormat::kQuantizedMesh: {
       const proto::TileExtensions wanted =
           request.extensions.value_or(proto::TileExtensions{true, dataset.water.any(), false});
-      if (wanted.watermask && !dataset.water.any()) {
+      if (wanted.water_mask && !dataset.water.any()) {
         return MakeError(
             ErrorCode::kInvalidArgument,
             "extension watermask: dataset {} has no water; give it a mask or a sea level with \"water\" in "
@@ -88,9 +88,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const BakeReque
             "extension metadata lists the tiles of the whole dataset: leave it out, or bake without --bbox "
             "and --levels");
       }
-      kind.normals = wanted.octvertexnormals;
-      kind.water_mask = wanted.watermask;
-      kind.metadata = wanted.metadata;
+      kind.extensions = wanted;
       if (request.compress) kind.coding = tiler::Coding::kGzip;
       break;
     }
@@ -190,6 +188,12 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
         }
         manifest.available.push_back(tiles.empty() ? tiles : geo::Disjoint(std::move(tiles)));
       }
+      if (manifest.available.back().empty()) {
+        return MakeError(ErrorCode::kInvalidArgument,
+                         "--format png: dataset {} has no tiles there: Web Mercator ends at 85.05 degrees of latitude; "
+                         "leave png out",
+                         dataset.name);
+      }
       continue;
     }
     manifest.available = request.bbox ? TilesWithin(source.Availability(), *request.bbox) : source.Availability();
@@ -206,8 +210,9 @@ tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileK
   tiler::TileRequest request = manifest.kind;
   request.key = key;
   if (!manifest.error_steps.empty()) request.error_step = manifest.error_steps[static_cast<std::size_t>(key.level)];
-  request.metadata = request.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_levels,
-                                                                manifest.dataset.max_source_level, manifest.available);
+  request.extensions.metadata =
+      request.extensions.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_levels,
+                                                            manifest.dataset.max_source_level, manifest.available);
   return request;
 }
 

@@ -42,7 +42,7 @@ class OpenUnit {
   struct Output {
     std::size_t target = 0;
     std::uint64_t key = 0;
-    std::unique_ptr<archive::TileWriter> writer = {};
+    std::unique_ptr<archive::UnitWriter> writer = {};
     std::unique_ptr<std::mutex> mutex = std::make_unique<std::mutex>();  // of the writer
   };
 

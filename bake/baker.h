@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "archive/manifest.h"
-#include "archive/tile_writer.h"
+#include "archive/unit_writer.h"
 #include "bake/queue/unit_queue.h"
 #include "bake/units.h"
 #include "engine/core/result.h"
@@ -27,9 +27,9 @@ struct Target {
   // The older archive whose units with equal keys are copied: its folder, and its units by name.
   std::string old_place = {};
   std::map<std::string, archive::UnitEntry> old_units = {};
-  // Where the tiles go instead of to files in `place`. `create` makes the writer of a unit, which is called by one
-  // thread at a time. Tiles for which `has` returns true exist already and are not built. Both empty: files in `place`.
-  std::function<Result<std::unique_ptr<archive::TileWriter>>()> create = {};
+  // Where the tiles go instead of to files in `place`. `create` makes the writer of a unit; one thread at a time
+  // calls it. Tiles for which `has` returns true exist already and are not built. Both empty: files in `place`.
+  std::function<Result<std::unique_ptr<archive::UnitWriter>>()> create = {};
   std::function<bool(const tiler::TileRequest&)> has = {};
 };
 

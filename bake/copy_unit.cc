@@ -6,6 +6,7 @@
 
 #include "archive/files/input_file.h"
 #include "archive/files/output_file.h"
+#include "archive/unit_name.h"
 
 namespace terrace::bake {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "archive/manifest.h"
-#include "archive/tile_writer.h"
+#include "archive/unit_writer.h"
 #include "engine/core/result.h"
 
 namespace terrace::bake {

@@ -5,6 +5,7 @@
 
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/tile_scheme.h"
+#include "archive/unit_name.h"
 #include "bake/unit_key.h"
 
 namespace terrace::bake {

@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "archive/files/bucket.h"
+#include "archive/unit_name.h"
 #include "bake/place_files.h"
 #include "engine/core/errno_text.h"
 #include "engine/core/parse_number.h"

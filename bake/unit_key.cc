@@ -27,7 +27,8 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
         static_cast<int>(kind.coding), static_cast<int>(kind.height_encoding), kind.side_px}) {
     hasher.Add(value);
   }
-  for (const bool value : {kind.normals, kind.water_mask, kind.metadata}) hasher.Add(value);
+  for (const bool value : {kind.extensions.normals, kind.extensions.water_mask, kind.extensions.metadata})
+    hasher.Add(value);
 }
 
 // The sources of height tiles. A geodetic tile of the level above the unit's is as wide as the unit, and is read at
@@ -73,7 +74,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
     AddMercatorContent(hasher, source, *unit.root);
   } else {
     hasher.Add(source.ContentBelow(*unit.root, last));
-    if (manifest.kind.metadata) {
+    if (manifest.kind.extensions.metadata) {
       // Metadata lists the dataset's tiles below a tile.
       const int deepest = static_cast<int>(source.AvailabilityBelow(*unit.root).size()) - 1;
       for (int level = unit.root->level; level <= deepest; ++level) {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "archive/unit_name.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::bake {

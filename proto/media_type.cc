@@ -47,8 +47,8 @@ TileExtensions ParseExtensions(std::string_view names) {
   TileExtensions extensions;
   while (!names.empty()) {
     const std::string_view name = TakePart(names, '-');
-    if (EqualsIgnoringCase(name, "octvertexnormals")) extensions.octvertexnormals = true;
-    if (EqualsIgnoringCase(name, "watermask")) extensions.watermask = true;
+    if (EqualsIgnoringCase(name, "octvertexnormals")) extensions.normals = true;
+    if (EqualsIgnoringCase(name, "watermask")) extensions.water_mask = true;
     if (EqualsIgnoringCase(name, "metadata")) extensions.metadata = true;
   }
   return extensions;
@@ -79,7 +79,7 @@ std::string_view QuantizedMeshContentType(TileExtensions extensions) {
       "application/vnd.quantized-mesh;extensions=watermask-metadata",
       "application/vnd.quantized-mesh;extensions=octvertexnormals-watermask-metadata",
   };
-  return kTypes[(extensions.octvertexnormals ? 1 : 0) + (extensions.watermask ? 2 : 0) + (extensions.metadata ? 4 : 0)];
+  return kTypes[(extensions.normals ? 1 : 0) + (extensions.water_mask ? 2 : 0) + (extensions.metadata ? 4 : 0)];
 }
 
 }  // namespace terrace::proto

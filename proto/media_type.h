@@ -8,15 +8,15 @@ namespace terrace::proto {
 
 inline constexpr std::string_view kQuantizedMeshType = "application/vnd.quantized-mesh";
 
-// The extensions of quantized-mesh-1.0 that a client can ask for.
+// Extensions of quantized-mesh-1.0.
 struct TileExtensions {
-  bool octvertexnormals = false;
-  bool watermask = false;
-  bool metadata = false;
+  bool normals = false;     // extension 1, octvertexnormals
+  bool water_mask = false;  // extension 2, watermask
+  bool metadata = false;    // extension 4, metadata
 
   friend bool operator==(const TileExtensions&, const TileExtensions&) = default;
   friend TileExtensions operator|(TileExtensions a, TileExtensions b) {
-    return {a.octvertexnormals || b.octvertexnormals, a.watermask || b.watermask, a.metadata || b.metadata};
+    return {a.normals || b.normals, a.water_mask || b.water_mask, a.metadata || b.metadata};
   }
 };
 

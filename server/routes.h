@@ -1,5 +1,5 @@
-// All URLs of the server: the table of rows, the row for a request target, and what the target names. Pure; knows no
-// dataset.
+// All URLs of the server: the table of rows (RouteRow, server/api/route.h), the row for a request target, and what the
+// target names. Pure; knows no dataset.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "server/api/request_context.h"
+#include "server/api/route.h"
 #include "server/openapi/openapi_document.h"
 
 namespace terrace::server {

@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include "engine/gdal/gdal_runtime.h"
-#include "proto/library_versions.h"
+#include "proto/codec_versions.h"
 
 namespace terrace::tiler {
 
 std::string EncoderText() {
-  return fmt::format("encoder {}, {}, {}", kEncoderVersion, dem::LibraryVersions(), proto::LibraryVersions());
+  return fmt::format("encoder {}, {}, {}", kEncoderVersion, dem::GdalVersions(), proto::CodecVersions());
 }
 
 std::string VersionText(std::uint64_t generation) { return fmt::format("{:012x}", generation >> 16); }

@@ -16,34 +16,35 @@ struct EncoderInput;  // tile_pipeline.h
 struct Encoder {
   TileFormat format;
   bool needs_refinement;
-  // Sets all of `encoded` except the ETag and the time of compression; adds to times.refine.
+  // Sets the bytes and times.encode. Meshes also set errors and counts, and add to times.refine. Formats without a
+  // refinement also set `refinement` to kNone, and times.read.
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 
 // encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: the source, the
 // water raster or the image cannot be read now. kCancelled: stopped. kNotFound (height tiles and those for maps):
 // deeper than max_mercator_depth; imagery: the dataset has none.
-Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeContours(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
-Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeGlbTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeHillshadeTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeSlopeTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeContoursTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeImageryTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
+Result<void> MakeGeodeticImageryTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 
 inline constexpr Encoder kEncoders[] = {
-    {TileFormat::kQuantizedMesh, /*needs_refinement=*/true, EncodeQuantizedMesh},
-    {TileFormat::kGlb, /*needs_refinement=*/true, EncodeGlb},
-    {TileFormat::kHeightPng, /*needs_refinement=*/false, EncodeHeightPng},
-    {TileFormat::kHillshade, /*needs_refinement=*/false, EncodeHillshade},
-    {TileFormat::kSlope, /*needs_refinement=*/false, EncodeSlope},
-    {TileFormat::kContours, /*needs_refinement=*/false, EncodeContours},
-    {TileFormat::kImagery, /*needs_refinement=*/false, EncodeImagery},
-    {TileFormat::kGeodeticImagery, /*needs_refinement=*/false, EncodeGeodeticImagery},
+    {TileFormat::kQuantizedMesh, /*needs_refinement=*/true, MakeQuantizedMeshTile},
+    {TileFormat::kGlb, /*needs_refinement=*/true, MakeGlbTile},
+    {TileFormat::kHeightPng, /*needs_refinement=*/false, MakeHeightPngTile},
+    {TileFormat::kHillshade, /*needs_refinement=*/false, MakeHillshadeTile},
+    {TileFormat::kSlope, /*needs_refinement=*/false, MakeSlopeTile},
+    {TileFormat::kContours, /*needs_refinement=*/false, MakeContoursTile},
+    {TileFormat::kImagery, /*needs_refinement=*/false, MakeImageryTile},
+    {TileFormat::kGeodeticImagery, /*needs_refinement=*/false, MakeGeodeticImageryTile},
 };
 
-// The triangles in the bytes that EncodeQuantizedMesh and EncodeGlb make of the same input. Same errors.
+// The triangles in the bytes that MakeQuantizedMeshTile and MakeGlbTile make of the same input. Same errors.
 Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
 Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);
 

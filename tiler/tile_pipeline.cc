@@ -77,8 +77,8 @@ std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& req
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
-      return request.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
-                              : source.EditsHash(request.key);
+      return request.extensions.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
+                                         : source.EditsHash(request.key);
     case TileFormat::kImagery:
     case TileFormat::kGeodeticImagery:
       return 0;
@@ -231,11 +231,9 @@ MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& sur
     request.dataset = dataset;
     request.key = key;
     const int finest = of.source ? of.source->max_source_level() : of.baked->extent().max_source_level;
-    request.error_step = ErrorStep(surface.requested, key.level, key.level >= finest, of.error_fraction);
-    if (!of.source && !surface.requested.error_m && !surface.requested.fraction) {
-      const std::vector<int>& steps = of.baked->extent().error_steps;
-      if (key.level < static_cast<int>(steps.size())) request.error_step = steps[static_cast<std::size_t>(key.level)];
-    }
+    std::span<const int> default_steps;
+    if (!of.source) default_steps = of.baked->extent().error_steps;
+    request.error_step = ErrorStep(surface.requested, key.level, key.level >= finest, of.error_fraction, default_steps);
     request.format = surface.format;
     request.compression = surface.compression;
     return MeshOf(of, request, stop);

@@ -90,8 +90,9 @@ struct EncoderInput {
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
 // that compute results are virtual, so that tests can replace them.
 //
-// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another error, format or
-// coding of a kept tile costs a replay and an encoding. The bytes of a tile do not depend on the cache.
+// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another format, coding or
+// larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion. Formats without
+// a mesh do not use the cache. The bytes of a tile do not depend on it.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
@@ -103,7 +104,8 @@ class TilePipeline {
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
-  // Reads, refines, quantizes, measures, encodes and compresses one tile. All formats share the refinement.
+  // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
+  // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
   // kNotFound: no such dataset, a tile outside availability, or, in a dataset without sources, a tile that its archive
   // lacks. kUnavailable: the source cannot be read now. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;

@@ -70,9 +70,8 @@ std::vector<std::vector<geo::TileRange>> TilesWithData(const TileTree& tree) {
 
 std::vector<proto::TreeRoot> TreesOf(const TileTree& tree) {
   const std::vector<std::vector<geo::TileRange>> with_data = TilesWithData(tree);
-  // The bounds in the manifest of a damaged archive may touch no tile of a level.
-  const bool misses = std::ranges::any_of(with_data, [](const auto& level) { return level.empty(); });
-  return proto::ImplicitTrees(tree.available, proto::ImplicitRoots(misses ? tree.available : with_data));
+  // The bounds in the manifest of a damaged archive may touch no tile.
+  return proto::ImplicitTrees(tree.available, proto::ImplicitRoots(with_data[0].empty() ? tree.available : with_data));
 }
 
 std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>& roots,

@@ -112,7 +112,7 @@ LIBRARIES = [
     Library("libdeflate", r"libdeflate\.h", r"(proto/.*|fly/content/gunzip)\.cc"),
     Library("brotli", r"brotli/.*", r"proto/.*\.cc"),
     Library("zstd", r"zstd\.h", r"proto/.*\.cc"),
-    Library("zlib", r"zlib\.h", r"proto/(compress|library_versions)\.cc"),
+    Library("zlib", r"zlib\.h", r"proto/(compress|codec_versions)\.cc"),
     Library("Draco", r"draco/.*", r"(proto/.*|fly/content/glb)\.cc"),
     Library("libjpeg", r"jpeglib\.h", r"proto/.*\.cc"),
     Library("protozero", r"protozero/.*", r"proto/.*\.cc"),

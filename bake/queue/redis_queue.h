@@ -109,7 +109,7 @@ class RedisQueue : public UnitQueue {
   void Beat();
 
   const RedisQueueOptions options_;
-  std::unordered_map<std::string, std::size_t> index_;  // of units_
+  std::unordered_map<std::string, std::size_t> index_;  // of options_.units, by name
 
   std::mutex calls_;  // held while Redis is waited for; taken before mutex_
   std::unique_ptr<redis::Connection> connection_;

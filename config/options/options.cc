@@ -29,6 +29,15 @@ void SetFromText(const std::vector<Option<Target>>& table, std::string_view key,
   for (const ConfigError& error : found) errors.push_back({FlagOf(key), error.message});
 }
 
+template <typename Target>
+std::vector<std::string> ChangedOptions(const std::vector<Option<Target>>& table, const Target& a, const Target& b) {
+  std::vector<std::string> keys;
+  for (const Option<Target>& option : table) {
+    if (option.codec.write(a) != option.codec.write(b)) keys.emplace_back(option.key);
+  }
+  return keys;
+}
+
 }  // namespace
 
 std::string FlagOf(std::string_view key) {
@@ -49,11 +58,11 @@ bool NeedsRestart(std::string_view key) {
 }
 
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) {
-  std::vector<std::string> keys;
-  for (const Option<Config>& option : ServerOptionTable()) {
-    if (option.codec.write(a) != option.codec.write(b)) keys.emplace_back(option.key);
-  }
-  return keys;
+  return ChangedOptions(ServerOptionTable(), a, b);
+}
+
+std::vector<std::string> ChangedDatasetOptions(const DatasetConfig& a, const DatasetConfig& b) {
+  return ChangedOptions(DatasetOptionTable(), a, b);
 }
 
 void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,

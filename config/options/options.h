@@ -34,6 +34,8 @@ bool NeedsRestart(std::string_view key);
 
 // Returns the keys of options at the top level of the file whose values differ between two configurations.
 std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
+// The same for the options of two datasets.
+std::vector<std::string> ChangedDatasetOptions(const DatasetConfig& a, const DatasetConfig& b);
 
 // Sets the option `key` from the text of its flag. Appends errors to `errors`, with the flag as path. `directory`: as
 // for FromWorkingDirectory; empty: relative paths are errors. Precondition: the option exists and has a flag.

@@ -15,24 +15,6 @@
 
 namespace terrace::dem {
 
-// A box of samples of a raster grid, ends included. If the raster grid wraps, columns may exceed it by one turn.
-struct SampleBox {
-  std::int64_t west = 0, north = 0, east = -1, south = -1;
-
-  bool empty() const { return west > east || north > south; }
-  std::int64_t columns() const { return east - west + 1; }
-  std::int64_t rows() const { return south - north + 1; }
-  // The smallest box that contains both.
-  SampleBox Around(const SampleBox& other) const {
-    if (empty()) return other;
-    if (other.empty()) return *this;
-    return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
-            std::max(south, other.south)};
-  }
-
-  friend bool operator==(const SampleBox&, const SampleBox&) = default;
-};
-
 // Bounds are in metres. `known`: the bound that the tile has already, which smaller ones do not change. A bound of at
 // most `known` may be returned as any value from 0 to `known`.
 class CellErrorBound {

@@ -15,7 +15,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 // Measures columns `c` and beyond, as many as the tag has lanes. `kEast`: the number of columns to the east, up to 2.
 template <int kEast, class D>
 HWY_INLINE void MeasureColumns(D d, const float* samples, std::size_t stride, std::size_t rows, std::size_t c,
-                               ColumnDifferences& bends) {
+                               ColumnDifferences& differences) {
   using V = hn::Vec<D>;
   const auto raise = [&](V& largest, V value) HWY_ATTR {
     const V size = hn::Abs(value);
@@ -41,36 +41,37 @@ HWY_INLINE void MeasureColumns(D d, const float* samples, std::size_t stride, st
     here = below;
     north = south;
   }
-  hn::StoreU(x, d, &bends.x[c]);
-  hn::StoreU(y, d, &bends.y[c]);
-  hn::StoreU(xx, d, &bends.xx[c]);
-  hn::StoreU(yy, d, &bends.yy[c]);
-  hn::StoreU(xy, d, &bends.xy[c]);
-  hn::StoreU(sum, d, &bends.sum[c]);
+  hn::StoreU(x, d, &differences.x[c]);
+  hn::StoreU(y, d, &differences.y[c]);
+  hn::StoreU(xx, d, &differences.xx[c]);
+  hn::StoreU(yy, d, &differences.yy[c]);
+  hn::StoreU(xy, d, &differences.xy[c]);
+  hn::StoreU(sum, d, &differences.sum[c]);
 }
 
 // Measures all columns but the last two; returns false if they are fewer than the tag has lanes.
 template <class D>
 HWY_INLINE bool MeasureInner(D d, const float* samples, std::size_t stride, std::size_t rows,
-                             ColumnDifferences& bends) {
-  const std::size_t lanes = hn::Lanes(d), inner = bends.columns() < 2 ? 0 : bends.columns() - 2;
+                             ColumnDifferences& differences) {
+  const std::size_t lanes = hn::Lanes(d), inner = differences.columns() < 2 ? 0 : differences.columns() - 2;
   if (inner < lanes) return inner == 0;
-  for (std::size_t c = 0; c + lanes <= inner; c += lanes) MeasureColumns<2>(d, samples, stride, rows, c, bends);
+  for (std::size_t c = 0; c + lanes <= inner; c += lanes) MeasureColumns<2>(d, samples, stride, rows, c, differences);
   // Columns may be measured twice.
-  if (inner % lanes != 0) MeasureColumns<2>(d, samples, stride, rows, inner - lanes, bends);
+  if (inner % lanes != 0) MeasureColumns<2>(d, samples, stride, rows, inner - lanes, differences);
   return true;
 }
 
-void Measure(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends) {
+void Measure(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& differences) {
   const hn::CappedTag<float, 16> wide;
   const hn::CappedTag<float, 4> narrow;
   const hn::CappedTag<float, 1> single;
-  if (!MeasureInner(wide, samples, stride, rows, bends) && !MeasureInner(narrow, samples, stride, rows, bends)) {
-    MeasureInner(single, samples, stride, rows, bends);
+  if (!MeasureInner(wide, samples, stride, rows, differences) &&
+      !MeasureInner(narrow, samples, stride, rows, differences)) {
+    MeasureInner(single, samples, stride, rows, differences);
   }
-  const std::size_t columns = bends.columns();
-  if (columns > 1) MeasureColumns<1>(single, samples, stride, rows, columns - 2, bends);
-  MeasureColumns<0>(single, samples, stride, rows, columns - 1, bends);
+  const std::size_t columns = differences.columns();
+  if (columns > 1) MeasureColumns<1>(single, samples, stride, rows, columns - 2, differences);
+  MeasureColumns<0>(single, samples, stride, rows, columns - 1, differences);
 }
 
 }  // namespace
@@ -90,8 +91,8 @@ void ColumnDifferences::Resize(std::size_t columns) {
   for (std::vector<float>* of_column : {&x, &y, &xx, &yy, &xy, &sum}) of_column->resize(columns);
 }
 
-void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends) {
-  HWY_DYNAMIC_DISPATCH(Measure)(samples, stride, rows, bends);
+void MeasureDifferences(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& differences) {
+  HWY_DYNAMIC_DISPATCH(Measure)(samples, stride, rows, differences);
 }
 
 }  // namespace terrace::dem

@@ -19,7 +19,7 @@ struct ColumnDifferences {
   std::size_t columns() const { return sum.size(); }
 };
 
-// Measures `rows` rows of bends.columns() samples; the rows begin `stride` samples apart.
-void MeasureBends(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& bends);
+// Measures `rows` rows of differences.columns() samples; the rows begin `stride` samples apart.
+void MeasureDifferences(const float* samples, std::size_t stride, std::size_t rows, ColumnDifferences& differences);
 
 }  // namespace terrace::dem

@@ -107,7 +107,7 @@ float GridStatistics::ErrorOfAverages(double west, double north, double east, do
   int met = 0;
   float error = 0;
   ForMembersAt({west, north, east, south}, [&](const GridMember& member, const RasterStatistics* statistics) {
-    const geo::TileRange pixels = member.pixels();
+    const PixelRange pixels = member.pixels();
     if (east < static_cast<double>(pixels.start_x) || west > static_cast<double>(pixels.end_x + 1) ||
         south < static_cast<double>(pixels.start_y) || north > static_cast<double>(pixels.end_y + 1)) {
       return;

@@ -136,12 +136,12 @@ PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
   return bounds;
 }
 
-double SmoothErrorBound::Largest(const Bends& bends, const NodeSteps& steps) {
+double SmoothErrorBound::Largest(const Differences& differences, const NodeSteps& steps) {
   const auto along = [&](double x, double y) {
-    return ChordError(x) * bends.xx + ChordError(y) * bends.yy + x * y * bends.xy / 4;
+    return ChordError(x) * differences.xx + ChordError(y) * differences.yy + x * y * differences.xy / 4;
   };
-  return along(steps.east_x, steps.east_y) + along(steps.north_x, steps.north_y) + steps.bend_x * bends.x +
-         steps.bend_y * bends.y;
+  return along(steps.east_x, steps.east_y) + along(steps.north_x, steps.north_y) + steps.bend_x * differences.x +
+         steps.bend_y * differences.y;
 }
 
 // The largest difference between served heights and the raster grid's own, at the nodes of a box.
@@ -206,50 +206,51 @@ double SmoothErrorBound::BoundOver(const CellBox& box) {
   NodeSteps steps;
   PixelBounds at;
   if (!Measure(box, steps, at)) return kUnknown;
-  Bends bends;
-  const SampleRange range = RangeOf(at);
-  if (!Measure(range, bends)) return kUnknown;
-  return Largest(bends, steps) + geoid_.BoundOver(box) + LargestBlend(box) +
-         statistics_.AveragingError(static_cast<double>(range.left), static_cast<double>(range.top),
-                                    static_cast<double>(range.right), static_cast<double>(range.bottom));
+  Differences differences;
+  const SampleBox range = AveragesIn(at);
+  if (!Measure(range, differences)) return kUnknown;
+  return Largest(differences, steps) + geoid_.BoundOver(box) + LargestBlend(box) +
+         statistics_.AveragingError(static_cast<double>(range.west), static_cast<double>(range.north),
+                                    static_cast<double>(range.east), static_cast<double>(range.south));
 }
 
-SmoothErrorBound::SampleRange SmoothErrorBound::RangeOf(const PixelBounds& at) const {
+SampleBox SmoothErrorBound::AveragesIn(const PixelBounds& at) const {
   const auto first = [](double place) { return static_cast<std::int64_t>(std::floor(place)); };
   return {first(at.west), first(at.north), first(at.east) + 1, first(at.south) + 1};
 }
 
 // Beyond the outermost averages the surface is constant.
-SmoothErrorBound::SampleRange SmoothErrorBound::Clipped(SampleRange range) const {
+SampleBox SmoothErrorBound::Clipped(SampleBox range) const {
   const GridWindow& window = trace_.window;
-  return {std::max(range.left, window.column), std::max(range.top, window.row),
-          std::min(range.right, window.column + window.columns - 1),
-          std::min(range.bottom, window.row + window.rows - 1)};
+  return {std::max(range.west, window.column), std::max(range.north, window.row),
+          std::min(range.east, window.column + window.columns - 1),
+          std::min(range.south, window.row + window.rows - 1)};
 }
 
-bool SmoothErrorBound::Measure(const SampleRange& range, Bends& bends) {
-  const SampleRange in = Clipped(range);
+bool SmoothErrorBound::Measure(const SampleBox& range, Differences& differences) {
+  const SampleBox in = Clipped(range);
   if (in.empty()) return false;
-  const bool is_in_band = in.top == band_.top && in.bottom == band_.bottom;
+  const bool is_in_band = in.north == band_.top && in.south == band_.bottom;
   if (!is_in_band) MeasureColumns(in, box_);
   const ColumnDifferences& of_column = is_in_band ? band_ : box_;
-  const auto first = static_cast<std::size_t>(is_in_band ? in.left - trace_.window.column : 0);
-  const auto columns = static_cast<std::size_t>(in.right - in.left + 1);
+  const auto first = static_cast<std::size_t>(is_in_band ? in.west - trace_.window.column : 0);
+  const auto columns = static_cast<std::size_t>(in.east - in.west + 1);
   const auto largest = [&](const std::vector<float>& values, std::size_t count) {
     constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
     return dem::Largest(values.data() + first, count) * kUp;
   };
-  bends = {largest(of_column.x, columns - 1), largest(of_column.y, columns),
-           largest(of_column.xx, columns > 2 ? columns - 2 : 0), largest(of_column.yy, columns),
-           largest(of_column.xy, columns - 1)};
+  differences = {largest(of_column.x, columns - 1), largest(of_column.y, columns),
+                 largest(of_column.xx, columns > 2 ? columns - 2 : 0), largest(of_column.yy, columns),
+                 largest(of_column.xy, columns - 1)};
   return std::isfinite(Sum(of_column.sum.data() + first, columns));
 }
 
-void SmoothErrorBound::MeasureColumns(const SampleRange& range, ColumnDifferences& bends) const {
+void SmoothErrorBound::MeasureColumns(const SampleBox& range, ColumnDifferences& differences) const {
   const GridWindow& window = trace_.window;
-  bends.Resize(static_cast<std::size_t>(range.right - range.left + 1));
-  MeasureBends(trace_.samples.data() + (range.top - window.row) * window.columns + (range.left - window.column),
-               static_cast<std::size_t>(window.columns), static_cast<std::size_t>(range.bottom - range.top + 1), bends);
+  differences.Resize(static_cast<std::size_t>(range.east - range.west + 1));
+  MeasureDifferences(trace_.samples.data() + (range.north - window.row) * window.columns + (range.west - window.column),
+                     static_cast<std::size_t>(window.columns), static_cast<std::size_t>(range.south - range.north + 1),
+                     differences);
 }
 
 // All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
@@ -268,11 +269,11 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
   at.Add(0, y1);
   at.Grow(0, misplacement_.y);
   const GridWindow& window = trace_.window;
-  SampleRange range = RangeOf(at);
-  range.left = window.column, range.right = window.column + window.columns - 1;
+  SampleBox range = AveragesIn(at);
+  range.west = window.column, range.east = window.column + window.columns - 1;
   range = Clipped(range);
   if (range.empty()) return;
-  band_.top = range.top, band_.bottom = range.bottom;
+  band_.top = range.north, band_.bottom = range.south;
   MeasureColumns(range, band_);
 }
 

@@ -34,7 +34,7 @@ class SmoothErrorBound {
 
  private:
   // Largest first (x, y) and second (xx, yy, xy) differences of the samples in a box, in metres.
-  struct Bends {
+  struct Differences {
     double x = 0, y = 0, xx = 0, yy = 0, xy = 0;
   };
   void PlaceNodes(const RasterGrid& grid);
@@ -42,17 +42,12 @@ class SmoothErrorBound {
   bool MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   // Returns false if a node or a neighbour of one is not evenly spaced.
   bool Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
-  // Columns and rows of averages, ends included.
-  struct SampleRange {
-    std::int64_t left = 0, top = 0, right = -1, bottom = -1;
-    bool empty() const { return left > right || top > bottom; }
-  };
-  SampleRange RangeOf(const PixelBounds& at) const;
-  SampleRange Clipped(SampleRange range) const;
+  SampleBox AveragesIn(const PixelBounds& at) const;
+  SampleBox Clipped(SampleBox range) const;
   // Returns false if one of the averages is void, or none was read.
-  bool Measure(const SampleRange& range, Bends& bends);
-  void MeasureColumns(const SampleRange& range, ColumnDifferences& bends) const;
-  static double Largest(const Bends& bends, const NodeSteps& steps);
+  bool Measure(const SampleBox& range, Differences& differences);
+  void MeasureColumns(const SampleBox& range, ColumnDifferences& differences) const;
+  static double Largest(const Differences& differences, const NodeSteps& steps);
   double LargestBlend(const CellBox& box) const;
 
   const TileNodes tile_;

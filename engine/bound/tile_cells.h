@@ -41,6 +41,25 @@ struct PixelBounds {
   void Grow(double x, double y) { west -= x, east += x, north -= y, south += y; }
 };
 
+// A box of samples or averages of a raster grid, ends included. If the raster grid wraps, columns may exceed it by one
+// turn.
+struct SampleBox {
+  std::int64_t west = 0, north = 0, east = -1, south = -1;
+
+  bool empty() const { return west > east || north > south; }
+  std::int64_t columns() const { return east - west + 1; }
+  std::int64_t rows() const { return south - north + 1; }
+  // The smallest box that contains both.
+  SampleBox Around(const SampleBox& other) const {
+    if (empty()) return other;
+    if (other.empty()) return *this;
+    return {std::min(west, other.west), std::min(north, other.north), std::max(east, other.east),
+            std::max(south, other.south)};
+  }
+
+  friend bool operator==(const SampleBox&, const SampleBox&) = default;
+};
+
 // A tile's served samples with a halo of one. The members must outlive this object.
 struct TileNodes {
   const geo::Lattice& lattice;

@@ -20,7 +20,7 @@ std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b) {
   for (const double turn : {0.0, -360.0, 360.0}) {
     const double west = std::max(first.west, second.west + turn), east = std::min(first.east, second.east + turn);
     if (west >= east) continue;
-    common.push_back({west > 180 ? west - 360 : west, south, east > 180 ? east - 360 : east, north});
+    common.push_back({west >= 180 ? west - 360 : west, south, east > 180 ? east - 360 : east, north});
   }
   return common;
 }

@@ -84,7 +84,7 @@ void InitGdal() {
   std::call_once(once, InitOnce);
 }
 
-std::string LibraryVersions() {
+std::string GdalVersions() {
   return fmt::format("GDAL {}, PROJ {}", GDALVersionInfo("RELEASE_NAME"), proj_info().version);
 }
 

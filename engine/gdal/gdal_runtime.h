@@ -20,7 +20,7 @@ struct GdalCounts {
 GdalCounts ReadGdalCounts();
 
 // The versions in use: "GDAL 3.6.2, PROJ 9.1.1". Other versions may read or locate samples differently.
-std::string LibraryVersions();
+std::string GdalVersions();
 
 // Sets the size of GDAL's block cache, for all threads together.
 void SetGdalCache(std::size_t bytes);

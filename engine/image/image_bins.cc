@@ -85,12 +85,12 @@ Result<void> ImageBins::FillColumns(ImageFile& image, int first_col, int cols, c
   const int east = std::min((first_col + cols) * side_, image.width()),
             south = std::min((first_row_ + rows_) * side_, image.height());
   const int width = east - west, rows_at_once = std::clamp(kPixelsAtOnce / width, 1, south - north);
-  std::vector<ColorSample> pixels(Area(width, rows_at_once));
+  std::vector<Rgba> pixels(Area(width, rows_at_once));
   for (int row = north; row < south; row += rows_at_once) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: reading it was stopped", image.path());
     const int rows = std::min(rows_at_once, south - row);
     if (auto read = image.Read(west, row, width, rows, pixels.data()); !read) return read;
-    const ColorSample* pixel = pixels.data();
+    const Rgba* pixel = pixels.data();
     for (int y = row; y < row + rows; ++y) {
       Bin* const bins = bins_.data() + static_cast<std::ptrdiff_t>(y / side_ - first_row_) * cols_ + Column(first_col);
       for (int x = 0; x < width; ++x, ++pixel) {
@@ -104,7 +104,7 @@ Result<void> ImageBins::FillColumns(ImageFile& image, int first_col, int cols, c
   return {};
 }
 
-ColorSample ImageBins::At(Position position) const {
+Rgba ImageBins::At(Position position) const {
   if (std::isnan(position.x) || std::isnan(position.y)) return {};
   const Neighbors x = Around(position.x, side_, last_col_), y = Around(position.y, side_, last_row_);
   std::array<double, 3> sums{};

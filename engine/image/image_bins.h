@@ -26,7 +26,7 @@ class ImageBins {
 
   // Interpolates bilinearly between the averages of the nearest four squares that have a colour. Beyond the image's
   // edge the edge colour is used. Returns no colour if none of the squares has one, or for NaN.
-  ColorSample At(Position position) const;
+  Rgba At(Position position) const;
 
  private:
   struct Bin {

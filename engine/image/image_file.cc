@@ -76,7 +76,7 @@ void ImageFile::FindMasks() {
   }
 }
 
-Result<void> ImageFile::Read(int col, int row, int cols, int rows, ColorSample* out) {
+Result<void> ImageFile::Read(int col, int row, int cols, int rows, Rgba* out) {
   ForgetGdalError();
   const std::size_t pixels = Area(cols, rows);
   levels_.resize(pixels);
@@ -92,7 +92,7 @@ Result<void> ImageFile::Read(int col, int row, int cols, int rows, ColorSample* 
 }
 
 // Reads into levels_, then copies to the pixels.
-bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, ColorSample* out) {
+bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, Rgba* out) {
   GDALRasterBand& band = *bands_[static_cast<std::size_t>(i)];
   if (band.RasterIO(GF_Read, col, row, cols, rows, levels_.data(), cols, rows, GDT_UInt16, 0, 0, nullptr) != CE_None) {
     return false;
@@ -100,7 +100,7 @@ bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, ColorSampl
   if (!palette_.empty()) {
     for (std::size_t k = 0; k < levels_.size(); ++k) {
       const bool is_there = out[k][3] != 0 && levels_[k] < palette_.size();
-      out[k] = is_there ? palette_[levels_[k]] : ColorSample{};
+      out[k] = is_there ? palette_[levels_[k]] : Rgba{};
       if (out[k][3] != 0) out[k][3] = 255;
     }
     return true;
@@ -117,9 +117,9 @@ bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, ColorSampl
   return true;
 }
 
-bool ImageFile::ReadMasks(int col, int row, int cols, int rows, ColorSample* out) {
+bool ImageFile::ReadMasks(int col, int row, int cols, int rows, Rgba* out) {
   const std::uint8_t without_masks = masks_.empty() ? 255 : 0;
-  std::fill(out, out + levels_.size(), ColorSample{0, 0, 0, without_masks});
+  std::fill(out, out + levels_.size(), Rgba{0, 0, 0, without_masks});
   for (GDALRasterBand* const mask : masks_) {
     if (mask->RasterIO(GF_Read, col, row, cols, rows, levels_.data(), cols, rows, GDT_UInt16, 0, 0, nullptr) !=
         CE_None) {

@@ -26,7 +26,7 @@ class ImageFile {
   int height() const { return dataset_->GetRasterYSize(); }
 
   // Reads a window of the image, row by row, into `out`. kUnavailable: it cannot be read.
-  Result<void> Read(int col, int row, int cols, int rows, ColorSample* out);
+  Result<void> Read(int col, int row, int cols, int rows, Rgba* out);
 
  private:
   ImageFile(std::string path, GDALDatasetUniquePtr dataset) : path_(std::move(path)), dataset_(std::move(dataset)) {}
@@ -34,13 +34,13 @@ class ImageFile {
   Result<void> FindBands();
   Result<void> ReadPalette(const GDALColorTable& table);
   void FindMasks();
-  bool ReadBand(int i, int col, int row, int cols, int rows, ColorSample* out);
-  bool ReadMasks(int col, int row, int cols, int rows, ColorSample* out);
+  bool ReadBand(int i, int col, int row, int cols, int rows, Rgba* out);
+  bool ReadMasks(int col, int row, int cols, int rows, Rgba* out);
 
   std::string path_;
   GDALDatasetUniquePtr dataset_;
   std::array<GDALRasterBand*, 3> bands_{};  // three equal pointers: grey or palette
-  std::vector<ColorSample> palette_;        // by index; empty: no palette
+  std::vector<Rgba> palette_;               // by index; empty: no palette
   std::vector<GDALRasterBand*> masks_;      // a pixel is valid if one of them says so; empty: all are valid
   std::vector<std::uint16_t> levels_;       // of one band and window
 };

@@ -40,9 +40,9 @@ class Imagery::Impl {
 
   // The colours at positions in pixels of the full image, which are changed; empty if none of them lies in the image.
   // `what`: for error messages.
-  Result<std::vector<ColorSample>> ColorsAt(std::vector<Position>& positions, int factor, const std::string& what,
-                                            const std::stop_token& stop);
-  Result<std::vector<ColorSample>> ColorsOfCells(const geo::TileKey& key, int side, const std::stop_token& stop);
+  Result<std::vector<Rgba>> ColorsAt(std::vector<Position>& positions, int factor, const std::string& what,
+                                     const std::stop_token& stop);
+  Result<std::vector<Rgba>> ColorsOfCells(const geo::TileKey& key, int side, const std::stop_token& stop);
 
   ImagePool pool;
   const Georeference georeference;
@@ -86,15 +86,14 @@ int Imagery::SideOf(int level, int max_side) const {
 }
 
 // The colours of a tile's lattice cells, row by row from the south-western one; empty if the image shows none of them.
-Result<std::vector<ColorSample>> Imagery::Impl::ColorsOfCells(const geo::TileKey& key, int side,
-                                                              const std::stop_token& stop) {
+Result<std::vector<Rgba>> Imagery::Impl::ColorsOfCells(const geo::TileKey& key, int side, const std::stop_token& stop) {
   TERRACE_CHECK(geo::IsValid(key) && IsSide(side));
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   const geo::Lattice lattice{key.level, side};
   const double size = lattice.cells * lattice.StepDegrees();
   if (!footprint.Touches(lattice.Longitude(lattice.FirstColumn(key)), lattice.Latitude(lattice.FirstRow(key)), size,
                          size)) {
-    return std::vector<ColorSample>();
+    return std::vector<Rgba>();
   }
   const int factor = FactorOf(AveragingFactor(SamplesPerCell(lattice, spacing)));
   std::vector<Position> positions =
@@ -111,7 +110,7 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
   picture.rgb.resize(3 * colors->size());
   bool is_there = false;
   for (std::size_t i = 0; i < colors->size(); ++i) {
-    const ColorSample color = (*colors)[i];
+    const Rgba color = (*colors)[i];
     is_there = is_there || color[3] != 0;
     std::uint8_t* const out = picture.rgb.data() + 3 * ((pixels - 1 - i / pixels) * pixels + i % pixels);
     std::copy_n(color[3] != 0 ? color.data() : kNoPicture.data(), 3, out);
@@ -119,8 +118,8 @@ Result<std::optional<TilePicture>> Imagery::Read(const geo::TileKey& key, int si
   return is_there ? std::optional(std::move(picture)) : std::nullopt;
 }
 
-Result<std::vector<ColorSample>> Imagery::Impl::ColorsAt(std::vector<Position>& positions, int factor,
-                                                         const std::string& what, const std::stop_token& stop) {
+Result<std::vector<Rgba>> Imagery::Impl::ColorsAt(std::vector<Position>& positions, int factor, const std::string& what,
+                                                  const std::stop_token& stop) {
   if (auto unchanged = pool.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   auto image = pool.Borrow(factor);
   if (!image) return tl::unexpected(image.error());
@@ -130,7 +129,7 @@ Result<std::vector<ColorSample>> Imagery::Impl::ColorsAt(std::vector<Position>& 
     is_there = is_there || is_inside;
     p = is_inside ? Position{p.x / image->size->across, p.y / image->size->down} : Position{NAN, NAN};
   }
-  std::vector<ColorSample> colors;
+  std::vector<Rgba> colors;
   if (!is_there) return colors;
   const auto bins = ImageBins::Read(*image->image, factor / image->size->factor, positions, stop);
   if (!bins) return MakeError(bins.error().code, "{}: {}", what, bins.error().message);

@@ -11,12 +11,11 @@
 #include <vector>
 
 #include "engine/common/dem_types.h"
+#include "engine/core/color.h"
 #include "engine/core/result.h"
 #include "engine/sources/read_raster.h"
 
 namespace terrace::dem {
-
-using ColorSample = std::array<std::uint8_t, 4>;
 
 // Returns the colours at the samples of `dem`, which ReadRaster has read from `dem_path`, in the same order.
 // If both files have a georeference, samples are located by it, through PROJ if the reference systems differ, and the
@@ -24,13 +23,13 @@ using ColorSample = std::array<std::uint8_t, 4>;
 // x k whole pixels, as many as fit the spacing of samples in the middle of the DEM. Otherwise both files must have the
 // same size, and pixels map to samples one to one. kInvalidArgument, with the remedy: the sizes differ; the image has
 // no readable colour bands; it ends more than half a pixel before a sample that has a height.
-Result<std::vector<ColorSample>> ReadColors(const std::string& image_path, const std::string& dem_path,
-                                            const RasterHeights& dem, const std::function<void(double)>& progress = {});
+Result<std::vector<Rgba>> ReadColors(const std::string& image_path, const std::string& dem_path,
+                                     const RasterHeights& dem, const std::function<void(double)>& progress = {});
 
 // The pixels of an image in the order of the file, row 0 on top. Needs no georeference.
 struct RasterColors {
   int width = 0, height = 0;
-  std::vector<ColorSample> colors;
+  std::vector<Rgba> colors;
   bool georeferenced = false;
   std::array<double, 6> geo_transform{};  // GDAL's order, as in RasterHeights
 };

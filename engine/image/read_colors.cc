@@ -117,8 +117,8 @@ bool Covers(const ImageFile& image, const Position& p) {
 
 }  // namespace
 
-Result<std::vector<ColorSample>> ReadColors(const std::string& image_path, const std::string& dem_path,
-                                            const RasterHeights& dem, const std::function<void(double)>& progress) {
+Result<std::vector<Rgba>> ReadColors(const std::string& image_path, const std::string& dem_path,
+                                     const RasterHeights& dem, const std::function<void(double)>& progress) {
   auto image = ImageFile::Open(image_path);
   if (!image) return tl::unexpected(image.error());
   const auto dem_file = OpenRaster(dem_path);
@@ -127,7 +127,7 @@ Result<std::vector<ColorSample>> ReadColors(const std::string& image_path, const
   if (!placement) return tl::unexpected(placement.error());
 
   const int side = PixelsPerSample(*placement, dem);
-  std::vector<ColorSample> colors;
+  std::vector<Rgba> colors;
   colors.reserve(dem.heights.size());
   std::vector<Position> positions;
   for (int first = 0; first < dem.height; first += kRowsAtOnce) {
@@ -171,7 +171,7 @@ Result<RasterColors> ReadImage(const std::string& path, const std::function<void
   raster.colors.resize(Area(raster.width, raster.height));
   for (int row = 0; row < raster.height; row += kImageRowsAtOnce) {
     const int rows = std::min(kImageRowsAtOnce, raster.height - row);
-    ColorSample* const out = raster.colors.data() + Area(row, raster.width);
+    Rgba* const out = raster.colors.data() + Area(row, raster.width);
     if (auto read = image->Read(0, row, raster.width, rows, out); !read) return tl::unexpected(read.error());
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }

@@ -35,7 +35,7 @@ class Patchwork {
 
   // The part of a member in the window, if it can add anything there; else empty.
   GridWindow Wanted(const BlockSpan& columns, const BlockSpan& rows) const {
-    const geo::TileRange here = geo::Intersection(
+    const PixelRange here = geo::Intersection(
         {columns.first, rows.first, columns.end(), rows.end()},
         {window_.column, window_.row, window_.column + window_.columns - 1, window_.row + window_.rows - 1});
     for (std::int64_t y = here.start_y; y <= here.end_y; ++y) {

@@ -21,15 +21,15 @@ bool Holds(const Box& box, const Position& p) {
 
 }  // namespace
 
-Box BoxOf(const geo::TileRange& pixels) {
+Box BoxOf(const PixelRange& pixels) {
   return {static_cast<double>(pixels.start_x), static_cast<double>(pixels.start_y),
           static_cast<double>(pixels.end_x + 1), static_cast<double>(pixels.end_y + 1)};
 }
 
 GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) {
-  std::vector<geo::TileRange> ranges;
+  std::vector<PixelRange> ranges;
   for (const GridMember& member : members) {
-    const geo::TileRange pixels = member.pixels();
+    const PixelRange pixels = member.pixels();
     ranges.push_back(pixels);
     if (turn > 0 && pixels.end_x >= turn) {
       ranges.push_back({0, pixels.start_y, std::min(pixels.end_x, 2 * turn - 1) - turn, pixels.end_y});
@@ -41,7 +41,7 @@ GridCover::GridCover(const std::vector<GridMember>& members, std::int64_t turn) 
   index_ = BoxIndex(entries);
 }
 
-bool GridCover::Covers(const geo::TileRange& pixels) const {
+bool GridCover::Covers(const PixelRange& pixels) const {
   std::int64_t covered = 0;
   for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Intersection(boxes_[i], pixels));
   return covered == geo::Cells(pixels);

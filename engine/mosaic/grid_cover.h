@@ -13,7 +13,7 @@
 namespace terrace::dem {
 
 // Converts a range of pixels to a box, ends included.
-Box BoxOf(const geo::TileRange& pixels);
+Box BoxOf(const PixelRange& pixels);
 
 // Immutable and thread-safe. Positions within 10^-6 pixels of a raster count as inside it.
 class GridCover {
@@ -31,12 +31,12 @@ class GridCover {
 
   // Whether the rasters cover all of these pixels. Precondition: the range is not empty and lies inside the raster
   // grid.
-  bool Covers(const geo::TileRange& pixels) const;
+  bool Covers(const PixelRange& pixels) const;
 
  private:
   std::vector<std::uint8_t> InsideOfAxes(const NodePositions& positions) const;
 
-  std::vector<geo::TileRange> boxes_;  // without overlap
+  std::vector<PixelRange> boxes_;  // without overlap
   BoxIndex index_;
 };
 

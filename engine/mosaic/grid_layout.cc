@@ -156,7 +156,7 @@ struct Member {
   const Georeference* where = nullptr;
   std::int64_t column = 0, row = 0;
 
-  geo::TileRange pixels() const { return {column, row, column + where->width() - 1, row + where->height() - 1}; }
+  PixelRange pixels() const { return {column, row, column + where->width() - 1, row + where->height() - 1}; }
 };
 
 std::vector<std::vector<Member>> GridsOf(std::span<const PlacedRaster> rasters, std::size_t& pairs) {
@@ -177,12 +177,12 @@ std::int64_t TurnOf(const Georeference& where) {
   return where.period() > 0 && std::abs(where.period() - whole) < 0.01 ? static_cast<std::int64_t>(whole) : 0;
 }
 
-bool Touch(const geo::TileRange& a, const geo::TileRange& b) {
+bool Touch(const PixelRange& a, const PixelRange& b) {
   return !geo::IsEmpty(geo::Intersection({a.start_x - 1, a.start_y - 1, a.end_x + 1, a.end_y + 1}, b));
 }
 
 // Returns the member's column, moved by whole turns, at which it touches `pixels`; nothing if there is none.
-std::optional<std::int64_t> ColumnBeside(const geo::TileRange& pixels, Member member, std::int64_t turn) {
+std::optional<std::int64_t> ColumnBeside(const PixelRange& pixels, Member member, std::int64_t turn) {
   const std::int64_t canonical = member.column;
   const auto nearest =
       turn == 0 ? 0 : std::llround(static_cast<double>(pixels.start_x - canonical) / static_cast<double>(turn));
@@ -200,7 +200,7 @@ class Ungrouped {
   Ungrouped(const std::vector<Member>& members, std::int64_t turn) : turn_(turn), index_(EntriesOf(members)) {}
 
   // Returns all members that touch `pixels`, and perhaps others, ascending. The grid may repeat itself.
-  std::vector<std::size_t> Near(const geo::TileRange& pixels) const {
+  std::vector<std::size_t> Near(const PixelRange& pixels) const {
     return index_.Find(BoxOf(Canonical({pixels.start_x - 1, pixels.start_y - 1, pixels.end_x + 1, pixels.end_y + 1})));
   }
 
@@ -210,13 +210,13 @@ class Ungrouped {
   }
 
  private:
-  static Box BoxOf(const geo::TileRange& pixels) {
+  static Box BoxOf(const PixelRange& pixels) {
     const auto at = [](std::int64_t pixel) { return static_cast<double>(pixel); };
     return {at(pixels.start_x), at(pixels.start_y), at(pixels.end_x), at(pixels.end_y)};
   }
 
   // Within the first turn; all columns for a grid that spans the whole Earth or nearly so.
-  geo::TileRange Canonical(geo::TileRange pixels) const {
+  PixelRange Canonical(PixelRange pixels) const {
     if (turn_ == 0) return pixels;
     const std::int64_t columns = pixels.end_x - pixels.start_x;
     pixels.start_x = columns + 2 >= turn_ ? -2 * turn_ : FloorMod(pixels.start_x, turn_);
@@ -226,7 +226,7 @@ class Ungrouped {
 
   std::vector<BoxIndex::Entry> EntriesOf(const Member& member, std::size_t number) const {
     std::vector<BoxIndex::Entry> entries;
-    const geo::TileRange pixels = Canonical(member.pixels());
+    const PixelRange pixels = Canonical(member.pixels());
     for (const std::int64_t turns : {0, -1, 1}) {
       entries.push_back(
           {BoxOf({pixels.start_x + turns * turn_, pixels.start_y, pixels.end_x + turns * turn_, pixels.end_y}),
@@ -258,7 +258,7 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
     ungrouped.Remove(members[first], first);
     std::vector<std::size_t>& group = groups.emplace_back(std::vector{first});
     for (std::size_t done = 0; done < group.size(); ++done) {
-      const geo::TileRange pixels = members[group[done]].pixels();
+      const PixelRange pixels = members[group[done]].pixels();
       for (const std::size_t i : ungrouped.Near(pixels)) {
         ++pairs;
         const auto column = ColumnBeside(pixels, members[i], turn);
@@ -277,7 +277,7 @@ std::vector<std::vector<std::size_t>> GroupsOf(std::vector<Member>& members, std
 // Moves the origin of pixels to the north-western corner of all; for a group around the whole Earth, to the westernmost
 // raster.
 GridLayout LayoutOf(const std::vector<Member>& members, std::int64_t turn) {
-  geo::TileRange hull = members.front().pixels();
+  PixelRange hull = members.front().pixels();
   for (const Member& member : members) hull = geo::BoundingRange(hull, member.pixels());
   const bool around = turn > 0 && hull.end_x - hull.start_x + 1 >= turn && members.size() > 1;
   if (around) {

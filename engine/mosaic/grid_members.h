@@ -14,13 +14,16 @@
 
 namespace terrace::dem {
 
+// An inclusive block of pixels of a raster grid: x is the column, y the row from the north.
+using PixelRange = geo::TileRange;
+
 struct GridMember {
   std::shared_ptr<const RasterSource> raster;
   std::int64_t column = 0, row = 0;  // of its first pixel in the raster grid
   // The largest offset of its samples from the raster grid on each axis, in pixels. Set by the raster grid.
   Position misplacement = {0, 0};
 
-  geo::TileRange pixels() const {  // y is the row, downwards
+  PixelRange pixels() const {
     return {column, row, column + raster->layout().width - 1, row + raster->layout().height - 1};
   }
 };

@@ -107,8 +107,8 @@ BlockRange RasterGrid::RangesInTurn(const Box& pixels) const {
   const auto pixel = [](double position, int count) {
     return static_cast<std::int64_t>(std::clamp(std::floor(position), 0.0, count - 1.0));
   };
-  const geo::TileRange wanted{pixel(pixels.min_x, width_), pixel(pixels.min_y, height_), pixel(pixels.max_x, width_),
-                              pixel(pixels.max_y, height_)};
+  const PixelRange wanted{pixel(pixels.min_x, width_), pixel(pixels.min_y, height_), pixel(pixels.max_x, width_),
+                          pixel(pixels.max_y, height_)};
   range.has_voids |= !cover_.Covers(wanted);
   return range;
 }

@@ -41,13 +41,13 @@ struct Placed {
 
 // Members that intersect a box of pixels, in order.
 std::vector<Placed> PlacedIn(const std::vector<GridMember>& members, const BoxIndex& index, std::int64_t turn,
-                             const geo::TileRange& box) {
+                             const PixelRange& box) {
   std::vector<Placed> placed;
   const Box pixels{static_cast<double>(box.start_x), static_cast<double>(box.start_y), static_cast<double>(box.end_x),
                    static_cast<double>(box.end_y)};
   for (const std::size_t i : index.Find(pixels)) {
     for (const std::int64_t shift : {std::int64_t{0}, -turn, turn}) {
-      geo::TileRange at = members[i].pixels();
+      PixelRange at = members[i].pixels();
       at.start_x += shift, at.end_x += shift;
       if (!geo::IsEmpty(geo::Intersection(at, box))) placed.push_back({&members[i], i, members[i].column + shift});
       if (turn == 0) break;
@@ -169,11 +169,11 @@ GridVoids::GridVoids(const std::vector<GridMember>& members, const BoxIndex& ind
       hole_regions_[i].push_back(joints.IsHole(i, region) ? 1 : 0);
     }
     if (std::ranges::none_of(hole_regions_[i], [](std::uint8_t is_hole) { return is_hole != 0; })) continue;
-    geo::TileRange around{1, 1, 0, 0};
+    PixelRange around{1, 1, 0, 0};
     for (const RimVoids::Run& run : voids.Runs()) {
       if (hole_regions_[i][run.region] == 0) continue;
       const std::int64_t x = members[i].column, y = members[i].row + run.row;
-      const geo::TileRange pixels{x + run.first, y, x + run.last, y};
+      const PixelRange pixels{x + run.first, y, x + run.last, y};
       around = geo::IsEmpty(around) ? pixels : geo::BoundingRange(around, pixels);
     }
     shared_.push_back(around);
@@ -234,7 +234,7 @@ std::vector<std::uint8_t> GridVoids::HolesIn(const std::vector<GridMember>& memb
 }
 
 bool GridVoids::SharesHole(const Box& pixels) const {
-  return std::ranges::any_of(shared_, [&](const geo::TileRange& range) {
+  return std::ranges::any_of(shared_, [&](const PixelRange& range) {
     const auto meets = [&](double shift) {
       return pixels.max_x + shift >= static_cast<double>(range.start_x) &&
              pixels.min_x + shift <= static_cast<double>(range.end_x + 1) &&

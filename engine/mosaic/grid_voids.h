@@ -45,7 +45,7 @@ class GridVoids {
   std::int64_t turn_ = 0;
   std::size_t examinations_ = 0;
   std::vector<std::vector<std::uint8_t>> hole_regions_;  // by member and region of its RimVoids: 1 if part of a hole
-  std::vector<geo::TileRange> shared_;                   // boxes of pixels around them
+  std::vector<PixelRange> shared_;                       // boxes of pixels around them
 };
 
 }  // namespace terrace::dem

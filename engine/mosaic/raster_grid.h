@@ -80,7 +80,7 @@ class RasterGrid {
   static Result<RasterGrid> Make(GridPlan plan, const GridOptions& options);
 
   const std::vector<GridMember>& members() const { return members_; }
-  // Returns the indices of the members that meet a box of pixels, ascending. Box::south is its first row.
+  // Returns the indices of the members that meet a box of pixels, ascending. Box::min_y is its first row.
   std::vector<std::size_t> MembersAt(const Box& pixels) const { return member_index_.Find(pixels); }
   const Georeference& georeference() const { return georeference_; }
   // Size in pixels. A raster grid that spans 360 degrees counts duplicated columns once.

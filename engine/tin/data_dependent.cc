@@ -134,8 +134,8 @@ Star& DataDependentCriterion::OutlineByShape(const Triangulation::Vertex& vertex
             if (options_.measure != FitMeasure::kNormals) [[likely]]
               return is_absorbed;
             if (!std::exchange(is_suspect, false)) return is_absorbed;
-            const Bends bends = BendsOf(q);
-            return IsBetterAlongPw(bends.uv, bends.pw, quality);
+            const NormalAngles angles = NormalAnglesOf(q);
+            return IsBetterAlongPw(angles.uv, angles.pw, quality);
           },
       [&](std::size_t edge) __attribute__((always_inline)) {
         suspect->edge = static_cast<std::uint32_t>(edge);

@@ -114,6 +114,7 @@ void SplitTallTrees(Availability available, std::vector<TreeRoot>& trees) {
 std::vector<geo::TileKey> ImplicitRoots(Availability available) {
   TERRACE_CHECK(!available.empty() && !available[0].empty());
   auto level = static_cast<int>(available.size()) - 1;
+  while (available[static_cast<std::size_t>(level)].empty()) --level;
   while (level > kShallowestRoots && !CanBeRoots(available, level)) --level;
   std::vector<geo::TileKey> roots = TilesOf(available, level);
   std::sort(roots.begin(), roots.end(),

@@ -26,7 +26,7 @@ inline constexpr int kShallowestRoots = 2;
 
 // Returns all tiles of one level, from west to east, then from south to north. It is the deepest level with at most
 // kMaxImplicitRoots tiles that together contain all deeper tiles; but at least kShallowestRoots, and at most the
-// deepest level. Precondition: level 0 is not empty.
+// deepest level with tiles. Precondition: level 0 is not empty.
 std::vector<geo::TileKey> ImplicitRoots(Availability available);
 
 // The number of levels from the root to the deepest available tile below it, both included. In a mosaic, trees over

@@ -309,7 +309,7 @@ Result<GlbTile> EncodeArrays(const GridMesh& mesh, const GlbOptions& options) {
 }
 
 GridMesh Reordered(const GridMesh& mesh) {
-  MeshoptOrder order = OrderForMeshopt(mesh.triangles, mesh.positions.size());
+  VertexOrder order = OrderForMeshopt(mesh.triangles, mesh.positions.size());
   GridMesh reordered{mesh.step_m, mesh.origin, {}, {}, std::move(order.triangles), mesh.cells, {}};
   reordered.positions.reserve(order.old_index.size());
   reordered.normals.reserve(order.old_index.size());

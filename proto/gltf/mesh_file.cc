@@ -62,7 +62,7 @@ void Write(std::ostream& out, const std::string& bytes) {
 }
 
 void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
-              const std::vector<VertexColor>& colors, StopPoll poll) {
+              const std::vector<Rgb>& colors, StopPoll poll) {
   BufferedText text(out);
   text.Append("# terrace: {} vertices, {} triangles\n", vertices.size(), triangles.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -81,7 +81,7 @@ void WriteObj(std::ostream& out, const std::vector<MeshVertex>& vertices, const 
 }
 
 void WritePly(std::ostream& out, const std::vector<MeshVertex>& vertices, const std::vector<Triangle>& triangles,
-              const std::vector<VertexColor>& colors, StopPoll poll) {
+              const std::vector<Rgb>& colors, StopPoll poll) {
   const std::string_view color_properties =
       colors.empty() ? "" : "property uchar red\nproperty uchar green\nproperty uchar blue\n";
   Write(out, fmt::format("ply\nformat binary_little_endian 1.0\ncomment terrace\nelement vertex {}\nproperty double x\n"
@@ -232,7 +232,7 @@ std::array<std::uint16_t, 256> LinearLevels() {
 
 // Returns an empty text if a stop was requested.
 std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors, StopPoll poll) {
+                      const std::vector<Triangle>& triangles, const std::vector<Rgb>& colors, StopPoll poll) {
   ByteWriter buffer;
   buffer.Reserve(layout.buffer_bytes());
   for (const MeshVertex& vertex : vertices) {
@@ -252,7 +252,7 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
   }
   buffer.PadTo(4);
   const std::array<std::uint16_t, 256> linear = LinearLevels();
-  for (const VertexColor& color : colors) {
+  for (const Rgb& color : colors) {
     for (const std::uint8_t level : color) buffer.Put(linear[level]);
     buffer.Put(std::uint16_t{0});
   }
@@ -260,7 +260,7 @@ std::string GlbBuffer(const GlbLayout& layout, const std::vector<MeshVertex>& ve
 }
 
 Result<void> WriteGlb(std::ostream& out, const std::vector<MeshVertex>& vertices,
-                      const std::vector<Triangle>& triangles, const std::vector<VertexColor>& colors,
+                      const std::vector<Triangle>& triangles, const std::vector<Rgb>& colors,
                       const std::optional<NodeMatrix>& matrix, StopPoll poll) {
   const GlbLayout layout = MakeGlbLayout(vertices, 3 * triangles.size(), !colors.empty(), matrix);
   const std::string head = GlbHead(GltfJson(GltfOf(layout)), layout.buffer_bytes());
@@ -311,9 +311,8 @@ Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name) {
 }
 
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
-                       const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                       const std::vector<VertexColor>& colors, const std::optional<GridPlacement>& placement,
-                       const std::stop_token& stop) {
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Rgb>& colors,
+                       const std::optional<GridPlacement>& placement, const std::stop_token& stop) {
   TERRACE_CHECK(colors.empty() || colors.size() == vertices.size());
   std::optional<NodeMatrix> matrix;
   if (placement && format == MeshFileFormat::kGlb && IsNodeMatrix(*placement)) {

@@ -20,6 +20,7 @@
 #include <string_view>
 #include <vector>
 
+#include "engine/core/color.h"
 #include "engine/core/result.h"
 
 namespace terrace::proto {
@@ -37,9 +38,6 @@ struct MeshVertex {
 // y = t[3] + column t[4] + row t[5].
 using GridPlacement = std::array<double, 6>;
 
-// Red, green, blue in sRGB.
-using VertexColor = std::array<std::uint8_t, 3>;
-
 // Appends the whole file to `out`, which must be in binary mode. With `placement`, x and y of the vertices are columns
 // and rows, and x, y and z are representable as 32-bit floats: a GLB stores them exactly, unless the raster is sheared,
 // which glTF nodes cannot express. kInvalidArgument: the mesh has no triangles, a coordinate is not finite, or the mesh
@@ -47,8 +45,7 @@ using VertexColor = std::array<std::uint8_t, 3>;
 // kCancelled: a stop was requested; part of the file may be written. Preconditions: every index is below
 // vertices.size(); `colors` is empty or has one entry per vertex.
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
-                       const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                       const std::vector<VertexColor>& colors = {},
+                       const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Rgb>& colors = {},
                        const std::optional<GridPlacement>& placement = std::nullopt, const std::stop_token& stop = {});
 
 }  // namespace terrace::proto

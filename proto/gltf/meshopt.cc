@@ -19,13 +19,13 @@ unsigned char* Bytes(std::string& text) { return reinterpret_cast<unsigned char*
 
 }  // namespace
 
-MeshoptOrder OrderForMeshopt(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
+VertexOrder OrderForMeshopt(const std::vector<Triangle>& triangles, std::size_t vertex_count) {
   TERRACE_CHECK(!triangles.empty());
   std::vector<Triangle> cached(triangles.size());
   meshopt_optimizeVertexCacheStrip(cached.front().data(), Indices(triangles), 3 * triangles.size(), vertex_count);
   VertexOrder order = OrderByFirstUse(cached, vertex_count);
   TERRACE_CHECK(order.old_index.size() == vertex_count);
-  return {std::move(order.old_index), std::move(order.triangles)};
+  return order;
 }
 
 std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, std::size_t stride) {

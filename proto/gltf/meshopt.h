@@ -8,15 +8,13 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/mesh/vertex_order.h"
+
 namespace terrace::proto {
 
 // Numbers the vertices in an order that suits the index codec: triangles next to each other share vertices, and
 // vertices stand in the order of their first use. Precondition: every vertex is used.
-struct MeshoptOrder {
-  std::vector<std::uint32_t> old_index;  // by new number
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-};
-MeshoptOrder OrderForMeshopt(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::size_t vertex_count);
+VertexOrder OrderForMeshopt(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::size_t vertex_count);
 
 // Mode ATTRIBUTES: `count` records of `stride` bytes, a multiple of 4 up to 256.
 std::string EncodeMeshoptVertices(std::string_view records, std::size_t count, std::size_t stride);

@@ -21,13 +21,13 @@ constexpr std::uint8_t kOctVertexNormals = 1, kWaterMask = 2, kMetadata = 4;  //
 // format never needs padding here.
 static_assert(kMaxTileVertices <= 65536);
 
-void CheckPreconditions(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
+void CheckPreconditions(const QuantizedTile& tile, const TileExtensions& extensions) {
   const std::size_t count = tile.u.size();
   TERRACE_CHECK(tile.v.size() == count && tile.h.size() == count && count <= kMaxTileVertices);
-  TERRACE_CHECK(!options.normals || tile.normals.size() == count);
+  TERRACE_CHECK(!extensions.normals || tile.normals.size() == count);
   constexpr std::size_t kWaterPixels = std::size_t{kWaterMaskSide} * kWaterMaskSide;
-  TERRACE_CHECK(!options.water_mask || tile.water_mask.size() == 1 || tile.water_mask.size() == kWaterPixels);
-  TERRACE_CHECK(!options.metadata || !tile.metadata.empty());
+  TERRACE_CHECK(!extensions.water_mask || tile.water_mask.size() == 1 || tile.water_mask.size() == kWaterPixels);
+  TERRACE_CHECK(!extensions.metadata || !tile.metadata.empty());
   TERRACE_CHECK(tile.triangles.size() >= 2);
   TERRACE_CHECK(geo::IsValid(tile.key));
   const auto fits = [](std::uint16_t value) { return value <= kQuantizedMax; };
@@ -130,13 +130,13 @@ void PutMetadata(ByteWriter& out, const std::string& json) {
 
 }  // namespace
 
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options) {
-  return EncodeQuantizedMesh(tile, options, DecodePositions(tile));
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions) {
+  return EncodeQuantizedMesh(tile, extensions, DecodePositions(tile));
 }
 
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options,
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions,
                                 const std::vector<geo::Vec3>& positions) {
-  CheckPreconditions(tile, options);
+  CheckPreconditions(tile, extensions);
   TERRACE_CHECK(positions.size() == tile.u.size());
   VertexOrder order = OrderByFirstUse(tile.triangles, tile.u.size());
   QuantizedTile ordered;
@@ -147,7 +147,7 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
   ordered.v = Reordered(tile.v, order.old_index);
   ordered.h = Reordered(tile.h, order.old_index);
   ordered.triangles = std::move(order.triangles);
-  if (options.normals) ordered.normals = Reordered(tile.normals, order.old_index);
+  if (extensions.normals) ordered.normals = Reordered(tile.normals, order.old_index);
 
   ByteWriter out;
   out.Reserve(kHeaderBytes + 64 + 9 * ordered.u.size() + 6 * ordered.triangles.size());
@@ -161,9 +161,9 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOp
   PutEdge(out, ordered.v, 0, ordered.u);              // south
   PutEdge(out, ordered.u, kQuantizedMax, ordered.v);  // east
   PutEdge(out, ordered.v, kQuantizedMax, ordered.u);  // north
-  if (options.normals) PutNormals(out, ordered.normals);
-  if (options.water_mask) PutWaterMask(out, tile.water_mask);
-  if (options.metadata) PutMetadata(out, tile.metadata);
+  if (extensions.normals) PutNormals(out, ordered.normals);
+  if (extensions.water_mask) PutWaterMask(out, tile.water_mask);
+  if (extensions.metadata) PutMetadata(out, tile.metadata);
   return out.Take();
 }
 
@@ -203,7 +203,7 @@ std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const g
   return tile;
 }
 
-std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options) {
+std::optional<std::string> KeepExtensions(std::string_view encoded, const TileExtensions& extensions) {
   ByteReader in(encoded);
   const auto skip_shorts = [&](std::size_t per_element) {
     const std::size_t count = in.Get<std::uint32_t>();
@@ -217,20 +217,21 @@ std::optional<std::string> KeepExtensions(std::string_view encoded, const Quanti
 
   const auto at = [&] { return encoded.size() - in.remaining(); };
   std::string kept(encoded.substr(0, at()));
-  QuantizedMeshOptions found;
+  TileExtensions found;
   while (in.remaining() > 0) {
     const std::size_t start = at();
     const auto id = in.Get<std::uint8_t>();
     in.GetBytes(in.Get<std::uint32_t>());
-    const bool normals = id == kOctVertexNormals && options.normals,
-               water_mask = id == kWaterMask && options.water_mask, metadata = id == kMetadata && options.metadata;
+    const bool normals = id == kOctVertexNormals && extensions.normals,
+               water_mask = id == kWaterMask && extensions.water_mask,
+               metadata = id == kMetadata && extensions.metadata;
     if (!in.ok() || !(normals || water_mask || metadata)) continue;
     kept.append(encoded.substr(start, at() - start));
     found.normals |= normals;
     found.water_mask |= water_mask;
     found.metadata |= metadata;
   }
-  if (!in.ok() || found != options) return std::nullopt;
+  if (!in.ok() || found != extensions) return std::nullopt;
   return kept;
 }
 

@@ -10,6 +10,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/tile_key.h"
+#include "proto/media_type.h"
 #include "proto/mesh/water_mask.h"
 
 namespace terrace::proto {
@@ -32,29 +33,21 @@ struct QuantizedTile {
   std::string metadata;  // JSON (tile_metadata.h)
 };
 
-struct QuantizedMeshOptions {
-  bool normals = false;     // extension 1, octvertexnormals
-  bool water_mask = false;  // extension 2, watermask
-  bool metadata = false;    // extension 4, metadata
-
-  friend bool operator==(const QuantizedMeshOptions&, const QuantizedMeshOptions&) = default;
-};
-
 // Renumbers the vertices in order of first use, as high-water-mark coding requires, and lists the edges. Computes
 // centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
-// at most kMaxTileVertices vertices, all four edges complete; the tile has the extensions that the options name.
+// at most kMaxTileVertices vertices, all four edges complete; the tile has the `extensions`.
 //
 // `positions`: of the tile's vertices, DecodePositions (tile_geometry.h).
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options,
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions,
                                 const std::vector<geo::Vec3>& positions);
-std::string EncodeQuantizedMesh(const QuantizedTile& tile, const QuantizedMeshOptions& options);
+std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions);
 
 // Decodes the mesh of a tile, without extensions. Nothing: `encoded` is not a complete quantized-mesh tile. Keeps
 // vertices without a triangle, and degenerate triangles of one point.
 std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const geo::TileKey& key);
 
-// Removes the extensions that `options` does not name. The result is what EncodeQuantizedMesh returns for these
-// options. Nothing: `encoded` was not written by EncodeQuantizedMesh, or lacks an extension that the options name.
-std::optional<std::string> KeepExtensions(std::string_view encoded, const QuantizedMeshOptions& options);
+// Removes the extensions that `extensions` does not name. The result is what EncodeQuantizedMesh returns for these
+// extensions. Nothing: `encoded` was not written by EncodeQuantizedMesh, or lacks an extension of `extensions`.
+std::optional<std::string> KeepExtensions(std::string_view encoded, const TileExtensions& extensions);
 
 }  // namespace terrace::proto

@@ -43,10 +43,10 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
   tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
-  tile.normals = wanted.octvertexnormals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
-  tile.water_mask = wanted.watermask && dataset.has_water;
-  tile.metadata = wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels,
-                                                            dataset.max_source_level(), dataset.available);
+  tile.extensions.normals = wanted.normals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
+  tile.extensions.water_mask = wanted.water_mask && dataset.has_water;
+  tile.extensions.metadata = wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels,
+                                                                       dataset.max_source_level(), dataset.available);
   return {};
 }
 
@@ -80,9 +80,7 @@ Result<void> ReadHeightPng(std::string_view query, const RequestFields&, const D
   return {};
 }
 
-std::string_view QuantizedMeshType(const TileRequest& tile) {
-  return proto::QuantizedMeshContentType({tile.normals, tile.water_mask, tile.metadata});
-}
+std::string_view QuantizedMeshType(const TileRequest& tile) { return proto::QuantizedMeshContentType(tile.extensions); }
 std::string_view GlbType(const TileRequest&) { return "model/gltf-binary"; }
 std::string_view PngType(const TileRequest&) { return "image/png"; }
 
@@ -184,11 +182,9 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 }
 
 int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset) {
-  if (!requested.error_m && !requested.fraction && dataset.baked_alone) {
-    const std::vector<int>& steps = dataset.baked_alone->extent().error_steps;
-    return level < static_cast<int>(steps.size()) ? steps[static_cast<std::size_t>(level)] : 0;
-  }
-  return ErrorStep(requested, level, level >= dataset.max_source_level(), dataset.error_fraction);
+  std::span<const int> default_steps;
+  if (dataset.baked_alone) default_steps = dataset.baked_alone->extent().error_steps;
+  return ErrorStep(requested, level, level >= dataset.max_source_level(), dataset.error_fraction, default_steps);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {

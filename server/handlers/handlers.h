@@ -86,8 +86,8 @@ struct Handlers {
   const DocumentMaker documents;
 };
 
-// GET /{dataset}/{z}/{x}/{y}.terrain, .glb and .png. Replies that need no build (refusals and cached tiles) are
-// returned at once. Precondition: the route has a format.
+// GET of all tiles: terrain, GLB, height images and tiles for maps (server/api/tile_formats.h). Replies that need no
+// build (refusals and cached tiles) are returned at once. Precondition: the route has a format.
 Answer AnswerTile(const Handlers& handlers, const RequestContext& context);
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times);
@@ -106,8 +106,8 @@ struct CertifiedPoints {
 
 // Returns the deepest available tile of each point, down to level `deepest`. kInvalidArgument, with a message for the
 // client: more than kMaxCertifiedTiles. kCancelled: a stop was requested.
-Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
-                                const std::stop_token& stop = {});
+Result<CertifiedPoints> CertifyingTilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points,
+                                          int deepest, const std::stop_token& stop = {});
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, the format of Open Topo Data. Points of
 // a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. Orthometric

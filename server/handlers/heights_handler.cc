@@ -26,8 +26,6 @@
 namespace terrace::server {
 namespace {
 
-using tiler::TileAt;
-
 // Thousands of points, and geodesics between them, take a tenth of a second, which would block the io thread. A query
 // of at most this many bytes has a few points and is parsed in microseconds.
 constexpr std::size_t kQuickQuery = 256;
@@ -52,7 +50,7 @@ asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& handlers, std::
   // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
   Work<CertifiedPoints> find = [catalog = handlers.catalog, dataset, wanted = query.points,
                                 level = *query.certify_level](const std::stop_token& stop) {
-    return TilesOf(catalog->datasets[dataset], wanted, level, stop);
+    return CertifyingTilesOf(catalog->datasets[dataset], wanted, level, stop);
   };
   Result<CertifiedPoints> points =
       co_await handlers.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
@@ -196,14 +194,13 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
   return json + "],\"status\":\"OK\"}";
 }
 
-Result<CertifiedPoints> TilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points, int deepest,
-                                const std::stop_token& stop) {
+Result<CertifiedPoints> CertifyingTilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points,
+                                          int deepest, const std::stop_token& stop) {
   CertifiedPoints certified;
+  const tiler::HasTile has_tile = [&](const geo::TileKey& key) { return IsAvailable(dataset, key); };
   for (const dem::GeoPosition& point : points) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the tiles any more");
-    int level = std::min(deepest, dataset.max_level());
-    geo::TileKey key = TileAt(point, level);
-    while (level > 0 && !IsAvailable(dataset, key)) key = TileAt(point, --level);
+    const geo::TileKey key = tiler::DeepestTileAt(has_tile, point, std::min(deepest, dataset.max_level()));
     auto known = std::ranges::find(certified.tiles, key);
     if (known == certified.tiles.end()) {
       if (certified.tiles.size() == kMaxCertifiedTiles) {

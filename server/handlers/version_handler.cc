@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "engine/gdal/gdal_runtime.h"
-#include "proto/library_versions.h"
+#include "proto/codec_versions.h"
 #include "server/handlers/handlers.h"
 #include "server/http/http_error.h"
 #include "server/http/text.h"
@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 // The modules write "GDAL 3.6.2, PROJ 9.1.1": a name and a version without blanks.
 Json Libraries() {
   Json libraries = Json::object();
-  const std::string text = dem::LibraryVersions() + ", " + proto::LibraryVersions();
+  const std::string text = dem::GdalVersions() + ", " + proto::CodecVersions();
   std::string_view rest = text;
   while (!rest.empty()) {
     const std::string_view entry = NextPiece(rest, ',');

@@ -23,8 +23,9 @@ struct TileParameters {
   std::optional<proto::TextureFormat> texture;
 };
 
-// Parses the parameters of URLs of tiles (`allow_at_least`), of .glb tiles (`allow_compression`) and of layer.json. `v`
-// and `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
+// Parses the query of tiles, layer.json, tileset.json and subtrees. `allow_at_least`: `atleast` is known.
+// `allow_compression` (GLB tiles, tileset.json and subtrees): `compression` and `texture` are known. `v` and
+// `extensions` may be repeated, because clients append them. deck.gl appends the query of tileset.json to every URL
 // below it, so error, fraction, compression and texture may be repeated there with the same value. kInvalidArgument,
 // with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
 // or an invalid value.

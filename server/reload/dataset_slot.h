@@ -38,6 +38,8 @@ class DatasetSlot {
   const config::DatasetConfig& wanted() const { return wanted_; }
   const std::optional<tiler::Dataset>& serving() const { return serving_; }
   bool is_opening() const { return opening_.valid(); }
+  // Whether something else is wanted than what is served, or nothing is served.
+  bool lacks_wanted() const { return !serving_ || stale_since_; }
   // Whether nothing is left to open: the wanted dataset is served, or the last attempt to open it failed.
   bool is_current() const { return serving_ ? !stale_since_ || !problem_.empty() : !problem_.empty(); }
 

@@ -152,7 +152,7 @@ bool Reloader::IsBusy() const {
 
 // Such datasets are tried again, also if nothing is watched.
 bool Reloader::LacksDatasets() const {
-  return std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) { return !slot.serving(); });
+  return std::any_of(slots_.begin(), slots_.end(), [](const DatasetSlot& slot) { return slot.lacks_wanted(); });
 }
 
 // An exception says nothing about the configuration. Nothing has changed yet, so the next check tries again.

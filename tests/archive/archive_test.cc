@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <set>
 
-#include "archive/tile_writer.h"
+#include "archive/unit_writer.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
 #include "tiler/tile/strong_etag.h"

@@ -188,13 +188,19 @@ TEST_F(HostileArchiveTest, TilesetOfAWrongManifest) {
     std::erase_if(manifest.available[1], [](const geo::TileRange& range) { return range.start_x > 0; });
     EXPECT_NE(tileset_of(manifest), "") << bounds.west;
   }
-  for (const std::size_t level : {0, 1}) {
-    Manifest manifest = good;
+  Manifest manifest = good;
+  manifest.available[0].clear();
+  EXPECT_EQ(tileset_of(manifest), "");
+  manifest.available[0] = good.available[0];
+  for (const std::size_t level : {1, 2}) {  // as in an area beside the finest source; a gap
+    manifest.max_level = manifest.dataset.max_level = 2;
+    manifest.error_steps = {0, 0, 0};
+    manifest.available.assign(3, good.available[0]);
     manifest.available[level].clear();
-    EXPECT_EQ(tileset_of(manifest), "") << level;
+    EXPECT_NE(tileset_of(manifest), "") << level;
   }
   for (const int step : {-1000, -17, 25, 1000}) {
-    Manifest manifest = good;
+    manifest = good;
     manifest.error_steps = {0, step};
     EXPECT_EQ(tileset_of(manifest), "") << step;
   }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "archive/unit_name.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
 
@@ -24,7 +25,7 @@ Manifest FullManifest() {
   manifest.dataset.max_level = manifest.dataset.max_source_level = 13;
   manifest.dataset.sources = 4;
   manifest.kind.coding = tiler::Coding::kGzip;
-  manifest.kind.normals = manifest.kind.metadata = true;
+  manifest.kind.extensions.normals = manifest.kind.extensions.metadata = true;
   manifest.error_steps = {0, -2, 4};
   manifest.max_level = 2;
   manifest.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{4, 2, 5, 3}, {7, 0, 7, 0}}};
@@ -53,7 +54,7 @@ TEST(ManifestTest, HashOfTilesIsThatOfWhatIsSent) {
   EXPECT_EQ(TilesHash(other), hash);
   for (const auto& change : {+[](Manifest& manifest) { ++manifest.dataset.generation; },
                              +[](Manifest& manifest) { ++manifest.error_steps[1]; },
-                             +[](Manifest& manifest) { manifest.kind.normals = false; },
+                             +[](Manifest& manifest) { manifest.kind.extensions.normals = false; },
                              +[](Manifest& manifest) { ++manifest.available[2][0].end_x; },
                              +[](Manifest& manifest) { manifest.available.pop_back(); }}) {
     other = FullManifest();

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "archive/unit_name.h"
 #include "tiler/tile/strong_etag.h"
 
 namespace terrace::archive {
@@ -54,12 +55,12 @@ Manifest WriteUnits(const std::string& place, const std::vector<geo::TileKey>& k
   manifest.identity = R"({"bbox":[1,2,3,4]})";
   manifest.max_level = manifest.dataset.max_level = manifest.dataset.max_source_level = 9;
   manifest.available.resize(10);
-  std::map<std::string, std::unique_ptr<TileWriter>> writers;
+  std::map<std::string, std::unique_ptr<UnitWriter>> writers;
   for (const geo::TileKey& key : keys) {
     manifest.available[static_cast<std::size_t>(key.level)].push_back({key.x, key.y, key.x, key.y});
-    std::unique_ptr<TileWriter>& writer = writers[UnitNameOf(key)];
+    std::unique_ptr<UnitWriter>& writer = writers[UnitNameOf(key)];
     if (!writer) {
-      Result<std::unique_ptr<TileWriter>> made = CreateUnit(place, UnitNameOf(key), {manifest.kind, unit_key});
+      Result<std::unique_ptr<UnitWriter>> made = CreateUnit(place, UnitNameOf(key), {manifest.kind, unit_key});
       EXPECT_TRUE(made) << made.error().message;
       writer = *std::move(made);
     }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "archive/manifest.h"
-#include "archive/tile_writer.h"
+#include "archive/unit_writer.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/tile/encoded_tile.h"
 

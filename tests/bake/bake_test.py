@@ -12,7 +12,7 @@ import subprocess
 import time
 import unittest
 
-from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_hgt
+from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_asc, write_hgt
 from pmtiles import archive, tiles_of
 
 KILLS = 200 if IS_LONG else 20
@@ -215,6 +215,16 @@ class Bake(BakeCase):
                     for level in range(4, 10):
                         tile = f"{level}/{int((x + 180) / 360 * 2 ** level)}/{int(row * 2 ** level)}.png"
                         self.assertEqual((get(tile)[0], (folder / tile).exists()), (200, True), tile)
+
+    def test_height_images_beyond_web_mercator_are_refused(self):
+        source = self.scratch / "polar.asc"
+        write_asc(source, west=20, south=86, cell=0.05, side=20)
+        for form, out in (("chunks", self.place("chunks")), ("single", self.place("polar.pmtiles"))):
+            command = [str(part) for part in (BINARY, "bake", source, "--vertical", "ellipsoid", "--format", "png", "--form", form, "--out", out)]
+            done = subprocess.run(command, env=self.environment, capture_output=True, text=True, timeout=60)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("Web Mercator ends at 85.05 degrees", done.stderr)
+            self.assertFalse(out.exists())
 
     def test_shards_and_finish_make_the_same_files(self):
         place = self.place("shards")

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "archive/unit_name.h"
 #include "bake/bake_request.h"
 #include "tests/support/source_dir.h"
 
@@ -18,7 +19,7 @@ namespace {
 enum class Throws { kInCreate, kInAdd, kInFinish };
 
 // Throws in the unit of one tile.
-class ThrowingWriter final : public archive::TileWriter {
+class ThrowingWriter final : public archive::UnitWriter {
  public:
   ThrowingWriter(Throws throws, const geo::TileKey& tile) : throws_(throws), tile_(tile) {}
   Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile&, const dem::HeightRange&) override {
@@ -51,7 +52,7 @@ void ExpectOneFailure(Throws throws, int levels, const std::string& message) {
   const geo::TileRange& deepest = manifests->front().available.back().front();
   const geo::TileKey tile{levels, deepest.start_x, deepest.start_y};
   std::vector<Target> targets = {{{}, manifests->front()}};
-  targets.front().create = [&]() -> Result<std::unique_ptr<archive::TileWriter>> {
+  targets.front().create = [&]() -> Result<std::unique_ptr<archive::UnitWriter>> {
     if (throws == Throws::kInCreate) throw std::runtime_error("statistics cannot be read");
     return std::make_unique<ThrowingWriter>(throws, tile);
   };

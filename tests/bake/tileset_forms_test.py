@@ -18,7 +18,7 @@ import unittest
 import zipfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
-from srtm import write_hgt  # noqa: E402
+from srtm import write_asc, write_hgt  # noqa: E402
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 INDEX = "@3dtilesIndex1@"
@@ -81,6 +81,15 @@ class TilesetForms(unittest.TestCase):
         finally:
             process.kill()
             process.communicate()
+
+    def test_an_area_without_the_deepest_levels_can_be_opened(self):
+        coarse = self.scratch / "coarse.asc"
+        write_asc(coarse, west=20, south=45, cell=0.05, side=60)
+        command = [str(part) for part in (BINARY, "bake", self.scratch / "N46E007.hgt", coarse, "--vertical", "ellipsoid", "--format", "glb",
+                                          "--cache-dir", self.scratch / "cache", "--bbox", "20.5,45.5,21.5,46.5")]
+        done = subprocess.run([*command, "--form", "folder", "--out", self.scratch / "area"], capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.scratch / "area" / "tileset.json").exists())
 
     def test_each_tile_below_the_roots_is_there(self):
         """Walks the tileset by its documents: every tile that a bit of a subtree names, and no other."""

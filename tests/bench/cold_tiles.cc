@@ -94,7 +94,7 @@ Result<void> Run(const Arguments& arguments) {
       tiler::TileRequest request;
       request.key = (*keys)[i % keys->size()];
       request.coding = tiler::Coding::kGzip;
-      request.normals = arguments.normals;
+      request.extensions.normals = arguments.normals;
       const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) ++failed;
       if (!tile) continue;

@@ -259,7 +259,7 @@ Result<void> Run(const Arguments& arguments) {
           Tile& tile = sampling.tiles.emplace_back();
           tile.request.key = key;
           tile.request.error_step = step;
-          tile.request.normals = true;
+          tile.request.extensions.normals = true;
           tile.request.coding = tiler::Coding::kGzip;
         }
       }

@@ -95,7 +95,7 @@ Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& c
       request.format = variant.format;
       request.compression = variant.compression;
       request.coding = variant.coding;
-      request.normals = variant.format == TileFormat::kQuantizedMesh;
+      request.extensions.normals = variant.format == TileFormat::kQuantizedMesh;
       const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
       if (!tile) return tl::unexpected(tile.error());
       cost.bytes += tile->bytes.size();

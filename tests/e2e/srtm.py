@@ -1,4 +1,4 @@
-"""A synthetic elevation model in SRTM's format, for tests that need a separate raster."""
+"""Synthetic elevation models, for tests that need a separate raster."""
 import array
 import math
 import os
@@ -19,6 +19,14 @@ def write_hgt(path, phase=0.0, base=1000):
     path.write_bytes(heights.tobytes())
     an_hour_ago = time.time() - 3600
     os.utime(path, (an_hour_ago, an_hour_ago))
+
+
+def write_asc(path, west, south, cell, side):
+    """Writes an Esri ASCII grid of `side` x `side` samples in WGS 84, and its .prj file."""
+    rows = "\n".join(" ".join(str(100 + column * row % 40) for column in range(side)) for row in range(side))
+    path.write_text(f"ncols {side}\nnrows {side}\nxllcorner {west}\nyllcorner {south}\ncellsize {cell}\n{rows}\n")
+    path.with_suffix(".prj").write_text('GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],'
+                                        'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]')
 
 
 if __name__ == "__main__":

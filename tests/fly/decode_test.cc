@@ -14,7 +14,7 @@ namespace {
 
 std::string EncodedGrid(int columns, int rows) {
   proto::QuantizedTile tile = proto::GridTile({9, 530, 388}, columns, rows, -12.5F, 873.25F, proto::Rugged());
-  proto::QuantizedMeshOptions options;
+  proto::TileExtensions options;
   options.normals = true;
   return proto::EncodeQuantizedMesh(tile, options);
 }

@@ -8,13 +8,13 @@
 namespace terrace::proto {
 
 void PrintTo(const TileExtensions& e, std::ostream* out) {
-  *out << "{" << e.octvertexnormals << e.watermask << e.metadata << "}";
+  *out << "{" << e.normals << e.water_mask << e.metadata << "}";
 }
 
 namespace {
 
-constexpr TileExtensions kNone{}, kNormals{.octvertexnormals = true}, kAll{true, true, true};
-constexpr TileExtensions kNormalsAndMetadata{.octvertexnormals = true, .metadata = true};
+constexpr TileExtensions kNone{}, kNormals{.normals = true}, kAll{true, true, true};
+constexpr TileExtensions kNormalsAndMetadata{.normals = true, .metadata = true};
 
 struct ExtensionsCase {
   std::string_view text;

@@ -20,10 +20,10 @@ using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 const std::vector<MeshVertex> kSquare = {
     {500000.1, 4000000.2, 10}, {500010.1, 4000000.2, 1.0 / 3}, {500010.1, 4000020.2, -7.5}, {500000.1, 4000020.2, 12}};
 const Triangles kTwo = {{0, 1, 2}, {0, 2, 3}};
-const std::vector<VertexColor> kColors = {{0, 127, 255}, {1, 2, 3}, {254, 100, 50}, {255, 255, 255}};
+const std::vector<Rgb> kColors = {{0, 127, 255}, {1, 2, 3}, {254, 100, 50}, {255, 255, 255}};
 
 std::string Written(MeshFileFormat format, const std::vector<MeshVertex>& vertices, const Triangles& triangles,
-                    const std::vector<VertexColor>& colors = {}, const std::optional<GridPlacement>& placement = {}) {
+                    const std::vector<Rgb>& colors = {}, const std::optional<GridPlacement>& placement = {}) {
   std::ostringstream out;
   const Result<void> result = WriteMesh(out, format, vertices, triangles, colors, placement);
   EXPECT_TRUE(result.has_value()) << (result ? "" : result.error().message);
@@ -229,7 +229,7 @@ TEST(MeshFile, GlbWidensIndicesPast65535Vertices) {
 
 TEST(MeshFile, ObjColorsReadBackToTheSameBytes) {
   std::vector<MeshVertex> vertices(256);
-  std::vector<VertexColor> colors;
+  std::vector<Rgb> colors;
   for (int i = 0; i < 256; ++i) {
     colors.push_back(
         {static_cast<std::uint8_t>(i), static_cast<std::uint8_t>(255 - i), static_cast<std::uint8_t>(7 * i)});
@@ -256,7 +256,7 @@ TEST(MeshFile, PlyHoldsColorsAsBytesBehindEachPosition) {
   ASSERT_EQ(bytes.size(), data + 4 * 27 + 2 * 13);
   for (std::size_t i = 0; i < kSquare.size(); ++i) {
     EXPECT_EQ(At<double>(bytes, data + 27 * i + 16), kSquare[i].z);
-    EXPECT_EQ(At<VertexColor>(bytes, data + 27 * i + 24), kColors[i]);
+    EXPECT_EQ(At<Rgb>(bytes, data + 27 * i + 24), kColors[i]);
   }
   EXPECT_EQ(bytes[data + 108], 3);
 }
@@ -290,7 +290,7 @@ TEST(MeshFile, GlbColorsAreLinearAndAligned) {
 }
 
 TEST(MeshFile, GlbColorsHaveTheSameBytesOnEveryMachine) {
-  std::vector<VertexColor> greys;
+  std::vector<Rgb> greys;
   for (int i = 0; i < 256; ++i) greys.push_back({static_cast<std::uint8_t>(i), 0, 0});
   const Glb glb = ParseGlb(Written(MeshFileFormat::kGlb, std::vector<MeshVertex>(256), {{0, 1, 2}}, greys));
   const std::size_t offset = glb.json.at("bufferViews").at(2).at("byteOffset");

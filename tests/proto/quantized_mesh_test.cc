@@ -14,7 +14,7 @@
 namespace terrace::proto {
 namespace {
 
-constexpr QuantizedMeshOptions kPlain{}, kWithNormals{.normals = true};
+constexpr TileExtensions kPlain{}, kWithNormals{.normals = true};
 
 QuantizedTile SmallTile() {
   QuantizedTile tile;
@@ -193,7 +193,7 @@ TEST(QuantizedMesh, ExtensionsCanBeRemoved) {
   tile.water_mask = {255};
   tile.metadata = R"({"available":[]})";
   const auto options = [](unsigned bits) {
-    return QuantizedMeshOptions{.normals = (bits & 1) != 0, .water_mask = (bits & 2) != 0, .metadata = (bits & 4) != 0};
+    return TileExtensions{.normals = (bits & 1) != 0, .water_mask = (bits & 2) != 0, .metadata = (bits & 4) != 0};
   };
   for (unsigned from = 0; from < 8; ++from) {
     const std::string encoded = EncodeQuantizedMesh(tile, options(from));

@@ -59,7 +59,7 @@ CatalogPtr ServerFixture::MakeCatalog() const {
 
 std::string ServerFixture::BodyOf(const tiler::TileRequest& request) {
   std::string body = fmt::format("tile {} step {} coding {} normals {} ", geo::ToString(request.key),
-                                 request.error_step, static_cast<int>(request.coding), request.normals);
+                                 request.error_step, static_cast<int>(request.coding), request.extensions.normals);
   body.append(2000, '.');
   return body;
 }

@@ -38,7 +38,7 @@ TEST(DeeperKeys, AreOfTheEditsAndOfTheTilesBelow) {
   request.key = kKey;
   EXPECT_EQ(TileEditsHash(*offset, request), TileEditsHash(*both, request));
   EXPECT_EQ(TileEditsHash(*precise, request), 0u);
-  request.metadata = true;
+  request.extensions.metadata = true;
   EXPECT_EQ(TileEditsHash(*offset, request), offset->EditsHash(kKey));
   EXPECT_NE(TileEditsHash(*both, request), TileEditsHash(*offset, request));
   EXPECT_EQ(TileEditsHash(*precise, request), precise->DeeperTilesHash(kKey));

@@ -268,7 +268,7 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
       for (const int step : kSteps) {
         TileRequest request = RequestFor(beside, step);
         request.format = format;
-        request.metadata = metadata;
+        request.extensions.metadata = metadata;
         EXPECT_EQ(TileEditsHash(source, request), 0u);
         const auto a = plain.Build(request, {}), b = pipeline.Build(request, {});
         ASSERT_TRUE(a.has_value() && b.has_value());

@@ -48,7 +48,7 @@ std::string TilesText(const TilePipeline& pipeline) {
         request.error_step = step;
         request.format = TileFormat::kQuantizedMesh;
         for (const bool normals : {false, true}) {
-          request.normals = normals;
+          request.extensions.normals = normals;
           add(pipeline.Build(request, {}));
         }
         request.format = TileFormat::kGlb;

@@ -34,7 +34,7 @@ const TilePipeline& SamplePipeline() {
 }
 
 FetchedTile FetchTile(const TilePipeline& pipeline, TileRequest request) {
-  request.normals = true;
+  request.extensions.normals = true;
   auto encoded = pipeline.Build(request, {});
   EXPECT_TRUE(encoded.has_value()) << geo::ToString(request.key) << ": " << (encoded ? "" : encoded.error().message);
   if (!encoded) return {};

@@ -48,7 +48,7 @@ void PrintTiles(const TilePipeline& pipeline) {
           request.dataset = dataset;
           request.key = key;
           request.format = format;
-          request.normals = true;
+          request.extensions.normals = true;
           const auto tile = pipeline.Build(request, {});
           ASSERT_TRUE(tile) << tile.error().message;
           fmt::print("tile {} {} {} {} {} {}\n", pipeline.datasets()[dataset].name, geo::ToString(key),

@@ -27,7 +27,7 @@ std::vector<proto::DecodedExtension> ExtensionsOf(std::uint32_t dataset, geo::Ti
   TileRequest request;
   request.dataset = dataset;
   request.key = key;
-  request.water_mask = request.metadata = true;
+  request.extensions.water_mask = request.extensions.metadata = true;
   return FetchTile(Earth(), request).mesh.extensions;
 }
 
@@ -90,7 +90,7 @@ TEST(TileExtensions, DoNotTouchTheMesh) {
   request.dataset = 1;
   request.key = {4, 16, 12};
   const auto plain = Earth().Build(request, {});
-  request.water_mask = request.metadata = true;
+  request.extensions.water_mask = request.extensions.metadata = true;
   const auto more = Earth().Build(request, {});
   ASSERT_TRUE(plain.has_value() && more.has_value());
   EXPECT_GT(more->bytes.size(), plain->bytes.size());

@@ -142,7 +142,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
       }
       // All of these are made from one read.
       request.coding = Coding::kGzip;
-      request.normals = true;
+      request.extensions.normals = true;
       EXPECT_EQ(cached->Build(request, {})->times.read.count(), 0);
     }
   }
@@ -185,7 +185,7 @@ TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
   const TilePipeline pipeline(std::move(datasets));
   TileRequest request;
   request.error_step = 24;
-  request.normals = true;
+  request.extensions.normals = true;
   Edge edges[2];
   for (const int k : {0, 1}) {
     request.key = {5, 32 + k, 16};

@@ -215,6 +215,7 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
   while (plan.level < source.max_source_level() && is_coarse()) ++plan.level;
   const auto nodes_at = [&](int level) { return NodesAt(source.LatticeOf(level), *clipped); };
   // Deeper levels exist around edits alone. An edit must not make an area too large.
+  plan.depends_on_limit = plan.level < source.max_level() && is_coarse();
   while (plan.level < source.max_level() && is_coarse() &&
          ExceededLimits(nodes_at(plan.level + 1), max_samples).empty() && IsCovered(source, *clipped, plan.level + 1)) {
     ++plan.level;

@@ -31,6 +31,7 @@ struct AreaRequest {
 // the area and need at most `max_samples`. The area is clipped to the source's bounds, then extended to whole cells.
 struct AreaPlan {
   int level = 0;
+  bool depends_on_limit = false;  // the level may be another one for another `max_samples`
   dem::NodeWindow window;
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };

@@ -8,7 +8,7 @@
 namespace terrace::tiler {
 
 // Heights are in the sources' datum, because a map's lines tell heights above the sea.
-Result<void> EncodeContours(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeContoursTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   encoded.refinement = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, kSidesPx[0], kContourMargin);

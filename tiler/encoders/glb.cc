@@ -137,7 +137,7 @@ Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_tok
   return drawn;
 }
 
-Result<void> EncodeGlb(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeGlbTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
   const auto start = Clock::now();
   const Result<MeshedGlb> meshed = MeshGlb(input, stop);

@@ -6,6 +6,7 @@
 
 #include "engine/core/elapsed_time.h"
 #include "tiler/encoders.h"
+#include "tiler/map/map_heights.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
@@ -25,24 +26,21 @@ double LargestLoss(const std::vector<float>& heights, proto::HeightEncoding enco
 
 // One pixel for each node of the Web Mercator grid. Tiles share no pixels with neighbours. EncodedTile::max_error_m is
 // the measured rounding error of the colours.
-Result<void> EncodeHeightPng(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const Dataset& dataset = input.dataset;
   const TileRequest& request = input.request;
-  const int size = request.side_px;
-  // A tile of 512 pixels has the pixels of the four tiles of 256 below it.
-  const int depth = request.key.level + (size == 512 ? 1 : 0);
-  if (depth > dataset.source->info().max_mercator_depth) {
+  const MapWindow window(request.key, request.side_px, /*margin=*/0);
+  if (window.depth > dataset.source->info().max_mercator_depth) {
     return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));
   }
   encoded.refinement = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
-  const dem::NodeWindow window{request.key.x * size, request.key.y * size, size, size};
-  const Result<std::vector<float>> heights = dataset.source->ReadMercator(depth, window, stop);
+  const Result<std::vector<float>> heights = dataset.source->ReadMercator(window.depth, window.nodes, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);
 
   start = std::chrono::steady_clock::now();
-  encoded.bytes = proto::EncodeHeightPng(*heights, size, request.height_encoding);
+  encoded.bytes = proto::EncodeHeightPng(*heights, window.size, request.height_encoding);
   encoded.times.encode = MicrosecondsSince(start);
   encoded.max_error_m = LargestLoss(*heights, request.height_encoding);
   return {};

@@ -26,7 +26,7 @@ tl::unexpected<Error> NoImagery() { return MakeError(ErrorCode::kNotFound, "the 
 
 }  // namespace
 
-Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeImageryTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   if (!input.dataset.imagery.image) return NoImagery();
   const auto start = std::chrono::steady_clock::now();
   const geo::TileKey& key = input.request.key;
@@ -35,7 +35,7 @@ Result<void> EncodeImagery(const EncoderInput& input, EncodedTile& encoded, cons
                           start, input, encoded);
 }
 
-Result<void> EncodeGeodeticImagery(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeGeodeticImageryTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   if (!input.dataset.imagery.image) return NoImagery();
   const auto start = std::chrono::steady_clock::now();
   return EncodeMapPicture(input.dataset.imagery.image->ReadGeodetic(input.request.key, input.request.side_px, stop),

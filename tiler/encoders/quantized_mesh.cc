@@ -38,25 +38,24 @@ Result<proto::WaterMask> WaterMaskOf(const Dataset& dataset, const proto::Lattic
 
 // Adds the water mask and the metadata to `tile`, if `request` asks for them and the dataset has them. Returns the
 // extensions to encode, including normals.
-Result<proto::QuantizedMeshOptions> AddExtensions(const Dataset& dataset, const TileRequest& request,
-                                                  const proto::LatticeView& lattice, proto::QuantizedTile& tile,
-                                                  const std::stop_token& stop) {
-  proto::QuantizedMeshOptions options;
-  options.normals = request.normals;
-  options.water_mask = request.water_mask && dataset.water.any();
-  options.metadata =
-      request.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels,
-                                                 dataset.source->max_source_level(), dataset.source->Availability());
-  if (options.water_mask) {
+Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRequest& request,
+                                            const proto::LatticeView& lattice, proto::QuantizedTile& tile,
+                                            const std::stop_token& stop) {
+  proto::TileExtensions extensions = request.extensions;
+  extensions.water_mask = extensions.water_mask && dataset.water.any();
+  extensions.metadata =
+      extensions.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels,
+                                                    dataset.source->max_source_level(), dataset.source->Availability());
+  if (extensions.water_mask) {
     Result<proto::WaterMask> mask = WaterMaskOf(dataset, lattice, stop);
     if (!mask) return tl::unexpected(std::move(mask).error());
     tile.water_mask = *std::move(mask);
   }
-  if (options.metadata) {
+  if (extensions.metadata) {
     tile.metadata =
         proto::EncodeTileMetadata(request.key, dataset.source->AvailabilityBelow(request.key), dataset.metadata_levels);
   }
-  return options;
+  return extensions;
 }
 
 }  // namespace
@@ -70,7 +69,7 @@ Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std
   return drawn;
 }
 
-Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
   const auto start = std::chrono::steady_clock::now();
   proto::LatticeView lattice = input.lattice();
@@ -79,12 +78,13 @@ Result<void> EncodeQuantizedMesh(const EncoderInput& input, EncodedTile& encoded
   Result<MeshedTile> measured =
       MeshTile(*dataset.source, lattice, refined->refinement, dataset.mesh_options, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
-  if (request.normals) measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->positions);
-  const Result<proto::QuantizedMeshOptions> options = AddExtensions(dataset, request, lattice, measured->tile, stop);
-  if (!options) return tl::unexpected(options.error());
+  if (request.extensions.normals)
+    measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->positions);
+  const Result<proto::TileExtensions> extensions = AddExtensions(dataset, request, lattice, measured->tile, stop);
+  if (!extensions) return tl::unexpected(extensions.error());
   LeaveOut(TrianglesInHoles(*dataset.source, request.key, measured->mesh), measured->mesh, lattice.cells(),
            measured->tile.triangles);
-  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *options, measured->positions);
+  encoded.bytes = proto::EncodeQuantizedMesh(measured->tile, *extensions, measured->positions);
   encoded.times.refine += measured->replayed;
   encoded.times.encode = MicrosecondsSince(start) - measured->replayed;
   encoded.max_error_m = measured->max_error_m;

@@ -66,7 +66,7 @@ Result<void> StoreBytes(Result<std::string> bytes, EncodedTile& encoded, std::ch
 
 }  // namespace
 
-Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeHillshadeTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto gradients = ReadGradients(input, encoded, stop);
   if (!gradients) return tl::unexpected(gradients.error());
   const auto start = std::chrono::steady_clock::now();
@@ -80,7 +80,7 @@ Result<void> EncodeHillshade(const EncoderInput& input, EncodedTile& encoded, co
   return StoreBytes(EncodeGrey(values, input.request.side_px, input.request.map.picture), encoded, start);
 }
 
-Result<void> EncodeSlope(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
+Result<void> MakeSlopeTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
   const auto gradients = ReadGradients(input, encoded, stop);
   if (!gradients) return tl::unexpected(gradients.error());
   const auto start = std::chrono::steady_clock::now();

@@ -1,4 +1,5 @@
-// Heights and refinement of a tile. Every error, format and coding of it is made from these without reading the source.
+// Heights and refinement of a tile. Quantized-mesh and GLB tiles of every error and coding are meshed from these; only
+// water masks and textures are read besides.
 #pragma once
 
 #include <cstdint>

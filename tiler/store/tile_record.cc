@@ -43,8 +43,9 @@ std::string_view GetText(ByteReader& reader) {
 // tiles of other requests.
 std::string RecordKey(const CacheKey& key) {
   const auto& [request, generation, edits] = key;
-  const auto& [dataset, tile, error_step, format, compression, texture, coding, normals, water_mask, metadata,
-               height_encoding, side_px, map] = request;
+  const auto& [dataset, tile, error_step, format, compression, texture, coding, extensions, height_encoding, side_px,
+               map] = request;
+  const auto& [normals, water_mask, metadata] = extensions;
   static_cast<void>(dataset);  // the generation identifies it
   ByteWriter writer;
   writer.Put(generation);

@@ -17,8 +17,9 @@ std::size_t TileRequestHash::operator()(const TileRequest& request) const noexce
       static_cast<std::uint64_t>(request.side_px) << 48 | static_cast<std::uint64_t>(request.height_encoding) << 40 |
       static_cast<std::uint64_t>(request.texture) << 32 | static_cast<std::uint64_t>(request.compression) << 24 |
       static_cast<std::uint64_t>(request.format) << 16 | static_cast<std::uint64_t>(request.coding) << 8 |
-      static_cast<std::uint64_t>(request.normals) | static_cast<std::uint64_t>(request.water_mask) << 1 |
-      static_cast<std::uint64_t>(request.metadata) << 2;
+      static_cast<std::uint64_t>(request.extensions.normals) |
+      static_cast<std::uint64_t>(request.extensions.water_mask) << 1 |
+      static_cast<std::uint64_t>(request.extensions.metadata) << 2;
   std::uint64_t hash = Mix(request.dataset + 0x9e3779b97f4a7c15);
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.level));
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.x));

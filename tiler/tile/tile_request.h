@@ -9,6 +9,7 @@
 #include "proto/documents/height_png.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
+#include "proto/media_type.h"
 #include "tiler/map/map_parameters.h"
 #include "tiler/tile/coding.h"
 
@@ -44,11 +45,7 @@ struct TileRequest {
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
   proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
   Coding coding = Coding::kIdentity;
-  // Extensions of quantized-mesh, included if the client asks for them and the tile has them. GLB tiles always have
-  // normals.
-  bool normals = false;
-  bool water_mask = false;
-  bool metadata = false;
+  proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   // Tiles of IsMercator(format), and kGeodeticImagery: side_px * side_px pixels.
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
   int side_px = kSidesPx[0];

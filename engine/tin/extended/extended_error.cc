@@ -19,9 +19,9 @@ ExtendedError MeasureExtendedError(const ExtendedField& field, const ColoredMesh
   ForEachSample(field.heights(), mesh.tin, stop, [&](const MeshSample& sample) {
     const auto& triangle = sample.triangle;
     double levels = 0;  // of colours, 0 to 255
-    if (const ColorSample& color = field.ColorAt(sample.x, sample.y); ExtendedField::IsKnown(color)) {
+    if (const Rgba& color = field.ColorAt(sample.x, sample.y); ExtendedField::IsKnown(color)) {
       ++error.color_samples;
-      for (std::size_t i = 0; i < std::tuple_size_v<Color>; ++i) {
+      for (std::size_t i = 0; i < std::tuple_size_v<Rgb>; ++i) {
         const auto at = [&](std::size_t corner) { return static_cast<double>(mesh.colors[triangle[corner]][i]); };
         const double distance = std::abs(sample.Interpolate(at(0), at(1), at(2)) - color[i]);
         levels += distance;

@@ -23,14 +23,14 @@ double RangeOf(const HeightField& heights) {
 
 }  // namespace
 
-ExtendedField::ExtendedField(HeightField heights, std::vector<ColorSample> colors, double color_weight)
+ExtendedField::ExtendedField(HeightField heights, std::vector<Rgba> colors, double color_weight)
     : heights_(std::move(heights)),
       colors_(std::move(colors)),
       color_weight_(color_weight),
       height_weight_(1 - color_weight),
       level_weight_(color_weight * RangeOf(heights_) / 3 / 255) {}
 
-Result<ExtendedField> ExtendedField::Make(HeightField heights, std::vector<ColorSample> colors, double color_weight) {
+Result<ExtendedField> ExtendedField::Make(HeightField heights, std::vector<Rgba> colors, double color_weight) {
   const std::size_t samples = static_cast<std::size_t>(heights.width()) * static_cast<std::size_t>(heights.height());
   if (colors.size() != samples) {
     return MakeError(ErrorCode::kInvalidArgument, "a field of {} x {} samples needs {} colours, not {}",
@@ -47,12 +47,12 @@ Result<ExtendedField> ExtendedField::Make(HeightField heights, std::vector<Color
   return ExtendedField(std::move(heights), std::move(colors), color_weight);
 }
 
-Color ExtendedField::NearestColor(int x, int y) const {
+Rgb ExtendedField::NearestColor(int x, int y) const {
   std::int64_t nearest = std::numeric_limits<std::int64_t>::max();
-  Color color{};
+  Rgb color{};
   for (int row = 0; row < height(); ++row) {
     for (int column = 0; column < width(); ++column) {
-      const ColorSample& sample = ColorAt(column, row);
+      const Rgba& sample = ColorAt(column, row);
       const std::int64_t dx = column - x, dy = row - y, distance = dx * dx + dy * dy;
       if (!IsKnown(sample) || distance >= nearest) continue;
       nearest = distance;

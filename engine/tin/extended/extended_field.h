@@ -17,35 +17,30 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/core/color.h"
 #include "engine/core/result.h"
 #include "engine/tin/mesh/height_field.h"
 
 namespace terrace::tin {
-
-// Red, green, blue.
-using Color = std::array<std::uint8_t, 3>;
-
-// Red, green, blue, alpha: 0 where the colour is not known, anything else where it is.
-using ColorSample = std::array<std::uint8_t, 4>;
 
 class ExtendedField {
  public:
   // `colors` has one element per height, in the same order. A sample without a height is a void, whatever its colour.
   // The error of a sample without a colour is that of its height alone. Refuses a wrong number of colours, a weight
   // outside 0 to 1, and colours of which none is known.
-  static Result<ExtendedField> Make(HeightField heights, std::vector<ColorSample> colors, double color_weight);
+  static Result<ExtendedField> Make(HeightField heights, std::vector<Rgba> colors, double color_weight);
 
   const HeightField& heights() const { return heights_; }
   int width() const { return heights_.width(); }
   int height() const { return heights_.height(); }
-  const ColorSample& ColorAt(int x, int y) const { return ColorRow(y)[x]; }
-  const ColorSample* ColorRow(int y) const {
+  const Rgba& ColorAt(int x, int y) const { return ColorRow(y)[x]; }
+  const Rgba* ColorRow(int y) const {
     return colors_.data() + static_cast<std::size_t>(y) * static_cast<std::size_t>(width());
   }
-  static bool IsKnown(const ColorSample& color) { return color[3] != 0; }
+  static bool IsKnown(const Rgba& color) { return color[3] != 0; }
 
   // The known colour nearest to a position; ties go to the smaller row, then column. Searches all samples.
-  Color NearestColor(int x, int y) const;
+  Rgb NearestColor(int x, int y) const;
 
   // The combined error for a height difference in metres and the sum of the differences in red, green and blue, in
   // 255ths of the range.
@@ -53,10 +48,10 @@ class ExtendedField {
   double color_weight() const { return color_weight_; }
 
  private:
-  ExtendedField(HeightField heights, std::vector<ColorSample> colors, double color_weight);
+  ExtendedField(HeightField heights, std::vector<Rgba> colors, double color_weight);
 
   HeightField heights_;
-  std::vector<ColorSample> colors_;
+  std::vector<Rgba> colors_;
   double color_weight_;   // w
   double height_weight_;  // 1 - w
   double level_weight_;   // w M / 3 / 255

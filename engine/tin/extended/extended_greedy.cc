@@ -20,7 +20,7 @@ class Planes {
   struct Corner {
     SamplePosition position;
     double z;
-    Color color;
+    Rgb color;
   };
 
   Planes(const Corner& u, const Corner& v, const Corner& p)
@@ -35,9 +35,9 @@ class Planes {
   }
 
   // The plane's colour at a sample inside the triangle, to the nearest level.
-  Color ColorAt(SamplePosition sample) const {
+  Rgb ColorAt(SamplePosition sample) const {
     const double x = sample.x - p_.position.x, y = sample.y - p_.position.y;
-    Color color;
+    Rgb color;
     for (std::size_t i = 0; i < 3; ++i) {
       color[i] = static_cast<std::uint8_t>(std::floor(p_.color[i] + (colors_[i].a * x + colors_[i].b * y) / d_ + 0.5));
     }
@@ -45,7 +45,7 @@ class Planes {
   }
 
   // The combined error of a sample; NaN at a void.
-  double Error(const ExtendedField& field, double x, double y, float z, const ColorSample& color) const {
+  double Error(const ExtendedField& field, double x, double y, float z, const Rgba& color) const {
     double levels = 0;
     if (ExtendedField::IsKnown(color)) {
       for (std::size_t i = 0; i < 3; ++i) levels += Numerator(color[i], p_.color[i], colors_[i], x, y);
@@ -70,7 +70,7 @@ class Planes {
   std::array<Slopes, 3> colors_;
 };
 
-Planes PlanesOf(const Triangulation& triangulation, const std::vector<Color>& colors, TriangleId t) {
+Planes PlanesOf(const Triangulation& triangulation, const std::vector<Rgb>& colors, TriangleId t) {
   const auto corner = [&](VertexId vertex) -> Planes::Corner {
     return {triangulation.position(vertex), static_cast<double>(triangulation.height(vertex)), colors[vertex]};
   };
@@ -83,8 +83,8 @@ Planes PlanesOf(const Triangulation& triangulation, const std::vector<Color>& co
 ExtendedGreedy::ExtendedGreedy(const ExtendedField& field) : field_(&field), triangulation_(field.heights()) {
   for (VertexId vertex = 0; vertex < 4; ++vertex) {
     const auto [x, y] = triangulation_.position(vertex);
-    const ColorSample& color = field.ColorAt(x, y);
-    colors_.push_back(ExtendedField::IsKnown(color) ? Color{color[0], color[1], color[2]} : field.NearestColor(x, y));
+    const Rgba& color = field.ColorAt(x, y);
+    colors_.push_back(ExtendedField::IsKnown(color) ? Rgb{color[0], color[1], color[2]} : field.NearestColor(x, y));
   }
   Scan(0);
   Scan(1);
@@ -113,8 +113,8 @@ void ExtendedGreedy::Insert(TriangleId triangle) {
   for (std::size_t i = 0; i < star.count; ++i) Scan(star.triangles[i]);
 }
 
-Color ExtendedGreedy::ColorOfVertex(SamplePosition sample, TriangleId triangle) const {
-  const ColorSample& color = field_->ColorAt(sample.x, sample.y);
+Rgb ExtendedGreedy::ColorOfVertex(SamplePosition sample, TriangleId triangle) const {
+  const Rgba& color = field_->ColorAt(sample.x, sample.y);
   if (ExtendedField::IsKnown(color)) return {color[0], color[1], color[2]};
   return PlanesOf(triangulation_, colors_, triangle).ColorAt(sample);
 }
@@ -134,7 +134,7 @@ void ExtendedGreedy::Scan(TriangleId t) {
     if (first <= last && is_corner(first, y)) ++first;
     if (first <= last && is_corner(last, y)) --last;
     const float* heights = field_->heights().Row(y);
-    const ColorSample* colors = field_->ColorRow(y);
+    const Rgba* colors = field_->ColorRow(y);
     for (int x = first; x <= last; ++x) {
       const double error = planes.Error(*field_, x - corners[2].x, y - corners[2].y, heights[x], colors[x]);
       if (!(error > worst.error)) continue;  // also at a void; numbers ascend, so the first of equals stays

@@ -33,7 +33,7 @@ struct ColoredMesh {
   TinMesh tin;
   // By vertex: the colour of its sample. If that is not known: the colour of the mesh at this position when the vertex
   // was inserted, rounded to 8 bits; at a corner of the field, the nearest known colour.
-  std::vector<Color> colors;
+  std::vector<Rgb> colors;
 };
 
 class ExtendedGreedy {
@@ -56,11 +56,11 @@ class ExtendedGreedy {
  private:
   void Insert(TriangleId triangle);
   void Scan(TriangleId triangle);
-  Color ColorOfVertex(SamplePosition sample, TriangleId triangle) const;
+  Rgb ColorOfVertex(SamplePosition sample, TriangleId triangle) const;
 
   const ExtendedField* field_;
   Triangulation triangulation_;
-  std::vector<Color> colors_;  // by vertex
+  std::vector<Rgb> colors_;    // by vertex
   CandidateQueue candidates_;  // by triangle
 };
 

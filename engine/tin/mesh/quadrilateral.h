@@ -1,4 +1,5 @@
-// The two ways to divide a convex quadrilateral into two triangles: their shape quality and their bend.
+// The two ways to divide a convex quadrilateral into two triangles: their shape quality and the angle between their
+// normals.
 //
 //        w           The quadrilateral (p, u, w, v), counter-clockwise, seen from the point p that is being inserted.
 //       / \          It is cut by u-v into (u, v, p) and (v, u, w), or by p-w into (u, w, p) and (w, v, p).
@@ -84,15 +85,15 @@ inline double CosineBetween(const Normal& a, const Normal& b) {
 // The angle between the two triangles of each way, across the diagonal alone: twice the squared sine of half the angle
 // between their normals (Dyn, Levin and Rippa, "Data Dependent Triangulations for Piecewise Linear Interpolation",
 // 1990).
-struct Bends {
+struct NormalAngles {
   double uv = 0;
   double pw = 0;
 };
-inline Bends BendsOf(const Quadrilateral& q) {
+inline NormalAngles NormalAnglesOf(const Quadrilateral& q) {
   const RingVertex p{0, 0, 0, q.height};
   // Rounding may make a cosine larger than 1.
-  const auto bend = [](const Normal& a, const Normal& b) { return std::max(0.0, 1 - CosineBetween(a, b)); };
-  return {bend(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)), bend(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
+  const auto angle = [](const Normal& a, const Normal& b) { return std::max(0.0, 1 - CosineBetween(a, b)); };
+  return {angle(Normal(q.u, q.v, p), Normal(q.v, q.u, q.w)), angle(Normal(q.u, q.w, p), Normal(q.w, q.v, p))};
 }
 
 }  // namespace terrace::tin

@@ -96,10 +96,12 @@ bake::BakeIdentity IdentityOf(const BakeArguments& arguments, const tiler::Datas
   if (arguments.error > 0) error = PlainNumber(arguments.error) + " m";
   if (arguments.fraction > 0) error = PlainNumber(arguments.fraction) + " of the level's";
   std::string extensions;  // of terrain; other formats have none
-  for (const auto& [extension, name] : {std::pair(&tiler::TileRequest::normals, "octvertexnormals"),
-                                        std::pair(&tiler::TileRequest::water_mask, "watermask"),
-                                        std::pair(&tiler::TileRequest::metadata, "metadata")}) {
-    const auto is_on = [wanted = extension](const bake::Target& target) { return target.manifest.kind.*wanted; };
+  for (const auto& [extension, name] : {std::pair(&proto::TileExtensions::normals, "octvertexnormals"),
+                                        std::pair(&proto::TileExtensions::water_mask, "watermask"),
+                                        std::pair(&proto::TileExtensions::metadata, "metadata")}) {
+    const auto is_on = [wanted = extension](const bake::Target& target) {
+      return target.manifest.kind.extensions.*wanted;
+    };
     if (std::ranges::any_of(targets, is_on)) extensions += (extensions.empty() ? "" : ",") + std::string(name);
   }
   return {{{"dataset", dataset.name},
@@ -129,7 +131,7 @@ Result<void> ReadOld(const std::string& place, std::vector<bake::Target>& target
       missing = error;
       continue;
     }
-    if (manifest->units.empty()) {
+    if (archive::IsSingleFile(place)) {
       return MakeError(ErrorCode::kInvalidArgument, "--update {}: is one file without units; give a bake in chunks",
                        place);
     }

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "archive/tile_writer.h"
+#include "archive/unit_writer.h"
 #include "bake/bake_request.h"
 #include "engine/core/plain_number.h"
 #include "server/cli/bake/bake_display.h"
@@ -55,7 +55,7 @@ struct Seed {
 // The key, checksum and columns of a record.
 constexpr std::uint64_t kRecordOverheadBytes = 160;
 
-class SeedWriter final : public archive::TileWriter {
+class SeedWriter final : public archive::UnitWriter {
  public:
   SeedWriter(Seed& seed, archive::Manifest manifest)
       : seed_(seed), manifest_(std::move(manifest)), dropped_before_(seed.store->stats().dropped) {}
@@ -179,7 +179,7 @@ int SeedCache(const BakeArguments& arguments, const config::DiskCacheConfig& lim
   Seed seed(pipeline.datasets().front());
   if (const int code = OpenSeed(arguments.into_cache, limits, seed); code != kExitOk) return code;
   for (bake::Target& target : targets) {
-    target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::TileWriter>> {
+    target.create = [&seed, manifest = target.manifest]() -> Result<std::unique_ptr<archive::UnitWriter>> {
       return std::make_unique<SeedWriter>(seed, manifest);
     };
     target.has = [&seed](const tiler::TileRequest& request) {

@@ -1,5 +1,6 @@
 #include "server/cli/common/open_baked.h"
 
+#include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include <filesystem>
@@ -10,6 +11,7 @@
 #include "archive/archive.h"
 #include "archive/baked_tiles.h"
 #include "archive/manifest.h"
+#include "config/options/options.h"
 #include "engine/gdal/file_stamp.h"
 #include "engine/gdal/source_policy.h"
 #include "tiler/encoder_version.h"
@@ -82,6 +84,17 @@ std::uint64_t GenerationOf(const Archives& archives) {
   return generation;
 }
 
+void WarnOfUnusedOptions(const config::DatasetConfig& wanted) {
+  config::DatasetConfig used;
+  used.name = wanted.name;
+  used.baked = wanted.baked;
+  used.is_public = wanted.is_public;
+  const std::vector<std::string> unused = config::ChangedDatasetOptions(wanted, used);
+  if (unused.empty()) return;
+  spdlog::warn("dataset {}: without \"sources\" its archive is served as it was baked: {} {} no effect", wanted.name,
+               fmt::join(unused, ", "), unused.size() == 1 ? "has" : "have");
+}
+
 }  // namespace
 
 bool IsArchive(const std::string& path) {
@@ -119,6 +132,7 @@ void AddBaked(const config::DatasetConfig& wanted, tiler::Dataset& dataset) {
 }
 
 Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
+  WarnOfUnusedOptions(wanted);
   tiler::Dataset dataset;
   dataset.baked_files = StampFiles(wanted.baked);
   Result<Archives> archives = OpenArchives(wanted.baked);

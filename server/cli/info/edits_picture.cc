@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "engine/core/color.h"
 #include "engine/geo/ellipsoid.h"
 #include "proto/documents/height_png.h"
 
@@ -19,10 +20,8 @@ namespace {
 
 constexpr int kSide = 1024;
 
-using Color = std::array<std::uint8_t, 3>;
-
-Color ColorOf(std::string_view op) {
-  static const std::map<std::string_view, Color> colors = {
+Rgb ColorOf(std::string_view op) {
+  static const std::map<std::string_view, Rgb> colors = {
       {"flatten", {220, 40, 40}},   {"slope", {230, 120, 20}},    {"offset", {200, 60, 200}},
       {"replace", {120, 70, 200}},  {"carve", {30, 90, 220}},     {"raise", {140, 80, 30}},
       {"precision", {20, 150, 60}}, {"breakline", {0, 150, 170}}, {"hole", {255, 220, 0}}};
@@ -56,11 +55,11 @@ class Picture {
  public:
   Picture() : pixels_(static_cast<std::size_t>(kSide) * kSide) {}
 
-  void Put(int x, int y, Color color) {
+  void Put(int x, int y, Rgb color) {
     if (x >= 0 && y >= 0 && x < kSide && y < kSide)
       pixels_[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x)] = color;
   }
-  void Line(double x0, double y0, double x1, double y1, Color color) {
+  void Line(double x0, double y0, double x1, double y1, Rgb color) {
     const int steps = static_cast<int>(std::max(std::abs(x1 - x0), std::abs(y1 - y0))) + 1;
     for (int k = 0; k <= steps; ++k) {
       const double t = static_cast<double>(k) / steps;
@@ -80,7 +79,7 @@ class Picture {
   }
 
  private:
-  std::vector<Color> pixels_;
+  std::vector<Rgb> pixels_;
 };
 
 }  // namespace

@@ -26,8 +26,8 @@
 #include "server/cli/common/open_cache.h"
 #include "server/cli/common/open_dataset.h"
 #include "server/cli/common/option_flags.h"
-#include "server/cli/common/output_file.h"
 #include "server/cli/common/progress.h"
+#include "server/cli/common/replaced_file.h"
 #include "server/cli/common/source_files.h"
 #include "server/cli/info/edits_picture.h"
 #include "server/cli/info/mosaic_info.h"
@@ -185,7 +185,7 @@ int Draw(const dem::DemSource& source, const std::string& path) {
   if (source.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
   const Result<std::string> png = DrawEdits(source);
   if (!png) return Fail(png.error().message, kExitFailure);
-  Result<OutputFile> file = OutputFile::Open(path);
+  Result<ReplacedFile> file = ReplacedFile::Open(path);
   if (!file) return Fail(file.error().message, kExitFailure);
   file->stream() << *png;
   const Result<void> written = file->Commit();

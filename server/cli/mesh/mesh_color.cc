@@ -36,8 +36,8 @@ struct Source {
   std::array<double, 6> geo_transform{};
 };
 
-Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std::vector<dem::ColorSample> colors,
-                          double weight, bool georeferenced, const std::array<double, 6>& geo_transform) {
+Result<Source> MakeSource(const std::string& path, tin::HeightField heights, std::vector<Rgba> colors, double weight,
+                          bool georeferenced, const std::array<double, 6>& geo_transform) {
   auto field = tin::ExtendedField::Make(std::move(heights), std::move(colors), weight);
   if (!field) return MakeError(field.error().code, "{}: {}", path, field.error().message);
   return Source{*std::move(field), georeferenced, geo_transform};

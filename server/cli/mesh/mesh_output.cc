@@ -18,14 +18,14 @@ Result<MeshOutput> MeshOutput::Open(const std::string& path, const std::vector<s
   }
   const auto format = proto::MeshFileFormatOf(path);
   if (!format) return tl::unexpected(format.error());
-  Result<OutputFile> file = OutputFile::Open(path);
+  Result<ReplacedFile> file = ReplacedFile::Open(path);
   if (!file) return tl::unexpected(std::move(file).error());
   return MeshOutput(*format, *std::move(file));
 }
 
 Result<void> MeshOutput::Write(std::vector<proto::MeshVertex> vertices,
                                const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                               const proto::GridPlacement& placement, const std::vector<proto::VertexColor>& colors) {
+                               const proto::GridPlacement& placement, const std::vector<Rgb>& colors) {
   Result<void> written = proto::WriteMesh(file_.stream(), format_, std::move(vertices), triangles, colors, placement);
   if (!written) return MakeError(written.error().code, "{}: {}", file_.path(), written.error().message);
   return file_.Commit();

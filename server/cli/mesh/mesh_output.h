@@ -11,7 +11,7 @@
 #include "engine/core/result.h"
 #include "engine/tin/mesh/height_field.h"
 #include "proto/gltf/mesh_file.h"
-#include "server/cli/common/output_file.h"
+#include "server/cli/common/replaced_file.h"
 
 namespace terrace::cli {
 
@@ -24,15 +24,15 @@ class MeshOutput {
   // Writes the whole file. The vertices lie on the placement's grid; `colors` is empty or has one entry per vertex.
   Result<void> Write(std::vector<proto::MeshVertex> vertices,
                      const std::vector<std::array<std::uint32_t, 3>>& triangles, const proto::GridPlacement& placement,
-                     const std::vector<proto::VertexColor>& colors = {});
+                     const std::vector<Rgb>& colors = {});
   // The same of a file that was encoded before.
   Result<void> Write(const std::string& bytes);
 
  private:
-  MeshOutput(proto::MeshFileFormat format, OutputFile file) : format_(format), file_(std::move(file)) {}
+  MeshOutput(proto::MeshFileFormat format, ReplacedFile file) : format_(format), file_(std::move(file)) {}
 
   proto::MeshFileFormat format_;
-  OutputFile file_;
+  ReplacedFile file_;
 };
 
 struct MeshSeconds {

@@ -56,7 +56,7 @@ TEST(ColumnDifferences, AreThoseOfSingleSamples) {
     tin::ForEachInstructionSet([&] {
       ColumnDifferences bends;
       bends.Resize(columns);
-      MeasureBends(samples.data(), stride, rows.size(), bends);
+      MeasureDifferences(samples.data(), stride, rows.size(), bends);
       EXPECT_EQ(bends.x, expected.x) << columns;
       EXPECT_EQ(bends.y, expected.y) << columns;
       EXPECT_EQ(bends.xx, expected.xx) << columns;

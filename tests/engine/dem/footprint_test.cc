@@ -1,5 +1,6 @@
 #include <algorithm>
 
+#include "engine/dem/planned_tiles.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -106,6 +107,19 @@ TEST(Footprint, ReachesWhereverReadFindsHeights) {
       }
     }
   }
+}
+
+TEST(CommonBounds, StayWithinTheTurn) {
+  const auto common = CommonBounds({173.9, -5, -172.1, 0}, {-180, -4, -173, -1});
+  ASSERT_EQ(common.size(), 1u);
+  EXPECT_EQ(common[0].west, -180);
+  EXPECT_EQ(common[0].east, -173);
+  const auto crossing = CommonBounds({173.9, -5, -172.1, 0}, {170, -4, -173, -1});
+  ASSERT_EQ(crossing.size(), 1u);
+  EXPECT_EQ(crossing[0].west, 173.9);
+  EXPECT_EQ(crossing[0].east, -173);
+  const auto before = CommonBounds({173.9, -5, 180, 0}, {-180, -4, -173, -1});
+  EXPECT_TRUE(before.empty());
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ std::string WriteColors(const TempDir& dir, ColorSpec spec, const std::string& n
   return path;
 }
 
-Result<std::vector<ColorSample>> Colors(const std::string& image, const std::string& dem) {
+Result<std::vector<Rgba>> Colors(const std::string& image, const std::string& dem) {
   const auto raster = ReadRaster(dem);
   EXPECT_TRUE(raster.has_value());
   return ReadColors(image, dem, *raster);
@@ -92,7 +92,7 @@ TEST(ReadColors, TakesPixelBySampleWithoutAGeoreference) {
   ASSERT_TRUE(colors) << colors.error().message;
   for (int i = 0; i < 35; ++i) {
     const auto level = [&](int band) { return static_cast<std::uint8_t>(value(i % 7, i / 7, band)); };
-    EXPECT_EQ((*colors)[static_cast<std::size_t>(i)], (ColorSample{level(0), level(1), level(2), 255}));
+    EXPECT_EQ((*colors)[static_cast<std::size_t>(i)], (Rgba{level(0), level(1), level(2), 255}));
   }
 }
 
@@ -105,7 +105,7 @@ TEST(ReadColors, PlacesByDegrees) {
     const auto colors = Colors(image, dem);
     ASSERT_TRUE(colors) << colors.error().message;
     for (int i = 0; i < 600; ++i) {
-      const ColorSample& color = (*colors)[static_cast<std::size_t>(i)];
+      const Rgba& color = (*colors)[static_cast<std::size_t>(i)];
       EXPECT_NEAR(color[0], (8 + .05 * (i % 30 + .5) - 6) * 10 - .5, .501);
       EXPECT_NEAR(color[1], (50 - .05 * (i / 30 + .5) - 46) * 10 - .5, .501);
       EXPECT_EQ(color[2], 77);
@@ -145,7 +145,7 @@ TEST(ReadColors, AveragesPixelsThatAreFinerThanSamples) {
       dir, {.width = 16, .height = 16, .geo_transform = {500000, 8, 0, 5000000, 0, -8}, .crs = "EPSG:32632"});
   const auto colors = Colors(image, dem);
   ASSERT_TRUE(colors) << colors.error().message;
-  for (const ColorSample& color : *colors) EXPECT_EQ(color, (ColorSample{128, 128, 128, 255}));
+  for (const Rgba& color : *colors) EXPECT_EQ(color, (Rgba{128, 128, 128, 255}));
 }
 
 TEST(ReadColors, DoesNotMixInWhatIsTransparent) {
@@ -159,7 +159,7 @@ TEST(ReadColors, DoesNotMixInWhatIsTransparent) {
   ASSERT_TRUE(colors) << colors.error().message;
   for (int i = 0; i < 900; ++i) {
     const bool is_clear = .1 + .5 * (i % 30 + .5) <= 7.5;  // the centre of the last transparent pixel
-    const ColorSample expected = is_clear ? ColorSample{} : ColorSample{40, 40, 40, 255};
+    const Rgba expected = is_clear ? Rgba{} : Rgba{40, 40, 40, 255};
     EXPECT_EQ((*colors)[static_cast<std::size_t>(i)], expected) << i;
   }
 }
@@ -190,7 +190,7 @@ TEST(ReadColors, NeedsNoImageUnderVoids) {
        }});
   const auto colors = Colors(WriteColors(dir, beside), dem);
   ASSERT_TRUE(colors) << colors.error().message;
-  EXPECT_EQ((*colors)[0], ColorSample{});
+  EXPECT_EQ((*colors)[0], Rgba{});
   EXPECT_EQ((*colors)[29][3], 255);
 }
 
@@ -199,24 +199,23 @@ TEST(ReadImage, KnowsEveryKindOfBands) {
   const auto pixel = [&](const ColorSpec& spec, int col, int row) {
     const auto image = ReadImage(WriteColors(dir, spec));
     EXPECT_TRUE(image) << image.error().message;
-    return image ? image->colors[static_cast<std::size_t>(row * image->width + col)] : ColorSample{};
+    return image ? image->colors[static_cast<std::size_t>(row * image->width + col)] : Rgba{};
   };
   const auto value = [](int col, int row, int band) { return 100 * band + 10 * row + col; };
-  EXPECT_EQ(pixel({.bands = 1, .value = value}, 3, 4), (ColorSample{43, 43, 43, 255}));
-  EXPECT_EQ(pixel({.bands = 3, .value = value}, 3, 4), (ColorSample{43, 143, 243, 255}));
+  EXPECT_EQ(pixel({.bands = 1, .value = value}, 3, 4), (Rgba{43, 43, 43, 255}));
+  EXPECT_EQ(pixel({.bands = 3, .value = value}, 3, 4), (Rgba{43, 143, 243, 255}));
   EXPECT_EQ(pixel({.bands = 2, .has_alpha = true, .value = [](int col, int, int) { return col; }}, 0, 0),
-            (ColorSample{0, 0, 0, 0}));
+            (Rgba{0, 0, 0, 0}));
   EXPECT_EQ(pixel({.bands = 2, .has_alpha = true, .value = [](int col, int, int) { return col; }}, 9, 0),
-            (ColorSample{9, 9, 9, 255}));
+            (Rgba{9, 9, 9, 255}));
   const auto index = [](int col, int, int) { return col % 4; };
-  EXPECT_EQ(pixel({.bands = 1, .has_palette = true, .value = index}, 1, 0), (ColorSample{200, 100, 50, 255}));
-  EXPECT_EQ(pixel({.bands = 1, .nodata = 2, .has_palette = true, .value = index}, 1, 0),
-            (ColorSample{200, 100, 50, 255}));
+  EXPECT_EQ(pixel({.bands = 1, .has_palette = true, .value = index}, 1, 0), (Rgba{200, 100, 50, 255}));
+  EXPECT_EQ(pixel({.bands = 1, .nodata = 2, .has_palette = true, .value = index}, 1, 0), (Rgba{200, 100, 50, 255}));
   EXPECT_EQ(pixel({.bands = 1, .nodata = 2, .has_palette = true, .value = index}, 2, 0)[3], 0);
   EXPECT_EQ(pixel({.bands = 3, .type = GDT_UInt16, .value = [](int, int, int band) { return band * 32767; }}, 0, 0),
-            (ColorSample{0, 127, 255, 255}));
+            (Rgba{0, 127, 255, 255}));
   // A nodata value in one band is a dark colour; in all bands it is no colour.
-  EXPECT_EQ(pixel({.nodata = 0, .value = [](int, int, int band) { return band; }}, 0, 0), (ColorSample{0, 1, 2, 255}));
+  EXPECT_EQ(pixel({.nodata = 0, .value = [](int, int, int band) { return band; }}, 0, 0), (Rgba{0, 1, 2, 255}));
   EXPECT_EQ(pixel({.nodata = 0}, 0, 0)[3], 0);
 }
 
@@ -245,8 +244,8 @@ TEST(ReadColors, CoversTheGlobeWithAPaletteOfAnotherResolution) {
     return (*colors)[static_cast<std::size_t>(std::lround((90 - latitude) * 6) * 2160 +
                                               std::lround((longitude + 180) * 6))];
   };
-  for (const ColorSample& color : *colors) ASSERT_EQ(color[3], 255);
-  const ColorSample sahara = at(10, 23), ocean = at(-150, 0), greenland = at(-40, 73);
+  for (const Rgba& color : *colors) ASSERT_EQ(color[3], 255);
+  const Rgba sahara = at(10, 23), ocean = at(-150, 0), greenland = at(-40, 73);
   EXPECT_GT(sahara[0], sahara[2] + 50);
   EXPECT_GT(ocean[2], ocean[0]);
   EXPECT_GT(std::min({greenland[0], greenland[1], greenland[2]}), 200);

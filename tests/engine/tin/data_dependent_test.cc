@@ -153,8 +153,8 @@ class NaiveDataDependent {
     if (quality.pw < (is_further_out ? root : threshold * root) * quality.uv) return Verdict::kKeeps;
     double now = 0, then = 0;  // squared
     if (options_.measure == FitMeasure::kNormals) {
-      now = BendsOf(q).uv;
-      then = BendsOf(q).pw;
+      now = NormalAnglesOf(q).uv;
+      then = NormalAnglesOf(q).pw;
     } else {
       const auto [a, b, c] = triangulation_.triangle(beyond);
       const Corner u = At(q.u.id), v = At(q.v.id), w = At(q.w.id);

@@ -16,8 +16,8 @@
 namespace terrace::tin {
 namespace {
 
-std::vector<ColorSample> Colors(int width, int height, const std::function<ColorSample(int, int)>& at) {
-  std::vector<ColorSample> colors;
+std::vector<Rgba> Colors(int width, int height, const std::function<Rgba(int, int)>& at) {
+  std::vector<Rgba> colors;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) colors.push_back(at(x, y));
   }
@@ -25,14 +25,14 @@ std::vector<ColorSample> Colors(int width, int height, const std::function<Color
 }
 
 // Discs over a gradient: smooth parts, edges, and channels that differ.
-ColorSample Picture(int x, int y) {
+Rgba Picture(int x, int y) {
   const bool in_disc = (x - 20) * (x - 20) + (y - 15) * (y - 15) < 90;
   const auto level = [](int value) { return static_cast<std::uint8_t>(std::clamp(value, 0, 255)); };
   return {level(in_disc ? 220 : 3 * x), level(in_disc ? 40 : 2 * y + x), level((x * y) / 8), 255};
 }
 
-ExtendedField Make(HeightField heights, const std::function<ColorSample(int, int)>& at, double weight) {
-  std::vector<ColorSample> colors = Colors(heights.width(), heights.height(), at);
+ExtendedField Make(HeightField heights, const std::function<Rgba(int, int)>& at, double weight) {
+  std::vector<Rgba> colors = Colors(heights.width(), heights.height(), at);
   return ExtendedField::Make(std::move(heights), std::move(colors), weight).value();
 }
 
@@ -82,7 +82,7 @@ Measured Measure(const ExtendedField& field, const ColoredMesh& mesh) {
           for (std::size_t k = 0; k < 3; ++k) at[k] += part * mesh.colors[t[static_cast<std::size_t>(i)]][k] / 255.0;
         }
         double colors = 0;
-        if (const ColorSample& color = field.ColorAt(x, y); color[3] != 0) {
+        if (const Rgba& color = field.ColorAt(x, y); color[3] != 0) {
           ++measured.known;
           for (std::size_t k = 0; k < 3; ++k) {
             const double distance = std::abs(at[k] - color[k] / 255.0);
@@ -143,8 +143,8 @@ TEST(ExtendedGreedy, InsertsTheWorstSampleOfAll) {
     greedy.Run({.max_points = points});
     ASSERT_EQ(greedy.vertex_count(), points);
     const SamplePosition inserted = greedy.Mesh().tin.vertices.back();
-    const ColorSample& color = field.ColorAt(inserted.x, inserted.y);
-    EXPECT_EQ(greedy.Mesh().colors.back(), (Color{color[0], color[1], color[2]}));
+    const Rgba& color = field.ColorAt(inserted.x, inserted.y);
+    EXPECT_EQ(greedy.Mesh().colors.back(), (Rgb{color[0], color[1], color[2]}));
   }
 }
 
@@ -177,7 +177,7 @@ TEST(ExtendedGreedy, WeighsHeightsAgainstColorsAsThePaperDoes) {
     return Make(
         MakeField(41, 41, [](int x, int) { return x < 20 ? 0.0F : 100.0F; }),
         [](int, int y) {
-          return y < 20 ? ColorSample{0, 0, 0, 255} : ColorSample{255, 255, 255, 255};
+          return y < 20 ? Rgba{0, 0, 0, 255} : Rgba{255, 255, 255, 255};
         },
         weight);
   };
@@ -214,7 +214,7 @@ TEST(ExtendedGreedy, StopsAtThePointsAskedFor) {
 TEST(ExtendedGreedy, TakesEverySampleForNoError) {
   const auto noise = [](int x, int y) {
     const auto level = [](int value) { return static_cast<std::uint8_t>((value * 7919) % 251); };
-    return ColorSample{level(x + 31 * y), level(3 * x + y), level(x * y), 255};
+    return Rgba{level(x + 31 * y), level(3 * x + y), level(x * y), 255};
   };
   const ExtendedField field = Make(NoiseField(17, 13, 5), noise, 0.5);
   const ColoredMesh mesh = MeshOf(field, {});
@@ -226,12 +226,12 @@ TEST(ExtendedGreedy, LeavesAConstantFieldAlone) {
   const ExtendedField field = Make(
       Flat(30, 20),
       [](int, int) {
-        return ColorSample{10, 200, 30, 255};
+        return Rgba{10, 200, 30, 255};
       },
       0.5);
   const ColoredMesh mesh = MeshOf(field, {});
   EXPECT_EQ(mesh.tin.vertices.size(), 4u);
-  EXPECT_EQ(mesh.colors, (std::vector<Color>(4, Color{10, 200, 30})));
+  EXPECT_EQ(mesh.colors, (std::vector<Rgb>(4, Rgb{10, 200, 30})));
 }
 
 TEST(ExtendedGreedy, FollowsColorsOverFlatGround) {
@@ -249,8 +249,8 @@ TEST(ExtendedGreedy, KeepsItsBoundAroundVoidsAndUnknownColors) {
       MakeField(61, 43, [&](int x, int y) { return is_void(x, y) ? kVoid : HillHeight(x, y, 3); });
   const auto picture = [&](int x, int y) {
     // The values of voids and transparent samples must have no effect.
-    if (is_clear(x, y)) return ColorSample{255, 0, 255, 0};
-    return is_void(x, y) ? ColorSample{255, 255, 0, 255} : Picture(x, y);
+    if (is_clear(x, y)) return Rgba{255, 0, 255, 0};
+    return is_void(x, y) ? Rgba{255, 255, 0, 255} : Picture(x, y);
   };
   const ExtendedField field = Make(heights, picture, 0.5);
   const ColoredMesh mesh = MeshOf(field, {.max_error = 4});
@@ -261,13 +261,13 @@ TEST(ExtendedGreedy, KeepsItsBoundAroundVoidsAndUnknownColors) {
   for (std::size_t i = 0; i < mesh.colors.size(); ++i) {
     const SamplePosition p = mesh.tin.vertices[i];
     EXPECT_TRUE(i < 4 || !is_void(p.x, p.y));
-    EXPECT_NE(mesh.colors[i], (Color{255, 0, 255}));
+    EXPECT_NE(mesh.colors[i], (Rgb{255, 0, 255}));
     has_clear = has_clear || is_clear(p.x, p.y);
   }
   EXPECT_TRUE(has_clear);
   // The corner at (60, 42): its nearest known colour.
-  const ColorSample east = field.ColorAt(60, 20);
-  EXPECT_EQ(field.NearestColor(60, 42), (Color{east[0], east[1], east[2]}));
+  const Rgba east = field.ColorAt(60, 20);
+  EXPECT_EQ(field.NearestColor(60, 42), (Rgb{east[0], east[1], east[2]}));
 }
 
 TEST(ExtendedGreedy, KeepsItsBoundForExtremeHeights) {
@@ -291,8 +291,7 @@ TEST(ExtendedGreedy, KeepsItsBoundOnRandomFields) {
     });
     const auto noise = [&](int x, int y) {
       const auto level = [&] { return static_cast<std::uint8_t>(random.Below(256)); };
-      return ColorSample{level(), level(), level(),
-                         static_cast<std::uint8_t>(x + y > 0 && random.Below(8) < clear ? 0 : 255)};
+      return Rgba{level(), level(), level(), static_cast<std::uint8_t>(x + y > 0 && random.Below(8) < clear ? 0 : 255)};
     };
     const ExtendedField field = Make(heights, noise, random.Unit());
     const double bound = static_cast<double>(scale) * 1000 * random.Unit();
@@ -302,8 +301,8 @@ TEST(ExtendedGreedy, KeepsItsBoundOnRandomFields) {
 }
 
 TEST(ExtendedField, RefusesWhatHasNoMeaning) {
-  const auto opaque = Colors(8, 6, [](int, int) { return ColorSample{1, 2, 3, 255}; });
-  const auto fails = [&](std::vector<ColorSample> colors, double weight, const char* words) {
+  const auto opaque = Colors(8, 6, [](int, int) { return Rgba{1, 2, 3, 255}; });
+  const auto fails = [&](std::vector<Rgba> colors, double weight, const char* words) {
     const auto field = ExtendedField::Make(Flat(8, 6), std::move(colors), weight);
     ASSERT_FALSE(field.has_value());
     EXPECT_EQ(field.error().code, ErrorCode::kInvalidArgument);
@@ -311,7 +310,7 @@ TEST(ExtendedField, RefusesWhatHasNoMeaning) {
   };
   fails({}, 0.5, "48 colours, not 0");
   for (const double weight : {-0.1, 1.1, std::nan("")}) fails(opaque, weight, "weight");
-  fails(std::vector<ColorSample>(48), 0.5, "transparent");
+  fails(std::vector<Rgba>(48), 0.5, "transparent");
 }
 
 }  // namespace

@@ -30,26 +30,26 @@ TEST(Quadrilateral, HoldsTheLargestCoordinates) {
   EXPECT_EQ(ShapeQualityOf(square).uv, ShapeQualityOf(square).pw);
 }
 
-TEST(Quadrilateral, BendsLessWhereThreeCornersAreLevel) {
+TEST(Quadrilateral, NormalAnglesLessWhereThreeCornersAreLevel) {
   // A square with one raised corner: the best diagonal leaves the other three in one triangle.
   const auto lifted = [](float u, float v, float w, float p) {
     return Quadrilateral{{1, 4, 0, u}, {2, 0, 4, v}, {3, 4, 4, w}, p};
   };
-  const auto less_along_pw = [](const Quadrilateral& q) { return BendsOf(q).pw < BendsOf(q).uv; };
+  const auto less_along_pw = [](const Quadrilateral& q) { return NormalAnglesOf(q).pw < NormalAnglesOf(q).uv; };
   EXPECT_TRUE(less_along_pw(lifted(9, 0, 0, 0)));
   EXPECT_TRUE(less_along_pw(lifted(0, 9, 0, 0)));
   EXPECT_FALSE(less_along_pw(lifted(0, 0, 9, 0)));
   EXPECT_FALSE(less_along_pw(lifted(0, 0, 0, 9)));
-  EXPECT_NEAR(BendsOf(lifted(4, 8, 12, 0)).uv, 0, 1e-15);  // a plane
-  EXPECT_NEAR(BendsOf(lifted(4, 8, 12, 0)).pw, 0, 1e-15);
+  EXPECT_NEAR(NormalAnglesOf(lifted(4, 8, 12, 0)).uv, 0, 1e-15);  // a plane
+  EXPECT_NEAR(NormalAnglesOf(lifted(4, 8, 12, 0)).pw, 0, 1e-15);
 }
 
-TEST(Quadrilateral, BendsByTheAngleBetweenNormals) {
+TEST(Quadrilateral, NormalAnglesByTheAngleBetweenNormals) {
   // A square of 2 x 2 whose sides slope by 1 in 1 from the diagonal p-w: normals (1, -1, 1) and (-1, 1, 1).
   const Quadrilateral roof{{1, 2, 0, -2}, {2, 0, 2, -2}, {3, 2, 2, 0}, 0};
-  EXPECT_NEAR(BendsOf(roof).pw, 1 - -1.0 / 3, 1e-15);
+  EXPECT_NEAR(NormalAnglesOf(roof).pw, 1 - -1.0 / 3, 1e-15);
   // Along u-v: (-1, -1, 1) and (1, 1, 1).
-  EXPECT_NEAR(BendsOf(roof).uv, 1 - -1.0 / 3, 1e-15);
+  EXPECT_NEAR(NormalAnglesOf(roof).uv, 1 - -1.0 / 3, 1e-15);
   // Rounded planes never have a negative angle.
   Random random(1);
   for (int i = 0; i < 100000; ++i) {
@@ -57,9 +57,10 @@ TEST(Quadrilateral, BendsByTheAngleBetweenNormals) {
       return static_cast<float>(std::round((a * x + b * y) * 1024) / 1024);
     };
     const int x = 1000 + random.Below(2000), y = 1000 + random.Below(2000);
-    const Bends bends = BendsOf({{1, x, 0, height(x, 0)}, {2, 0, y, height(0, y)}, {3, x, y, height(x, y)}, 0});
-    ASSERT_GE(bends.uv, 0);
-    ASSERT_GE(bends.pw, 0);
+    const NormalAngles angles =
+        NormalAnglesOf({{1, x, 0, height(x, 0)}, {2, 0, y, height(0, y)}, {3, x, y, height(x, y)}, 0});
+    ASSERT_GE(angles.uv, 0);
+    ASSERT_GE(angles.pw, 0);
   }
 }
 

@@ -31,7 +31,7 @@ TEST(TileHead, SaysWhatTheTileIs) {
 
 TEST(TileHead, NamesTheFormatWithItsExtensions) {
   tiler::TileRequest request;
-  request.normals = true;
+  request.extensions.normals = true;
   EXPECT_TRUE(MakeTileHeaders(request, HeadTile())
                   .text.starts_with("Content-Type: application/vnd.quantized-mesh;extensions=octvertexnormals\r\n"))
       << MakeTileHeaders(request, HeadTile()).text;

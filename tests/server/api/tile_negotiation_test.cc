@@ -99,7 +99,7 @@ TEST(NegotiateTile, GivesNoExtensionThatTheTileHasNot) {
   request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals-watermask-metadata");
   const auto extensions = [&](const char* target) {
     const tiler::TileRequest tile = *NegotiateTile(TestContext(target, request).context, datasets);
-    return proto::TileExtensions{tile.normals, tile.water_mask, tile.metadata};
+    return tile.extensions;
   };
   EXPECT_EQ(extensions("/dry/0/0/0.terrain"), (proto::TileExtensions{true, false, false}));
   EXPECT_EQ(extensions("/wet/0/0/0.terrain"), (proto::TileExtensions{true, true, true}));
@@ -277,7 +277,7 @@ TEST(NegotiateTile, MakesACanonicalRequest) {
   EXPECT_EQ(tile->dataset, 1u);
   EXPECT_EQ(tile->key, (geo::TileKey{1, 1, 0}));
   EXPECT_EQ(tile->coding, tiler::Coding::kGzip);
-  EXPECT_TRUE(tile->normals);
+  EXPECT_TRUE(tile->extensions.normals);
   EXPECT_EQ(tile->error_step, geo::SnapToLadder(1, 100));
 
   EXPECT_EQ(negotiate("/oahu/0/0/0.terrain").error().code, ErrorCode::kNotFound);
@@ -304,7 +304,7 @@ TEST(NegotiateTile, GlbTilesAreCanonicalToo) {
   ASSERT_TRUE(tile);
   EXPECT_EQ(tile->format, tiler::TileFormat::kGlb);
   EXPECT_EQ(tile->compression, proto::GlbCompression::kMeshopt);
-  EXPECT_FALSE(tile->normals) << "they have normals whatever is asked for";
+  EXPECT_FALSE(tile->extensions.normals) << "they have normals whatever is asked for";
   EXPECT_EQ(*tile, *negotiate("/maui/0/1/0.glb?compression=meshopt"));
   EXPECT_FALSE(*tile == *negotiate("/maui/0/1/0.glb?compression=draco"));
   EXPECT_EQ(negotiate("/maui/0/1/0.glb?compression=draco")->coding, tiler::Coding::kIdentity);

@@ -73,7 +73,7 @@ TEST(StoppedJobs, CertifiedPointsEnd) {
   const std::vector<DatasetView> views = Views(1);
   const std::vector<dem::GeoPosition> points(400'000);
   const StopAtAllocation stop(kMiddle);
-  const auto tiles = TilesOf(views[0], points, 5, stop.token());
+  const auto tiles = CertifyingTilesOf(views[0], points, 5, stop.token());
   ASSERT_FALSE(tiles);
   EXPECT_EQ(tiles.error().code, ErrorCode::kCancelled);
   EXPECT_TRUE(stop.happened());

@@ -292,13 +292,13 @@ TEST(CertifiedPoints, LieInTheDeepestTilesThereAre) {
   DatasetView dataset;
   dataset.available = {{{0, 0, 1, 0}}, {{2, 1, 2, 1}}};  // 0..90 east, 0..90 north at level 1
   const std::vector<dem::GeoPosition> points = {{45, 45}, {100, 45}, {0, 0}, {-0.001, 0}, {180, 90}, {-180, -90}};
-  const auto deepest = TilesOf(dataset, points, geo::kMaxLevel);
+  const auto deepest = CertifyingTilesOf(dataset, points, geo::kMaxLevel);
   ASSERT_TRUE(deepest);
   const std::vector<geo::TileKey> tiles = {{1, 2, 1}, {0, 1, 0}, {0, 0, 0}};
   EXPECT_EQ(deepest->tiles, tiles);
   EXPECT_EQ(deepest->tile_of_point, (std::vector<std::size_t>{0, 1, 0, 2, 2, 2}));
   EXPECT_EQ(deepest->errors_m.size(), 3u);
-  EXPECT_EQ(TilesOf(dataset, points, 0)->tiles, (std::vector<geo::TileKey>{{0, 1, 0}, {0, 0, 0}}));
+  EXPECT_EQ(CertifyingTilesOf(dataset, points, 0)->tiles, (std::vector<geo::TileKey>{{0, 1, 0}, {0, 0, 0}}));
 }
 
 TEST(CertifiedPoints, AreRefusedInTooManyTiles) {
@@ -308,12 +308,12 @@ TEST(CertifiedPoints, AreRefusedInTooManyTiles) {
   }
   std::vector<dem::GeoPosition> points;
   for (std::size_t i = 0; i <= kMaxCertifiedTiles; ++i) points.push_back({static_cast<double>(i) * 2.8125 - 179, 1});
-  const auto refused = TilesOf(dataset, points, 6);
+  const auto refused = CertifyingTilesOf(dataset, points, 6);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
-  EXPECT_TRUE(TilesOf(dataset, points, 5));
+  EXPECT_TRUE(CertifyingTilesOf(dataset, points, 5));
   points.pop_back();
-  EXPECT_TRUE(TilesOf(dataset, points, 6));
+  EXPECT_TRUE(CertifyingTilesOf(dataset, points, 6));
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ class ReloaderTest : public testing::Test {
     return dataset;
   }
 
-  void Start() {
+  void Start(bool watch = true) {
     std::vector<DatasetSlot> slots;
     for (const config::DatasetConfig& wanted : config_.datasets) {
       tiler::Dataset dataset = *Open(wanted, {});
@@ -86,7 +86,7 @@ class ReloaderTest : public testing::Test {
     openings_ = 0;
     next_ = config_;
     reloader_ = std::make_unique<Reloader>(config_, std::move(slots), MakeHooks());
-    reloader_->Start(/*watch=*/true);
+    reloader_->Start(watch);
   }
 
   Reloader::Hooks MakeHooks() {
@@ -337,6 +337,18 @@ TEST_F(ReloaderTest, ADatasetThatWasNeverServedIsTriedAgainWithoutWatching) {
   EXPECT_TRUE(Eventually([&] { return Problems().empty(); })) << "it is being prepared again";
   blocks_ = fails_ = false;
   EXPECT_TRUE(Eventually([&] { return Served().size() == 1; }));
+}
+
+TEST_F(ReloaderTest, AReplacementThatFailedIsTriedAgainWithoutWatching) {
+  Start(/*watch=*/false);
+  const auto before = Served();
+  fails_ = true;
+  Put("a");
+  reloader_->CheckNow();
+  ASSERT_TRUE(Eventually([&] { return Problems().contains("a"); }));
+  fails_ = false;
+  Put("a");
+  EXPECT_TRUE(Eventually([&] { return Served() != before && Problems().empty(); }));
 }
 
 TEST_F(ReloaderTest, OpensNothingAfterAStop) {

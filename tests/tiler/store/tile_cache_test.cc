@@ -109,11 +109,11 @@ TEST(TileCache, SeparatesEverythingThatChangesBytes) {
   keys[1].request.dataset = 1;
   keys[2].request.error_step = -1;
   keys[3].request.coding = Coding::kGzip;
-  keys[4].request.normals = true;
+  keys[4].request.extensions.normals = true;
   keys[5].generation = 2;
   keys[6].request.key.level = 11;
-  keys[7].request.water_mask = true;
-  keys[8].request.metadata = true;
+  keys[7].request.extensions.water_mask = true;
+  keys[8].request.extensions.metadata = true;
   keys[9].request.texture = proto::TextureFormat::kJpeg;
   for (std::size_t i = 0; i < keys.size(); ++i) cache.Insert(keys[i], Tile(static_cast<char>('a' + i)));
   for (std::size_t i = 0; i < keys.size(); ++i) {

@@ -90,9 +90,9 @@ TEST(TileRecord, KeysDifferWhereverTheBytesMay) {
   keys[7].request.compression = proto::GlbCompression::kMeshopt;
   keys[8].request.texture = proto::TextureFormat::kJpeg;
   keys[9].request.coding = Coding::kGzip;
-  keys[10].request.normals = true;
-  keys[11].request.water_mask = true;
-  keys[12].request.metadata = true;
+  keys[10].request.extensions.normals = true;
+  keys[11].request.extensions.water_mask = true;
+  keys[12].request.extensions.metadata = true;
   keys[13].request.height_encoding = proto::HeightEncoding::kTerrarium;
   keys[14].request.side_px = 512;
   std::set<std::string> different;

@@ -7,6 +7,7 @@
 
 #include "archive/manifest.h"
 #include "archive/pmtiles/unit_file.h"
+#include "archive/unit_name.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
@@ -18,9 +19,9 @@ namespace terrace::archive {
 // Used by one thread at a time. The same tiles make the same bytes, in whatever order they were added.
 // Destroyed without Finish: removes what it wrote. A process that is killed leaves files that end with ".partial",
 // which readers ignore, and which bake::TidyPlace removes when all is done.
-class TileWriter {
+class UnitWriter {
  public:
-  virtual ~TileWriter() = default;
+  virtual ~UnitWriter() = default;
 
   // `tile`: in the coding of the archive's kind. Its bytes, errors and counts are stored. `range`:
   // DemSource::RangeBound of the tile; not used for height tiles. kInvalidArgument: the tile lies outside the unit.
@@ -40,7 +41,7 @@ struct UnitOptions {
 
 // Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 80 bytes for
 // each.
-Result<std::unique_ptr<TileWriter>> CreateUnit(const std::string& place, const std::string& name,
+Result<std::unique_ptr<UnitWriter>> CreateUnit(const std::string& place, const std::string& name,
                                                const UnitOptions& options);
 
 // Reads a finished file in full: every checksum, whether its tiles belong to the unit, and whether header and metadata

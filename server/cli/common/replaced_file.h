@@ -1,5 +1,5 @@
-// A file that is written completely or not at all: written to a temporary name in the same folder and renamed at the
-// end.
+// Replaces a file that the user named: written under a temporary name in the same folder, renamed at the end, removed
+// on signals.
 #pragma once
 
 #include <filesystem>
@@ -14,12 +14,12 @@ namespace terrace::cli {
 
 // At most one at a time. The destructor removes the file; so do SIGINT, SIGTERM and SIGHUP before they end the process.
 // Ignored signals stay ignored. If the process ends in another way, the file stays.
-class UnfinishedFile {
+class TemporaryFile {
  public:
-  explicit UnfinishedFile(std::string path);
-  UnfinishedFile(const UnfinishedFile&) = delete;
-  UnfinishedFile& operator=(const UnfinishedFile&) = delete;
-  ~UnfinishedFile();
+  explicit TemporaryFile(std::string path);
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile();
 
   const std::string& path() const { return path_; }
 
@@ -27,13 +27,13 @@ class UnfinishedFile {
   std::string path_;
 };
 
-class OutputFile {
+class ReplacedFile {
  public:
   // If `path` is a symbolic link, writes its target. kUnavailable: the folder is missing or not writable, the existing
   // file is not writable, or it is a device or a pipe.
-  static Result<OutputFile> Open(const std::string& path);
+  static Result<ReplacedFile> Open(const std::string& path);
 
-  // Without Commit, the new file is removed (UnfinishedFile) and the old file at `path` stays.
+  // Without Commit, the new file is removed (TemporaryFile) and the old file at `path` stays.
   std::ostream& stream() { return stream_; }
 
   const std::string& path() const { return path_; }  // as given
@@ -42,11 +42,11 @@ class OutputFile {
   Result<void> Commit();
 
  private:
-  OutputFile(std::string path, std::filesystem::path target);
+  ReplacedFile(std::string path, std::filesystem::path target);
 
   std::string path_;              // as given
   std::filesystem::path target_;  // the file that is replaced
-  std::unique_ptr<UnfinishedFile> unfinished_;
+  std::unique_ptr<TemporaryFile> temporary_;
   std::ofstream stream_;
 };
 

@@ -1,4 +1,4 @@
-#include "proto/library_versions.h"
+#include "proto/codec_versions.h"
 
 // clang-format off
 #include <cstdio>  // jpeglib.h needs FILE
@@ -15,7 +15,7 @@
 
 namespace terrace::proto {
 
-std::string LibraryVersions() {
+std::string CodecVersions() {
   return fmt::format(
       "Draco {}, meshoptimizer {}, libjpeg {}, libwebp {:x}, libdeflate {}, zlib {}, brotli {:x}, zstd {}",
       draco::kDracoVersion, MESHOPTIMIZER_VERSION, JPEG_LIB_VERSION, WebPGetEncoderVersion(), LIBDEFLATE_VERSION_STRING,

@@ -1,4 +1,4 @@
-#include "server/cli/common/output_file.h"
+#include "server/cli/common/replaced_file.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -47,7 +47,7 @@ fs::path TargetOf(const fs::path& path) {
 }  // namespace
 
 // Files with longer paths cannot be opened.
-UnfinishedFile::UnfinishedFile(std::string path) : path_(std::move(path)) {
+TemporaryFile::TemporaryFile(std::string path) : path_(std::move(path)) {
   TERRACE_CHECK(!has_file.load());
   if (path_.size() >= path_of_file.size()) return;
   path_.copy(path_of_file.data(), path_.size());
@@ -61,18 +61,18 @@ UnfinishedFile::UnfinishedFile(std::string path) : path_(std::move(path)) {
 }
 
 // After a rename there is no file to remove.
-UnfinishedFile::~UnfinishedFile() {
+TemporaryFile::~TemporaryFile() {
   has_file.store(false);
   ::unlink(path_.c_str());
 }
 
-OutputFile::OutputFile(std::string path, fs::path target)
+ReplacedFile::ReplacedFile(std::string path, fs::path target)
     : path_(std::move(path)),
       target_(std::move(target)),
-      unfinished_(std::make_unique<UnfinishedFile>(fmt::format("{}.{}.part", target_.string(), getpid()))),
-      stream_(unfinished_->path(), std::ios::binary) {}
+      temporary_(std::make_unique<TemporaryFile>(fmt::format("{}.{}.part", target_.string(), getpid()))),
+      stream_(temporary_->path(), std::ios::binary) {}
 
-Result<OutputFile> OutputFile::Open(const std::string& path) {
+Result<ReplacedFile> ReplacedFile::Open(const std::string& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
     return MakeError(ErrorCode::kUnavailable, "{} is a folder; name a file in it", path);
@@ -85,22 +85,22 @@ Result<OutputFile> OutputFile::Open(const std::string& path) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; remove it, or give another name", path,
                      ErrorText());
   }
-  OutputFile file(path, TargetOf(path));
+  ReplacedFile file(path, TargetOf(path));
   if (!file.stream_) {
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; choose a folder that exists and is writable", path,
                      ErrorText());
   }
   // Set before anything is written, so that nobody can read data without permission.
   const fs::perms permissions = fs::status(file.target_, ignored).permissions();
-  if (permissions != fs::perms::unknown) fs::permissions(file.unfinished_->path(), permissions, ignored);
+  if (permissions != fs::perms::unknown) fs::permissions(file.temporary_->path(), permissions, ignored);
   return file;
 }
 
-Result<void> OutputFile::Commit() {
+Result<void> ReplacedFile::Commit() {
   stream_.close();
   if (!stream_) return MakeError(ErrorCode::kUnavailable, "writing {} failed; is the disk full?", path_);
   std::error_code error;
-  fs::rename(unfinished_->path(), target_, error);
+  fs::rename(temporary_->path(), target_, error);
   if (error) return MakeError(ErrorCode::kUnavailable, "cannot replace {}: {}", path_, error.message());
   return {};
 }
