@@ -270,7 +270,7 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
   return true;
 }
 
-double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
+double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool between, bool fills, double known,
                                            std::optional<CellSamples>& cell_samples) const {
   const HeightRange& all = grid_.heights();
   const auto corners = CornersOf(cell);
@@ -278,7 +278,7 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   PixelBounds box;
   for (const Position& corner : *corners) box.Add(corner.x, corner.y);
   // Samples are at the pixels' centres.
-  const double halo = may_blend ? 1 : 0;
+  const double halo = between ? 1 : 0;
   const Position& off = statistics_.misplacement();
   box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
   if (fills) {
@@ -302,7 +302,7 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool may_blend,
   double error = DistanceBound(cell, range.min, range.max);
   if (fills) return error;
   error = std::min(error, BoundByAveragesNear(cell, box));
-  cell_samples = CellSamples{*corners, Clipped(CentresIn(box, 0)), may_blend};
+  cell_samples = CellSamples{*corners, Clipped(CentresIn(box, 0)), between};
   if (trace_.factor > 1) return error;
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;

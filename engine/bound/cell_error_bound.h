@@ -42,10 +42,11 @@ class CellErrorBound {
     bool between = false;  // heights between samples count as well
   };
 
-  // Returns a bound for any cell from the statistics, averages and samples that were read. `may_blend`: the raster grid
-  // is blended in the cell, so heights between samples count like samples. `fills`: filled voids count too. Sets
-  // `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been read.
-  double BoundBySurroundings(const TileCell& cell, bool may_blend, bool fills, double known,
+  // Returns a bound for any cell from the statistics, averages and samples that were read. `between`: heights
+  // between samples count like samples, for example because the raster grid is blended in the cell. `fills`: filled
+  // voids count too. Sets `cell_samples` if BoundBySamples can give a tighter bound from samples that have not been
+  // read.
+  double BoundBySurroundings(const TileCell& cell, bool between, bool fills, double known,
                              std::optional<CellSamples>& cell_samples) const;
 
   // Whether BoundBySurroundings returns 0 for every cell of a box, because all samples around them are voids, as on the

@@ -56,8 +56,9 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
   PlaceNodes(grid);
 }
 
-// Nodes that took their height from this raster grid, away from its rim: averages are not evenly spaced at the end of
-// the surface, where the last average of an axis covers fewer samples.
+// Nodes that took their height from this raster grid. Averages are not evenly spaced at the end of an axis whose last
+// average covers fewer samples. Beyond the outermost averages, where the surface is constant, all places are those of
+// the averages: the steps between places change there, which counts as a bend.
 void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   const GridAxis columns(grid.columns(), trace_.factor, grid.wraps()), rows(grid.rows(), trace_.factor, false);
   const auto last = [&](const GridAxis& axis, int samples) {
@@ -67,13 +68,12 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   const double last_y = last(rows, grid.rows()) - misplacement_.y;
   const auto of_column = [&](std::int64_t column, double weight) {
     const double x = static_cast<double>(column) + weight;
-    const bool is_even =
-        grid.wraps() ? grid.columns() % trace_.factor == 0 || (x >= 0 && x <= last_x) : x > 0 && x < last_x;
+    const bool is_even = (grid.wraps() && grid.columns() % trace_.factor == 0) || (x >= 0 && x <= last_x);
     return is_even ? x : kUnknown;
   };
   const auto of_row = [&](std::int64_t row, double weight) {
     const double y = static_cast<double>(row) + weight;
-    return y > 0 && y < last_y ? y : kUnknown;
+    return y >= 0 && y <= last_y ? y : kUnknown;
   };
   const NodeCells& cells = trace_.cells;
   const NodeWindow& part = cells.window();  // nodes beyond have no height from this raster grid
@@ -165,9 +165,10 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
     const NodeCoordinates places{x_.get() + n, y_.get() + n, tile_.stride()};
     if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
   }
-  // A line with second difference b deviates from its chord by b / 8; half as much again covers changes of b in both
-  // directions.
-  constexpr double kOffChord = 1.5 * 2 / 8;
+  // A line with second difference b deviates from its chord by b / 8, and half as much again covers changes of b in
+  // both directions. At the outermost averages places stop between two nodes: a part a of a step of length s is lost,
+  // the steps differ by a or by s - a, and a place is at most a (s - a) / s, half of the larger one, off the chord.
+  constexpr double kOffChord = 0.5;
   steps.bend_x = steps.bend_x * kOffChord + position_error_ + misplacement_.x;
   steps.bend_y = steps.bend_y * kOffChord + position_error_ + misplacement_.y;
   at.Grow(misplacement_.x, misplacement_.y);

@@ -123,7 +123,7 @@ class GridErrorBound {
   }
 
  private:
-  std::size_t CellIndex(int i, int j) const { return Area(j, nodes_.cells()) + static_cast<std::size_t>(i); }
+  std::size_t CellIndex(int i, int j) const { return IndexAt(i, j, nodes_.cells()); }
   bool Touches(const CellBox& box) const {
     return grid_.reach().Touches(nodes_.West(box), nodes_.South(box), nodes_.Width(box), nodes_.Height(box));
   }
@@ -220,7 +220,7 @@ class GridErrorBound {
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
     const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
     if (!std::isfinite(error)) {
-      if (!tile_.blends_ && HasNoHeights(box) && single_.HasNoSamples(box)) return;
+      if (!tile_.blends_ && !tile_.counts_between_ && HasNoHeights(box) && single_.HasNoSamples(box)) return;
       uneven_.push_back({box, may_blend});
       return;
     }
@@ -283,8 +283,8 @@ class GridErrorBound {
   void AddUneven(const TileCell& cell, bool may_blend, bool fills, double known) {
     if (known <= tile_.bound_) return;
     std::optional<CellErrorBound::CellSamples> cell_samples;
-    const double error =
-        std::min(known, single_.BoundBySurroundings(cell, may_blend, fills, tile_.bound_, cell_samples));
+    const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend || tile_.counts_between_, fills,
+                                                                     tile_.bound_, cell_samples));
     if (error <= tile_.bound_) return;
     if (!cell_samples || !LooseCells::MayRead(trace_.factor)) return Raise(error);
     loose_.Add(cell, *cell_samples, error);
@@ -308,11 +308,12 @@ class GridErrorBound {
 };
 
 SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window,
-                                   std::span<const float> heights, bool blends)
+                                   std::span<const float> heights, bool blends, bool counts_between)
     : lattice_(lattice),
       window_(window),
       heights_(heights),
       blends_(blends),
+      counts_between_(counts_between),
       covered_(Area(lattice.cells, lattice.cells)) {}
 
 Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {

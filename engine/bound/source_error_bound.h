@@ -21,8 +21,10 @@ class SourceErrorBound {
   static constexpr int kGroup = 16;
 
   // `window` and `heights`: the tile's samples with a halo of one, as served. `blends`: raster grids are blended at
-  // their edges.
-  SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends);
+  // their edges. `counts_between`: the heights between samples count as well as the samples, as those of a replacement
+  // do, which are wanted at the samples of others.
+  SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends,
+                   bool counts_between = false);
 
   // `trace`: of RasterGrid::Fill for this window, with heights above the ellipsoid. Reads samples where statistics and
   // averages give no tight bound. kUnavailable: a raster cannot be read now. kCancelled: stopped.
@@ -42,7 +44,7 @@ class SourceErrorBound {
   const geo::Lattice lattice_;
   const NodeWindow window_;
   const std::span<const float> heights_;
-  const bool blends_;
+  const bool blends_, counts_between_;
   // By cell: no sample of a later raster grid shows in it.
   std::vector<std::uint8_t> covered_;
   double bound_ = 0;

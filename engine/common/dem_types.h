@@ -101,10 +101,14 @@ struct NodeWindow {
   int columns = 0, rows = 0;
 };
 
-// The number of elements in `rows` rows of `columns` elements: the size of a grid, or the index of a row's first
-// element.
+// The number of elements in `rows` rows of `columns` elements.
 constexpr std::size_t Area(std::int64_t columns, std::int64_t rows) {
   return static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+}
+
+// The index of an element in rows of `columns` elements.
+constexpr std::size_t IndexAt(std::int64_t column, std::int64_t row, std::int64_t columns) {
+  return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column);
 }
 
 // The remainder in 0 .. modulus - 1, for example of columns around the Earth.
@@ -184,7 +188,7 @@ struct TileHeights {
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.
-  float At(int i, int j) const { return heights[Area(j + 1, stride) + static_cast<std::size_t>(i + 1)]; }
+  float At(int i, int j) const { return heights[IndexAt(i + 1, j + 1, stride)]; }
 };
 
 // An edit, to be drawn.

@@ -37,7 +37,7 @@ void RangeTable::AddWindow(int col, int row, int cols, int rows, const float* he
     const std::int64_t bottom =
         std::min<std::int64_t>(((std::int64_t{row + r} + 1) * pixel_step - 1) / kBlock, finest.rows - 1);
     for (int c = 0; c < cols; ++c) {
-      const float height = heights[Area(r, cols) + static_cast<std::size_t>(c)];
+      const float height = heights[IndexAt(c, r, cols)];
       const std::int64_t left = std::int64_t{col + c} * pixel_step / kBlock;
       const std::int64_t right =
           std::min<std::int64_t>(((std::int64_t{col + c} + 1) * pixel_step - 1) / kBlock, finest.columns - 1);

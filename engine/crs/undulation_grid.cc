@@ -146,7 +146,7 @@ Result<UndulationPatch> UndulationPatch::Read(const UndulationGrid& grid, std::s
 
 std::array<double, 4> UndulationPatch::Around(const AxisPosition& column, const AxisPosition& row) const {
   const auto node = [&](int c, int r) {
-    return double{heights_[Area(r - first_row_, columns_) + static_cast<std::size_t>(c - first_column_)]};
+    return double{heights_[IndexAt(c - first_column_, r - first_row_, columns_)]};
   };
   return {node(column.node, row.node), node(column.next, row.node), node(column.node, row.next),
           node(column.next, row.next)};

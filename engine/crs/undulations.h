@@ -85,7 +85,7 @@ class Undulations {
   double EastOfArea(double longitude) const;  // degrees, 0 .. 360
   bool IsInside(double longitude, double latitude) const;
   const HeightRange& BoxAt(double longitude, double latitude) const;
-  HeightRange& Box(int column, int row) { return boxes_[Area(row, columns_) + static_cast<std::size_t>(column)]; }
+  HeightRange& Box(int column, int row) { return boxes_[IndexAt(column, row, columns_)]; }
   const HeightRange& Box(int column, int row) const { return const_cast<Undulations&>(*this).Box(column, row); }
   void FillBoxes();
 

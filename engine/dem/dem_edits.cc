@@ -193,7 +193,8 @@ Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWi
         for (std::size_t k = 0; k < tile.heights.size(); ++k) {
           if (std::isnan(tile.heights[k])) tile.heights[k] = heights[k];
         }
-        const auto bound = other.BoundError(tile, window, std::move(traces), stop);
+        // The samples of the sources take heights between those of the replacement.
+        const auto bound = other.BoundError(tile, window, std::move(traces), stop, /*counts_between=*/true);
         if (!bound) return tl::unexpected(bound.error());
         result.error_m = *bound;
       }

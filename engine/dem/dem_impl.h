@@ -48,8 +48,9 @@ class DemSource::Impl {
   Result<std::vector<float>> ReadGrids(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                        const std::string& what, const std::stop_token& stop,
                                        std::vector<PartTrace>* traces) const;
+  // `counts_between`: heights between samples count as well.
   Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
-                            const std::stop_token& stop) const;
+                            const std::stop_token& stop, bool counts_between = false) const;
   // The raster grids that may have heights in the box, in order of precedence.
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
   std::vector<std::size_t> GridsNear(const geo::TileKey& tile) const;

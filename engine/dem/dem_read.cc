@@ -276,9 +276,10 @@ Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum d
 
 // `traces`: of the raster grids that were read for the heights, in order of precedence.
 Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
-                                           std::vector<PartTrace> traces, const std::stop_token& stop) const {
+                                           std::vector<PartTrace> traces, const std::stop_token& stop,
+                                           bool counts_between) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(tile.lattice, window));
-  SourceErrorBound bound(tile.lattice, window, tile.heights, has_feather && order.size() > 1);
+  SourceErrorBound bound(tile.lattice, window, tile.heights, has_feather && order.size() > 1, counts_between);
   for (std::size_t k = 0; k < traces.size(); ++k) {
     const RasterGrid& grid = grids[order[k]];
     const GridTrace trace = Widened(std::move(traces[k]), grid, tile.lattice, window);

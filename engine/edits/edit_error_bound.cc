@@ -32,11 +32,11 @@ void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<con
   const auto stride = static_cast<std::size_t>(part.columns);
   for (int j = 0; j + 1 < part.rows; ++j) {
     for (int i = 0; i + 1 < part.columns; ++i) {
-      const std::size_t at = Area(part.columns, j) + static_cast<std::size_t>(i);
+      const std::size_t at = IndexAt(i, j, part.columns);
       const std::array<const EditedNode*, 4> corners = {&nodes[at], &nodes[at + 1], &nodes[at + stride],
                                                         &nodes[at + stride + 1]};
       double nearest = std::numeric_limits<double>::infinity(), furthest = -nearest, difference = 0;
-      const std::size_t cell = Area(window_.columns - 1, part.row + j) + static_cast<std::size_t>(part.column + i);
+      const std::size_t cell = IndexAt(part.column + i, part.row + j, window_.columns - 1);
       bool is_above = false, is_below = false;
       bool is_partial =
           replacement != nullptr && !replacement->void_cells.empty() && replacement->void_cells[cell] != 0;
@@ -79,7 +79,7 @@ double EditErrorBound::bound() const {
   double largest = before_;
   for (int j = 1; j + 2 < window_.rows; ++j) {  // without the halo's cells
     for (int i = 1; i + 2 < window_.columns; ++i) {
-      largest = std::max(largest, cells_[Area(window_.columns - 1, j) + static_cast<std::size_t>(i)]);
+      largest = std::max(largest, cells_[IndexAt(i, j, window_.columns - 1)]);
     }
   }
   return largest + kRounding;

@@ -116,7 +116,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
             target = TargetAt(edit, {x, y}, place);
           }
           if (errors)
-            nodes[Area(columns, j - part.first_row) + static_cast<std::size_t>(i - part.first_column)] = {
+            nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {
                 place, values[at], target};
           if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
         }

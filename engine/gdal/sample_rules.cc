@@ -209,7 +209,7 @@ Result<void> VisitSamples(GDALRasterBand& band, const SampleRules& rules, int co
     }
     for (int r = 0; r < count; r += rows_per_visit) {
       const int visited = std::min(rows_per_visit, count - r);
-      const std::size_t first = Area(cols, r), samples = Area(cols, visited);
+      const std::size_t first = IndexAt(0, r, cols), samples = Area(cols, visited);
       std::byte* const values = raw.get() + first * bytes_per_sample;
       auto* const doubles = reinterpret_cast<double*>(values);  // where `type` is GDT_Float64
       if (rules.is_signed_byte) {

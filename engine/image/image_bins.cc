@@ -110,7 +110,7 @@ Rgba ImageBins::At(Position position) const {
   std::array<double, 3> sums{};
   double whole = 0;
   const auto add = [&](int col, int row, double share) {
-    const Bin& bin = bins_[Area(row - first_row_, cols_) + static_cast<std::size_t>(Column(col))];
+    const Bin& bin = bins_[IndexAt(Column(col), row - first_row_, cols_)];
     if (bin.count == 0 || share == 0) return;
     for (std::size_t i = 0; i < 3; ++i) sums[i] += share * bin.sums[i] / bin.count;
     whole += share;

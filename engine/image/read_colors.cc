@@ -171,7 +171,7 @@ Result<RasterColors> ReadImage(const std::string& path, const std::function<void
   raster.colors.resize(Area(raster.width, raster.height));
   for (int row = 0; row < raster.height; row += kImageRowsAtOnce) {
     const int rows = std::min(kImageRowsAtOnce, raster.height - row);
-    Rgba* const out = raster.colors.data() + Area(row, raster.width);
+    Rgba* const out = raster.colors.data() + IndexAt(0, row, raster.width);
     if (auto read = image->Read(0, row, raster.width, rows, out); !read) return tl::unexpected(read.error());
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }

@@ -410,17 +410,16 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const Quadratic over(at_first, at_middle, at_last);
   scan.search.Add(at_first, scan.ShareOf(first));
   scan.search.Add(at_last, scan.ShareOf(last));
-  const Quadratic::Range range = over.Over(0, 1);
-  if (range.min < std::min(at_first, at_last)) {
-    const double vertex = -over.Slope(0) / (2 * over.curvature());
-    scan.search.Add(range.min, scan.ShareOf(Lerp(first, last, vertex)));
-  }
-  if (range.min >= -kSightTolerance || scan.search.IsBlockedBefore(scan.ShareOf(first))) return {};
+  // Not by values: rounding may make one of the polynomial lower than both ends where it has no lowest place between.
+  const bool is_lowest_between = over.Slope(0) < 0 && over.Slope(1) > 0;
+  const double lowest = is_lowest_between ? std::clamp(-over.Slope(0) / (2 * over.curvature()), 0.0, 1.0) : 1;
+  if (is_lowest_between) scan.search.Add(over.At(lowest), scan.ShareOf(Lerp(first, last, lowest)));
+  const bool is_blocked = std::min({at_first, at_last, over.At(lowest)}) < -kSightTolerance;
+  if (!is_blocked || scan.search.IsBlockedBefore(scan.ShareOf(first))) return {};
   // The first place below the tolerance.
   double place = 0;
   if (at_first >= -kSightTolerance) {
-    const double below = at_last < -kSightTolerance ? 1 : -over.Slope(0) / (2 * over.curvature());
-    place = FirstBelow([&](double share) { return over.At(share); }, 0, below);
+    place = FirstBelow([&](double share) { return over.At(share); }, 0, at_last < -kSightTolerance ? 1 : lowest);
   }
   scan.search.AddBlocked(scan.ShareOf(Lerp(first, last, place)));
   return {};

@@ -71,12 +71,6 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) 
 std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
   if (layout.overview_factors.empty() || statistics.voids == 0) return {};
   const auto declared = DeclaredNodata(HeightBand(dataset));
-  const BlockRange all = statistics.table.Whole();
-  // Beside a cliff, overviews by Lanczos kernels exceed the heights by 18 % of their range, cubic ones by 10 %. Equal
-  // heights differ by rounding.
-  const double overshoot =
-      0.25 * (static_cast<double>(statistics.highest) - static_cast<double>(statistics.lowest)) + 0.01;
-  const bool has_other_heights = all.min < statistics.lowest - overshoot || all.max > statistics.highest + overshoot;
   std::string why;
   if (layout.rules.nodata && !declared && !layout.rules.has_mask) {
     why =
@@ -86,13 +80,13 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics
     why =
         "they were made of voids too, before the raster stated its nodata value; make them anew with `gdaladdo -clean "
         "file` and `gdaladdo -r average file`";
-  } else if (has_other_heights && layout.rules.has_mask) {
+  } else if (statistics.has_stray_overviews && layout.rules.has_mask) {
     why =
-        "they have heights that the raster has not, as if they were made without its mask; copy it with "
+        "they have heights that the raster has not there, as if they were made without its mask; copy it with "
         "`gdal_translate --config GDAL_TIFF_INTERNAL_MASK YES in out` and make the copy's overviews";
-  } else if (has_other_heights) {
+  } else if (statistics.has_stray_overviews) {
     why =
-        "they have heights that the raster has not, as if they were made of its voids too; make them anew with "
+        "they have heights that the raster has not there, as if they were made of its voids too; make them anew with "
         "`gdaladdo -clean file` and `gdaladdo -r average file`";
   }
   if (!why.empty()) layout.overview_factors.clear();

@@ -23,7 +23,7 @@ Result<void> ReadAll(GDALRasterBand& band, const SampleRules& rules, const std::
   constexpr int kRowsAtOnce = 256;
   for (int row = 0; row < raster.height; row += kRowsAtOnce) {
     const int rows = std::min(kRowsAtOnce, raster.height - row);
-    float* out = raster.heights.data() + Area(row, raster.width);
+    float* out = raster.heights.data() + IndexAt(0, row, raster.width);
     if (auto read = ReadHeights(band, rules, 0, row, raster.width, rows, out, {}); !read) return read;
     if (progress) progress(static_cast<double>(row + rows) / raster.height);
   }

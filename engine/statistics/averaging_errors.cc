@@ -34,7 +34,7 @@ float AveragingErrors::Largest(int factor, double west, double north, double eas
   float largest = 0;
   for (int row = block(north, level.rows); row <= block(south, level.rows); ++row) {
     for (int column = block(west, level.columns); column <= block(east, level.columns); ++column) {
-      largest = std::max(largest, level.errors[Area(row, level.columns) + static_cast<std::size_t>(column)]);
+      largest = std::max(largest, level.errors[IndexAt(column, row, level.columns)]);
     }
   }
   return largest;

@@ -33,7 +33,7 @@ class AveragingErrors {
 
   void Raise(int factor, int block_column, int block_row, float error) {
     Level& level = levels_[IndexOf(factor)];
-    float& known = level.errors[Area(block_row, level.columns) + static_cast<std::size_t>(block_column)];
+    float& known = level.errors[IndexAt(block_column, block_row, level.columns)];
     if (error > known) known = error;
   }
 

@@ -32,7 +32,7 @@ struct Samples {
   Chunk box;
   std::unique_ptr<float[]> heights;
 
-  const float* Row(int row) const { return heights.get() + Area(row - box.row, box.cols); }
+  const float* Row(int row) const { return heights.get() + IndexAt(0, row - box.row, box.cols); }
 };
 
 // Returns false if the file stores nothing there and GDAL's replacement value is a void.

@@ -50,6 +50,8 @@ struct RasterStatistics {
   ContentHash content;            // of all heights, including those of overviews that are read
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
+  // An overview that is read has heights beyond those of the samples around them, as if it were made of voids too.
+  bool has_stray_overviews = false;
   std::uint64_t valid = 0, voids = 0;
   RimVoids rim_voids;
   std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 if rim_voids.is_everything()

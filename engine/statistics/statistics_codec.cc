@@ -107,6 +107,9 @@ template <typename Archive, typename Statistics>
 void StatisticsFields(Archive& archive, Statistics& statistics, TableParts& parts, const RasterLayout& layout) {
   archive(statistics.content.high, statistics.content.low);
   archive(statistics.lowest, statistics.highest, statistics.valid, statistics.voids, statistics.hole_samples);
+  auto has_stray_overviews = static_cast<std::uint8_t>(statistics.has_stray_overviews ? 1 : 0);
+  archive(has_stray_overviews);
+  if constexpr (Archive::kReads) statistics.has_stray_overviews = has_stray_overviews != 0;
   archive(parts.is_everything, parts.regions);
   archive.Size(parts.runs);
   for (auto& run : parts.runs) archive(run.row, run.first, run.last, run.region);

@@ -108,7 +108,7 @@ class BandScanner {
   }
 
  private:
-  std::size_t Index(int c, int r) const { return Area(r, wide_) + static_cast<std::size_t>(c); }
+  std::size_t Index(int c, int r) const { return IndexAt(c, r, wide_); }
 
   void FindVoidsInRows() {
     void_in_row_.assign(samples_.size(), 0);

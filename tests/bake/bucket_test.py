@@ -1,5 +1,6 @@
 """`terrace bake` into a bucket, with a store of this folder: bucket_test.py BINARY."""
 import json
+import re
 import shutil
 import signal
 import subprocess
@@ -10,7 +11,7 @@ import urllib.request
 from bake_case import BINARY, BakeCase, files_of
 import in_parallel  # bake_case has set the path
 from fake_s3 import FakeS3
-from redis_process import Redis, free_port
+from redis_process import Redis
 
 PLACE, BELOW = "/vsis3/terrain/maps/alps", "terrain/maps/alps"
 UNIT = "units/7-132-96.pmtiles"
@@ -59,10 +60,9 @@ class Bucket(BakeCase):
         out, _ = self.bake("--json")
         self.assertEqual(self.outcomes(out), ["kept"] * 9)
         self.expect_all()
-        port = free_port()
         environment = {**self.environment, **self.store.environment()}
         config = self.scratch / "baked.json"
-        config.write_text(json.dumps({"listen": f"127.0.0.1:{port}", "allowed_prefixes": ["/vsis3/terrain/"],
+        config.write_text(json.dumps({"listen": "127.0.0.1:0", "allowed_prefixes": ["/vsis3/terrain/"],
                                       "datasets": [{"name": "cells", "baked": PLACE}]}))
         refused = subprocess.run([BINARY, "serve", PLACE, "--allowed-prefixes", "/vsis3/terrain/"], text=True, stderr=subprocess.PIPE,
                                  env=environment)
@@ -72,7 +72,9 @@ class Bucket(BakeCase):
                                   stderr=subprocess.PIPE)
         self.addCleanup(server.communicate)
         self.addCleanup(server.terminate)
-        self.assertIn("serving", server.stdout.readline())
+        line = server.stdout.readline()
+        self.assertIn("serving", line)
+        port = re.search(r"127\.0\.0\.1:(\d+)", line)[1]
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/cells/layer.json") as reply:
             self.assertEqual(json.load(reply)["available"][0], [{"startX": 0, "startY": 0, "endX": 1, "endY": 0}])
         for key in ("0/1/0", "9/530/388"):

@@ -18,7 +18,7 @@ struct Picture {
   std::vector<png_byte> bytes;  // red, green, blue
 };
 
-Picture Decode(const std::string& png) {
+Picture DecodePng(const std::string& png) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   Picture picture;
@@ -59,7 +59,7 @@ TEST(HeightPng, DecodesToTheHeights) {
     for (const std::vector<float>& heights :
          {Noise(256, 18'000), Hills(256), std::vector<float>(256 * 256, -431.5f), Noise(1, 9), Noise(512, 3)}) {
       const int size = static_cast<int>(std::lround(std::sqrt(static_cast<double>(heights.size()))));
-      const Picture picture = Decode(EncodeHeightPng(heights, size, encoding));
+      const Picture picture = DecodePng(EncodeHeightPng(heights, size, encoding));
       ASSERT_EQ(picture.width, static_cast<png_uint_32>(size));
       ASSERT_EQ(picture.height, static_cast<png_uint_32>(size));
       for (std::size_t i = 0; i < heights.size(); ++i) {

@@ -24,7 +24,7 @@ std::vector<std::uint8_t> Ramp() {
 }
 
 // Decodes with GDAL, independently of the encoder. Returns one band after the other.
-std::vector<std::uint8_t> Decode(std::string bytes) {
+std::vector<std::uint8_t> DecodeTexture(std::string bytes) {
   GDALAllRegister();
   const std::string name = "/vsimem/texture_test";
   VSILFILE* const file =
@@ -47,7 +47,7 @@ TEST(EncodePicture, DecodesToThePicture) {
   for (const TextureFormat format : {TextureFormat::kJpeg, TextureFormat::kWebp}) {
     const auto bytes = EncodePicture(rgb, kSide, kSide, format, 90);
     ASSERT_TRUE(bytes.has_value());
-    const std::vector<std::uint8_t> bands = Decode(*bytes);
+    const std::vector<std::uint8_t> bands = DecodeTexture(*bytes);
     double worst = 0;
     for (std::size_t i = 0; i < rgb.size(); ++i) {
       const std::size_t pixel = i / 3, band = i % 3;

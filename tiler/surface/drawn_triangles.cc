@@ -4,20 +4,17 @@
 #include <cstdint>
 #include <optional>
 
+#include "proto/mesh/tile_geometry.h"
+
 namespace terrace::tiler {
 
 DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile) {
-  const geo::TileKey& key = tile.key;
-  const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
-  const double west = static_cast<double>(key.x) * side - 180, south = static_cast<double>(key.y) * side - 90;
-  const double least = tile.min_height, relief = static_cast<double>(tile.max_height) - least;
   DrawnTriangles drawn;
+  drawn.positions = proto::DecodePositions(tile);
+  drawn.places.reserve(tile.u.size());
   for (std::size_t i = 0; i < tile.u.size(); ++i) {
-    const double u = static_cast<double>(tile.u[i]) / proto::kQuantizedMax,
-                 v = static_cast<double>(tile.v[i]) / proto::kQuantizedMax;
-    const double height_m = least + static_cast<double>(tile.h[i]) / proto::kQuantizedMax * relief;
-    drawn.positions.push_back(geo::ToEcef(west + u * side, south + v * side, height_m));
-    drawn.places.push_back({u, v});
+    drawn.places.push_back(
+        {static_cast<double>(tile.u[i]) / proto::kQuantizedMax, static_cast<double>(tile.v[i]) / proto::kQuantizedMax});
   }
   drawn.triangles = tile.triangles;
   return drawn;

@@ -61,6 +61,27 @@ TEST_F(EditErrors, CoverVoidsOfAReplacementBetweenNodes) {
   EXPECT_GT(ExpectCovered(*source, top, 4, source->max_level()), 2900);
 }
 
+// A ridge of the replacement, half a sample from its northern end: there are no samples in the cells that it crosses.
+TEST_F(EditErrors, CoverHeightsBetweenTheSamplesOfAReplacement) {
+  constexpr double kPixel = 1.0 / 3600;
+  constexpr int kCoarse = 60;  // times as large
+  RasterSpec flat{.width = 200, .height = 200, .geo_transform = {7, kPixel, 0, 46, 0, -kPixel}};
+  RasterSpec ridge{.width = 3, .height = 3};
+  ridge.geo_transform = {7 + 10.5 * kPixel, kCoarse * kPixel, 0, 46 - 10.5 * kPixel, 0, -kCoarse * kPixel};
+  ridge.value = [](int column, int) { return column == 1 ? 1000.0 : 0.0; };
+  WriteRaster(dir_, ridge, "ridge.tif");
+  DemOptions options;
+  options.edits = {WriteEdits(dir_, Rectangle(R"({"op":"replace","source":"ridge.tif"})", 7.005, 45.95, 7.05, 45.995))};
+  const auto source = OpenOrFail(WriteRaster(dir_, flat, "flat.tif"), options);
+  ASSERT_NE(source, nullptr);
+  double largest = 0;
+  for (int row = 25; row < 38; ++row) {
+    const GeoPosition at{7 + (10.5 + 1.5 * kCoarse) * kPixel, 46 - (row + 0.5) * kPixel};
+    largest = std::max(largest, ExpectCovered(*source, at, source->max_level() - 1, source->max_level()));
+  }
+  EXPECT_GT(largest, 1);
+}
+
 // Inside of a polygon, whether or not its edge is blended.
 TEST_F(EditErrors, AreNoLargerWhereAnEditIsConstant) {
   for (const char* const terrain :

@@ -1,4 +1,6 @@
-// A raster grid of one source: a full turn around the Earth, and voids that are not read.
+// A raster grid of one source: a full turn around the Earth, voids that are not read, a mask.
+#include <gdal_priv.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -90,6 +92,29 @@ TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
   // What was not read may not outlive its file either.
   std::filesystem::remove(path);
   EXPECT_FALSE(read(key_at(11, 19.7), smooth));
+}
+
+// A mask of one band, as GDAL also stores it in separate files and in VRTs.
+TEST(OneSource, AMaskOfTheBandAloneCounts) {
+  const TempDir dir;
+  RasterSpec spec;
+  spec.value = [](int col, int) { return col < 8 ? 500 : 8000; };
+  const std::string path = WriteRaster(dir, spec);
+  {
+    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
+    GDALRasterBand& band = *dataset->GetRasterBand(1);
+    EXPECT_EQ(band.CreateMaskBand(0), CE_None);
+    const std::vector<std::uint8_t> line = {1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0};
+    for (int row = 0; row < spec.height; ++row) {
+      EXPECT_EQ(band.GetMaskBand()->RasterIO(GF_Write, 0, row, spec.width, 1, const_cast<std::uint8_t*>(line.data()),
+                                             spec.width, 1, GDT_Byte, 0, 0, nullptr),
+                CE_None);
+    }
+  }
+  const auto source = OpenOrFail(path, {.source = {.vertical = "unknown"}});
+  ASSERT_NE(source, nullptr);
+  EXPECT_EQ(source->info().sources.front().heights.max, 500);
+  EXPECT_EQ(source->info().sources.front().void_samples, 128U);
 }
 
 }  // namespace

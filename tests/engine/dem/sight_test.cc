@@ -408,6 +408,37 @@ TEST(Sight, DoesNotSeeTheGroundBelowThroughAVoidOfTheRim) {
   }
 }
 
+// The lowest place is the end of the ray, where it meets the ground.
+TEST(Sight, TellsTheEndOfARayAsItsLowestPlace) {
+  const TempDir dir;
+  RasterSpec spec{.width = 200, .height = 200, .geo_transform = {7, 1.0 / 3600, 0, 46, 0, -1.0 / 3600}};
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> height(0, 1), share(0.02, 0.98);
+  spec.value = [&](int, int) { return height(random); };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  const auto place = [&] { return GeoPosition{7 + share(random) / 18, 46 - share(random) / 18}; };
+  std::vector<SightRay> rays;
+  for (int i = 0; i < 500; ++i) {
+    const std::array<GeoPosition, 2> ends = {place(), place()};
+    const auto ground = source->ReadPoints(ends);
+    ASSERT_TRUE(ground);
+    rays.push_back({{ends[0].longitude, ends[0].latitude, (*ground)[0] + 300.0},
+                    {ends[1].longitude, ends[1].latitude, double{(*ground)[1]}}});
+  }
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    const SightAnswer& answer = (*answers)[i];
+    const SightPoint lowest = PointAt(rays[i], answer.clearance_at, {});
+    ASSERT_GE(answer.clearance_at, 0);
+    ASSERT_LE(answer.clearance_at, 1);
+    const auto ground = source->ReadPoints(std::array{GeoPosition{lowest.longitude, lowest.latitude}});
+    ASSERT_TRUE(ground);
+    EXPECT_NEAR(lowest.height_m - double{ground->front()}, answer.clearance_m, 0.01) << i;
+  }
+}
+
 // A rising strip of 400 blocks: the farther to the south, the less a level ray is above it, so none of them is skipped.
 TEST(Sight, KeepsFewBlocksInMemory) {
   const TempDir dir;

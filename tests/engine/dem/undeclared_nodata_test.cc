@@ -425,8 +425,8 @@ TEST(Overviews, OfUndeclaredVoidsAreNotUsed) {
 // Masks everything outside of the circle with GDAL's mask, in the file or in a separate one, before or after the
 // overviews are made.
 std::string WriteMasked(const TempDir& dir, bool inside, bool overviews_first, const std::string& type = "Float32",
-                        const char* resampling = "AVERAGE") {
-  RasterSpec spec = WithOverviews(0, type);
+                        const char* resampling = "AVERAGE", RasterSpec spec = WithOverviews(0)) {
+  spec.type = type;
   if (!overviews_first) spec.overviews.clear();
   const std::string path = WriteRaster(dir, spec, inside ? "inside.tif" : "beside.tif");
   CPLSetConfigOption("GDAL_TIFF_INTERNAL_MASK", inside ? "YES" : "NO");
@@ -457,27 +457,16 @@ TEST(Overviews, WithoutTheMaskOfTheRasterAreNotUsed) {
   ExpectUnused(WriteMasked(other, true, true), {.vertical = "unknown"}, "heights that the raster has not");
 }
 
-// GDAL also stores such masks in separate files and in VRTs.
-TEST(UndeclaredNodata, AMaskOfTheBandAloneCounts) {
+// The masked 0 is near the lowest height of the raster, but far from those around it.
+TEST(Overviews, WithoutTheMaskAreNotUsedAlsoIfTheirHeightsAreWithinTheRange) {
   const TempDir dir;
-  RasterSpec spec;
-  spec.value = [](int col, int) { return col < 8 ? 500 : 8000; };
-  const std::string path = WriteRaster(dir, spec);
-  {
-    const GDALDatasetUniquePtr dataset(GDALDataset::Open(path.c_str(), GDAL_OF_RASTER | GDAL_OF_UPDATE));
-    GDALRasterBand& band = *dataset->GetRasterBand(1);
-    EXPECT_EQ(band.CreateMaskBand(0), CE_None);
-    const std::vector<std::uint8_t> line = {1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0};
-    for (int row = 0; row < spec.height; ++row) {
-      EXPECT_EQ(band.GetMaskBand()->RasterIO(GF_Write, 0, row, spec.width, 1, const_cast<std::uint8_t*>(line.data()),
-                                             spec.width, 1, GDT_Byte, 0, 0, nullptr),
-                CE_None);
-    }
-  }
-  const auto source = OpenOrFail(path, {.source = {.vertical = "unknown"}});
+  RasterSpec spec = WithOverviews(0);
+  spec.width = spec.height = 512;
+  spec.value = [](int col, int row) { return std::hypot(col - 400, row - 256) < 60 ? 0 : 100 + 8.0 * col; };
+  const auto source = OpenOrFail(WriteMasked(dir, true, true, "Float32", "AVERAGE", spec));
   ASSERT_NE(source, nullptr);
-  EXPECT_EQ(InfoOf(*source).heights.max, 500);
-  EXPECT_EQ(InfoOf(*source).void_samples, 128U);
+  EXPECT_TRUE(InfoOf(*source).overview_factors.empty());
+  EXPECT_NE(InfoOf(*source).overviews_unused.find("heights that the raster has not"), std::string::npos);
 }
 
 // Int16 always has a nodata value, and a cubic kernel slightly exceeds the range of its input.

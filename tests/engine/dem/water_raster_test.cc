@@ -12,7 +12,7 @@
 namespace terrace::dem {
 namespace {
 
-constexpr int kSide = WaterRaster::kSide;
+constexpr int kMaskSide = WaterRaster::kSide;
 
 std::unique_ptr<WaterRaster> OpenMask(const std::string& path, const GeoBounds& around = {}) {
   auto mask = WaterRaster::Open(path, around);
@@ -23,20 +23,20 @@ std::unique_ptr<WaterRaster> OpenMask(const std::string& path, const GeoBounds& 
 std::vector<std::uint8_t> ReadOrFail(const WaterRaster& mask, const geo::TileKey& key) {
   const auto pixels = mask.Read(key);
   EXPECT_TRUE(pixels.has_value()) << (pixels ? "" : pixels.error().message);
-  return pixels.value_or(std::vector<std::uint8_t>(std::size_t{kSide} * kSide, 99));
+  return pixels.value_or(std::vector<std::uint8_t>(std::size_t{kMaskSide} * kMaskSide, 99));
 }
 
 int At(const std::vector<std::uint8_t>& pixels, int row, int column) {
-  return pixels.at(static_cast<std::size_t>(row * kSide + column));
+  return pixels.at(static_cast<std::size_t>(row * kMaskSide + column));
 }
 
 // Exactly tile 6/65/32 (2.8125 degrees wide), 256 samples a side times `finer`.
 RasterSpec WaterSpec(int finer = 1) {
   constexpr double kTile = 180.0 / 64;
   RasterSpec spec;
-  spec.width = spec.height = kSide * finer;
+  spec.width = spec.height = kMaskSide * finer;
   spec.type = "Byte";
-  spec.geo_transform = {kTile, kTile / kSide / finer, 0, kTile, 0, -kTile / kSide / finer};
+  spec.geo_transform = {kTile, kTile / kMaskSide / finer, 0, kTile, 0, -kTile / kMaskSide / finer};
   return spec;
 }
 constexpr geo::TileKey kWaterTile{6, 65, 32};
@@ -48,8 +48,8 @@ TEST(WaterRaster, PixelsAreTheSamplesWhereBothAgree) {
   spec.value = [&](int column, int row) { return value(column, row); };
   const auto mask = OpenMask(WriteRaster(dir, spec));
   const auto pixels = ReadOrFail(*mask, kWaterTile);
-  for (int row = 0; row < kSide; ++row) {
-    for (int column = 0; column < kSide; ++column) {
+  for (int row = 0; row < kMaskSide; ++row) {
+    for (int column = 0; column < kMaskSide; ++column) {
       ASSERT_EQ(At(pixels, row, column), value(column, row) != 0 ? 255 : 0) << row << " " << column;
     }
   }
@@ -71,7 +71,7 @@ TEST(WaterRaster, CoarserSamplesStillGiveASharpCoast) {
   spec.value = [](int column, int) { return column < 100 ? 1 : 0; };
   // Three levels deeper a sample is 8 pixels wide: the coast is the line between samples 99 and 100.
   const auto pixels = ReadOrFail(*OpenMask(WriteRaster(dir, spec)), {9, 65 * 8 + 3, 32 * 8});
-  const int coast = 800 - 3 * kSide;
+  const int coast = 800 - 3 * kMaskSide;
   EXPECT_EQ(At(pixels, 9, coast - 2), 255);
   EXPECT_GT(At(pixels, 9, coast - 1), 127);
   EXPECT_LT(At(pixels, 9, coast), 128);
@@ -92,7 +92,7 @@ TEST(WaterRaster, NoDataAndTheOutsideAreLand) {
   EXPECT_EQ(At(parent, 200, 130), 0);
   EXPECT_EQ(At(parent, 64, 250), 0);
   const auto far = ReadOrFail(*mask, {6, 3, 3});
-  EXPECT_EQ(std::count(far.begin(), far.end(), 0), kSide * kSide);
+  EXPECT_EQ(std::count(far.begin(), far.end(), 0), kMaskSide * kMaskSide);
 }
 
 // A pixel does not depend on the window that was read for its tile.
@@ -157,7 +157,7 @@ TEST(WaterRaster, GoesOnAcrossTheAntimeridian) {
   const auto west = ReadOrFail(*mask, {7, 255, 64}), east = ReadOrFail(*mask, {7, 0, 64});
   EXPECT_EQ(At(west, 128, 255), 255);
   EXPECT_EQ(At(east, 128, 0), 255);
-  for (int column = 0; column < kSide; ++column) {
+  for (int column = 0; column < kMaskSide; ++column) {
     EXPECT_NEAR(At(west, 128, 255 - column), At(east, 128, column), 1) << column;
   }
 }
