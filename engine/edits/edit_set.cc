@@ -115,9 +115,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           } else if (weight > 0) {
             target = TargetAt(edit, {x, y}, place);
           }
-          if (errors)
-            nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {
-                place, values[at], target};
+          if (errors) nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {place, values[at], target};
           if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
         }
       }
