@@ -27,8 +27,8 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
         static_cast<int>(kind.coding), static_cast<int>(kind.height_encoding), kind.side_px}) {
     hasher.Add(value);
   }
-  for (const bool value : {kind.extensions.normals, kind.extensions.water_mask, kind.extensions.metadata})
-    hasher.Add(value);
+  const auto& [normals, water_mask, metadata] = kind.extensions;
+  for (const bool value : {normals, water_mask, metadata}) hasher.Add(value);
 }
 
 // The sources of height tiles. A geodetic tile of the level above the unit's is as wide as the unit, and is read at

@@ -14,7 +14,7 @@
 
 namespace terrace::dem {
 
-// An inclusive block of pixels of a raster grid: x is the column, y the row from the north.
+// An inclusive block of pixels, or of averages, of a raster grid: x is the column, y the row from the north.
 using PixelRange = geo::TileRange;
 
 struct GridMember {

@@ -312,9 +312,13 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
 }
 
 Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
-  if (layout_.overview_factors.empty()) return {};
-  RangeTable samples = statistics_.table;
-  samples.Finish();
+  // Overviews of a raster without voids are used in any case (RasterSource).
+  const bool is_compared = !layout_.overview_factors.empty() && statistics_.voids > 0;
+  RangeTable samples(layout_.width, layout_.height);
+  if (is_compared) {
+    samples = statistics_.table;
+    samples.Finish();
+  }
   for (const int factor : layout_.overview_factors) {
     RangeTable overview(layout_.width, layout_.height);
     content_.Add(factor);
@@ -326,10 +330,10 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
         if (!heights) return tl::unexpected(heights.error());
         content_.AddBytes(heights->data(), heights->size() * sizeof(float));
         statistics_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
-        overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
+        if (is_compared) overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
       }
     }
-    statistics_.has_stray_overviews |= IsStray(overview, samples, layout_, factor);
+    statistics_.has_stray_overviews |= is_compared && IsStray(overview, samples, layout_, factor);
   }
   return {};
 }

@@ -51,6 +51,7 @@ struct RasterStatistics {
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
   // An overview that is read has heights beyond those of the samples around them, as if it were made of voids too.
+  // False without voids.
   bool has_stray_overviews = false;
   std::uint64_t valid = 0, voids = 0;
   RimVoids rim_voids;

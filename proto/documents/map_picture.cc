@@ -44,14 +44,15 @@ Result<std::string> EncodeWebpPixels(const PixelView& pixels, int quality) {
   const bool with_alpha = !IsOpaque(pixels);
   const Samples samples = Expanded(pixels, with_alpha);
   const int width = pixels.width, height = pixels.height;
+  if (!with_alpha && quality > 0) return EncodePicture(samples, width, height, TextureFormat::kWebp, quality);
   std::uint8_t* bytes = nullptr;
   std::size_t size = 0;
-  if (with_alpha) {
-    size = quality == 0 ? WebPEncodeLosslessRGBA(samples.data(), width, height, 4 * width, &bytes)
-                        : WebPEncodeRGBA(samples.data(), width, height, 4 * width, static_cast<float>(quality), &bytes);
+  if (!with_alpha) {
+    size = WebPEncodeLosslessRGB(samples.data(), width, height, 3 * width, &bytes);
+  } else if (quality == 0) {
+    size = WebPEncodeLosslessRGBA(samples.data(), width, height, 4 * width, &bytes);
   } else {
-    size = quality == 0 ? WebPEncodeLosslessRGB(samples.data(), width, height, 3 * width, &bytes)
-                        : WebPEncodeRGB(samples.data(), width, height, 3 * width, static_cast<float>(quality), &bytes);
+    size = WebPEncodeRGBA(samples.data(), width, height, 4 * width, static_cast<float>(quality), &bytes);
   }
   const std::unique_ptr<std::uint8_t, void (*)(void*)> owner(bytes, WebPFree);
   if (size == 0) return MakeError(ErrorCode::kInternal, "libwebp cannot encode {} x {} pixels", width, height);

@@ -198,6 +198,16 @@ class Bake(BakeCase):
         self.assertEqual(other.returncode, 2, other.stderr)
         self.assertIn('extensions "octvertexnormals", not "none"', other.stderr)
 
+    def test_options_that_an_archive_alone_does_not_use_are_named(self):
+        config = self.scratch / "alone.json"
+        config.write_text(json.dumps({"listen": "127.0.0.1:0", "datasets": [
+            {"name": "alone", "baked": str(self.reference), "public": True, "attribution": "X", "error_fraction": 0.25}]}))
+        process = self.begin([BINARY, "serve", "--config", config])
+        self.assertIn("serving", process.stdout.readline())
+        process.terminate()
+        errors = process.communicate(timeout=60)[1]
+        self.assertIn("attribution, error_fraction have no effect; remove them, or add the sources", errors)
+
     def test_tiles_json_promises_the_tiles_that_are_there(self):
         chunks, folder = self.place("chunks"), self.place("folder")
         for place, form in ((chunks, "chunks"), (folder, "folder")):

@@ -17,9 +17,11 @@ class AreaTest : public ServerFixture {
  protected:
   // Plans every area with an error of at least a metre, and builds a text with its error.
   void StartAreas(ServerOptions options = {}) {
-    area_mesher_.plan = [](std::uint32_t, const tiler::AreaRequest& area) -> Result<tiler::AreaPlan> {
+    area_mesher_.plan = [this](std::uint32_t, const tiler::AreaRequest& area) -> Result<tiler::AreaPlan> {
       if (area.error_m < 1) return MakeError(ErrorCode::kInvalidArgument, "ask for 1 m or more");
       tiler::AreaPlan plan;
+      plan.level = level_;
+      plan.depends_on_limit = depends_on_limit_;
       plan.centre = {(area.west + area.east) / 2, (area.south + area.north) / 2};
       return plan;
     };
@@ -36,7 +38,8 @@ class AreaTest : public ServerFixture {
     Start(std::move(options));
   }
 
-  std::atomic<bool> held_{false}, fails_{false};
+  std::atomic<bool> held_{false}, fails_{false}, depends_on_limit_{false};
+  std::atomic<int> level_{0};
 };
 
 TEST_F(AreaTest, TellsItsErrorAndOrigin) {
@@ -57,6 +60,19 @@ TEST_F(AreaTest, AreKeptForGoodWithTheirVersion) {
   EXPECT_EQ(kept("&v=0"), "no-store");
   EXPECT_EQ(kept(""), "public, max-age=3600");
   EXPECT_EQ(Fetch(port(), kArea).Field("vary"), "Accept-Encoding");
+}
+
+// max_mesh_samples may decide the level, and the version does not cover it.
+TEST_F(AreaTest, OfALevelThatALimitDecidesAreNotKeptForGood) {
+  StartAreas();
+  depends_on_limit_ = true;
+  const std::string url = std::string(kArea) + "&v=" + kMauiVersion;
+  const Reply before = Fetch(port(), url);
+  EXPECT_EQ(before.Field("cache-control"), "public, max-age=3600");
+  const std::string has_it = "If-None-Match: " + before.Field("etag") + "\r\n";
+  EXPECT_EQ(Fetch(port(), url, has_it).status, 304);
+  level_ = 1;
+  EXPECT_EQ(Fetch(port(), url, has_it).status, 200);
 }
 
 TEST_F(AreaTest, TypesAreThoseOfFormats) {

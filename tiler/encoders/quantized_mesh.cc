@@ -78,8 +78,9 @@ Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encod
   Result<MeshedTile> measured =
       MeshTile(*dataset.source, lattice, refined->refinement, dataset.mesh_options, error_m, stop);
   if (!measured) return tl::unexpected(std::move(measured).error());
-  if (request.extensions.normals)
+  if (request.extensions.normals) {
     measured->tile.normals = proto::TileNormals(lattice, measured->mesh, measured->positions);
+  }
   const Result<proto::TileExtensions> extensions = AddExtensions(dataset, request, lattice, measured->tile, stop);
   if (!extensions) return tl::unexpected(extensions.error());
   LeaveOut(TrianglesInHoles(*dataset.source, request.key, measured->mesh), measured->mesh, lattice.cells(),

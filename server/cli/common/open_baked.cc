@@ -91,8 +91,10 @@ void WarnOfUnusedOptions(const config::DatasetConfig& wanted) {
   used.is_public = wanted.is_public;
   const std::vector<std::string> unused = config::ChangedDatasetOptions(wanted, used);
   if (unused.empty()) return;
-  spdlog::warn("dataset {}: without \"sources\" its archive is served as it was baked: {} {} no effect", wanted.name,
-               fmt::join(unused, ", "), unused.size() == 1 ? "has" : "have");
+  spdlog::warn(
+      "dataset {}: without \"sources\" its archive is served as it was baked, and {} {} no effect; remove "
+      "{}, or add the sources",
+      wanted.name, fmt::join(unused, ", "), unused.size() == 1 ? "has" : "have", unused.size() == 1 ? "it" : "them");
 }
 
 }  // namespace

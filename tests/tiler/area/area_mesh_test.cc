@@ -425,6 +425,8 @@ TEST_F(EditedAreaMesh, GoesNoDeeperThanItsSamplesAllow) {
   const auto as_before = PlanArea(*source_, 0.5, area_, samples(*plain));
   ASSERT_TRUE(as_before) << as_before.error().message;
   EXPECT_EQ(as_before->level, plain->level);
+  EXPECT_FALSE(plain->depends_on_limit);
+  for (const auto& plan : {deep, shallower, as_before}) EXPECT_TRUE(plan->depends_on_limit) << plan->level;
 }
 
 TEST_F(EditedAreaMesh, HasHolesAndBreaklines) {
