@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
 # Static checks of the sources: layers, leftovers, Python, formatting, self-contained headers. All checks run, also
-# after a failure; the last line has the number of failures. `make lint` installs what they need first.
+# after a failure; the last line names what failed. `make lint` installs what they need first.
 set -uo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
-jobs=${1:-$(nproc)} passed=0 failed=0
+jobs=${1:-$(nproc)} passed=0 failed=""
 
 step() {
-  echo "lint: $1"
+  local name=$1
+  echo "lint: $name"
   shift
-  if "$@"; then passed=$((passed + 1)); else failed=$((failed + 1)); fi
+  if "$@"; then passed=$((passed + 1)); else failed+="; failed: $name"; fi
 }
 
 sources() { git ls-files '*.h' '*.cc'; }
@@ -26,5 +27,5 @@ step "leftovers, the checker itself" tools/check_tree.py --self-test
 step "Python" bash -c "git ls-files '*.py' | xargs pyflakes3"
 step "formatting (make format corrects it)" bash -c "git ls-files '*.h' '*.cc' | xargs clang-format-14 --dry-run -Werror"
 step "self-contained headers" headers
-echo "lint: $passed passed, $failed failed"
-exit $((failed > 0))
+echo "lint: $passed passed$failed"
+[[ -z $failed ]]

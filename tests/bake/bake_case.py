@@ -12,7 +12,7 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "e2e"))
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "support"))
-from srtm import write_asc, write_hgt  # noqa: E402
+from srtm import write_hgt  # noqa: E402
 
 BINARY = pathlib.Path(sys.argv.pop(1)).resolve()
 IS_LONG = "--long" in sys.argv

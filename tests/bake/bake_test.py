@@ -12,8 +12,9 @@ import subprocess
 import time
 import unittest
 
-from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_asc, write_hgt
+from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_hgt
 from pmtiles import archive, tiles_of
+from srtm import write_asc
 
 KILLS = 200 if IS_LONG else 20
 
