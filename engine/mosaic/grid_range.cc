@@ -143,7 +143,7 @@ std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) con
     grown |= grow(box.max_y, height_, y, at_south);
   }
   // Holes are filled from averages beside them by at least the factor; large holes by factors up to a sixtieth of their
-  // size. Includes a margin of averages, and the samples from which small voids beside the hole are filled.
+  // size. Includes a margin of averages, and the samples from which narrow voids beside the hole are filled.
   const double size = std::max(box.max_x - box.min_x, box.max_y - box.min_y);
   const double reach = 4 * std::max<double>(factor, size / 32) + options_.max_void_gap;
   box.Grow(reach, reach);

@@ -232,7 +232,7 @@ GridWindow RasterGrid::Grown(const GridWindow& window, int halo, int factor) con
 }
 
 bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
-  // Small voids are filled from samples around them. Averages by overviews reach up to three averages into a void
+  // Narrow voids are filled from samples around them. Averages by overviews reach up to three averages into a void
   // (cubic splines, each overview made from the one before), and heights are interpolated between averages.
   const GridWindow around = Grown(window, options_.max_void_gap / factor + 6, factor);
   const BlockRange range = Ranges(PixelsOf(around, factor));

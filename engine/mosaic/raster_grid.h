@@ -179,7 +179,7 @@ class RasterGrid {
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
   Result<void> Compose(int step, const GridWindow& window, float* out, const std::stop_token& stop) const;
-  // A window with small voids filled.
+  // A window with narrow voids filled.
   struct Bridged {
     std::vector<float> heights;
     std::uint64_t voids = 0;  // before

@@ -1,4 +1,4 @@
-// Fills small voids by interpolation across them.
+// Fills narrow voids by interpolation across them.
 #pragma once
 
 #include <vector>

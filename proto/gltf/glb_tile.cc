@@ -27,7 +27,7 @@ constexpr std::array<double, 4> kGroundColor{0.5, 0.5, 0.5, 1};
 
 // Stored positions are ECEF: times `scale` they are metres from `origin`. Clients turn y-up content by
 // (x, y, z) -> (x, -z, y), so the node undoes that first and then moves to the origin.
-std::array<double, 16> NodeMatrix(Vec3d origin, double scale) {
+std::array<double, 16> MatrixAt(Vec3d origin, double scale) {
   return {scale, 0, 0, 0, 0, 0, -scale, 0, 0, scale, 0, 0, origin[0], origin[2], -origin[1], 1};
 }
 
@@ -243,7 +243,7 @@ Result<GlbTile> EncodeWithDraco(const GridMesh& mesh, const GlbOptions& options)
   gltf.extensions = {"KHR_draco_mesh_compression"};
   Vec3d origin{};
   for (std::size_t axis = 0; axis < 3; ++axis) origin[axis] = static_cast<double>(mesh.origin[axis]) * mesh.step_m;
-  gltf.matrix = NodeMatrix(origin, 1);
+  gltf.matrix = MatrixAt(origin, 1);
   ByteWriter buffer;
   const std::size_t view = AddView(gltf, buffer, draco->bytes, 0, GltfTarget::kNone);
   gltf.draco = GltfDraco{view, {{"POSITION", draco->position_id}, {"NORMAL", draco->normal_id}}};
@@ -272,7 +272,7 @@ Result<GlbTile> EncodeArrays(const GridMesh& mesh, const GlbOptions& options) {
   GltfMesh gltf = Describe(options);
   if (quantized) gltf.extensions.push_back("KHR_mesh_quantization");
   if (meshopt) gltf.extensions.push_back("EXT_meshopt_compression");
-  gltf.matrix = NodeMatrix(arrays.origin, arrays.scale);
+  gltf.matrix = MatrixAt(arrays.origin, arrays.scale);
   GltfAccessor index{.component = IndexComponent(count), .type = "SCALAR", .count = corners};
   ByteWriter buffer;
   if (meshopt) {

@@ -2,7 +2,7 @@
 //
 // quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if
 // the heights there are multiples of a step that the steps of both tiles divide. All steps here are powers of two. A
-// tile's own step (tile_mesh.h) is the finest that its relief allows, so an edge's step only has to be at least what
+// tile's own step (quantize_tile.h) is the finest that its relief allows, so an edge's step only has to be at least what
 // either tile needs. The need of a tile is derived from the RangeBound of its heights and not from its samples, because
 // the neighbour that computes the same edge has not read them:
 //

@@ -95,17 +95,14 @@ std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& 
 // GET and POST /{dataset}/heights
 Answer AnswerHeights(const Handlers& handlers, const RequestContext& context);
 
-// Limit of tiles per request: each must be built if it is not cached.
-inline constexpr std::size_t kMaxCertifiedTiles = 64;
-
 struct CertifiedPoints {
   std::vector<geo::TileKey> tiles;              // without duplicates
-  std::vector<std::size_t> tile_of_point;       // index into `tiles`
+  std::vector<std::uint32_t> tile_of_point;     // index into `tiles`
   std::vector<std::optional<double>> errors_m;  // by tile; nothing: the tile states none
 };
 
 // Returns the deepest available tile of each point, down to level `deepest`. kInvalidArgument, with a message for the
-// client: more than kMaxCertifiedTiles. kCancelled: a stop was requested.
+// client: more than tiler::kMaxTilesRead. kCancelled: a stop was requested.
 Result<CertifiedPoints> CertifyingTilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points,
                                           int deepest, const std::stop_token& stop = {});
 

@@ -196,23 +196,16 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
 
 Result<CertifiedPoints> CertifyingTilesOf(const DatasetView& dataset, std::span<const dem::GeoPosition> points,
                                           int deepest, const std::stop_token& stop) {
-  CertifiedPoints certified;
   const tiler::HasTile has_tile = [&](const geo::TileKey& key) { return IsAvailable(dataset, key); };
+  tiler::TileNumbers numbers(has_tile, std::min(deepest, dataset.max_level()), "certify: the points");
+  CertifiedPoints certified;
   for (const dem::GeoPosition& point : points) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the tiles any more");
-    const geo::TileKey key = tiler::DeepestTileAt(has_tile, point, std::min(deepest, dataset.max_level()));
-    auto known = std::ranges::find(certified.tiles, key);
-    if (known == certified.tiles.end()) {
-      if (certified.tiles.size() == kMaxCertifiedTiles) {
-        return MakeError(ErrorCode::kInvalidArgument,
-                         "certify: the points lie in more than {} tiles, which is the most this server certifies at "
-                         "once; ask for fewer points, or for a shallower level",
-                         kMaxCertifiedTiles);
-      }
-      known = certified.tiles.insert(certified.tiles.end(), key);
-    }
-    certified.tile_of_point.push_back(static_cast<std::size_t>(known - certified.tiles.begin()));
+    const Result<std::uint32_t> number = numbers.NumberAt(point);
+    if (!number) return tl::unexpected(number.error());
+    certified.tile_of_point.push_back(*number);
   }
+  certified.tiles = numbers.keys();
   certified.errors_m.resize(certified.tiles.size());
   return certified;
 }

@@ -86,7 +86,7 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
 
 prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
   prometheus::MetricFamily family{"terrace_source_samples_total",
-                                  "Samples read for tiles: measured, small voids filled from their edges, and voids "
+                                  "Samples read for tiles: measured, narrow voids filled from their edges, and voids "
                                   "left to other sources or the floor",
                                   kCounter,
                                   {}};

@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "proto/error/tile_error.h"
+#include "proto/mesh/quantize_tile.h"
 #include "proto/mesh/tile_geometry.h"
-#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/ground.h"
 
 namespace terrace::proto {

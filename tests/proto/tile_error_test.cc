@@ -9,8 +9,8 @@
 
 #include "engine/tin/insert_samples.h"
 #include "proto/mesh/grid_mesh.h"
+#include "proto/mesh/quantize_tile.h"
 #include "proto/mesh/tile_geometry.h"
-#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/ground.h"
 #include "tests/proto/plumb_error.h"
 

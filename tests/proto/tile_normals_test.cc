@@ -7,8 +7,8 @@
 #include <functional>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/mesh/quantize_tile.h"
 #include "proto/mesh/tile_geometry.h"
-#include "proto/mesh/tile_mesh.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 
 namespace terrace::proto {

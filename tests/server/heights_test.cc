@@ -100,7 +100,7 @@ TEST_F(HeightsTest, CertifiesNoMoreTilesThanItSays) {
   StartHeights();
   const Reply reply = Fetch(port(), "/deep/heights?path=0,-80|0,80&samples=400&certify=8");
   EXPECT_EQ(reply.status, 400);
-  EXPECT_NE(reply.body.find("the most this server certifies at once"), std::string::npos) << reply.body;
+  EXPECT_NE(reply.body.find("certify: the points lie in more than 64 tiles"), std::string::npos) << reply.body;
   EXPECT_EQ(builds_, 0);
 }
 

@@ -13,7 +13,7 @@
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/mesh/edge_steps.h"
-#include "proto/mesh/tile_mesh.h"
+#include "proto/mesh/quantize_tile.h"
 #include "tiler/mesh/inner_vertices.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/refine_options.h"

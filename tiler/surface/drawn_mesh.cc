@@ -142,7 +142,13 @@ std::optional<DrawnMesh::Crossing> DrawnMesh::Cross(const PlumbLine& line, std::
   const geo::Vec3 ab = positions_[b] - positions_[a], ac = positions_[c] - positions_[a];
   const geo::Vec3 across = geo::Cross(line.up, ac);
   const double determinant = geo::Dot(ab, across);  // minus twice the area seen from above; a triangle on edge has none
-  if (!(determinant < 0)) return std::nullopt;
+  // Positions are rounded to nanometres, so a triangle of a smaller width is noise. At a pole, corners at several
+  // longitudes are one place.
+  constexpr double kMinWidth = 1e-7;  // metres
+  if (!(determinant < 0) ||
+      determinant * determinant < kMinWidth * kMinWidth * std::max(geo::Dot(ab, ab), geo::Dot(ac, ac))) {
+    return std::nullopt;
+  }
   const geo::Vec3 from = line.start - positions_[a];
   const geo::Vec3 turned = geo::Cross(from, ab);
   const double of_b = geo::Dot(from, across) / determinant, of_c = geo::Dot(line.up, turned) / determinant;

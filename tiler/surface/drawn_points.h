@@ -3,18 +3,15 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
-#include <tuple>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "proto/gltf/glb_tile.h"
-#include "tiler/surface/drawn_mesh.h"
+#include "tiler/surface/drawn_tiles.h"
 #include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
@@ -39,17 +36,8 @@ struct DrawnSurface {
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
 };
 
-// Limit of the tiles that the points of one request lie in: each of them may have to be made.
-inline constexpr std::size_t kMaxDrawnTiles = 64;
-
 // Level of the surface. kInvalidArgument: the dataset has no such level.
 Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction);
-
-// The mesh of an available tile.
-using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
-
-// Whether a tile exists.
-using HasTile = std::function<bool(const geo::TileKey&)>;
 
 // Heights at points, with the tile of each. A point belongs to the tile of `level` that it lies in, or to its deepest
 // available ancestor. On an edge between two tiles it belongs to the eastern and the northern one. Beside an edge where
@@ -57,17 +45,5 @@ using HasTile = std::function<bool(const geo::TileKey&)>;
 // normals. kInvalidArgument: too many tiles.
 Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
-
-// The tile of a level that contains a point.
-geo::TileKey TileAt(const dem::GeoPosition& point, int level);
-// The deepest tile of at most this level that contains a point.
-geo::TileKey DeepestTileAt(const HasTile& has_tile, const dem::GeoPosition& point, int level);
-
-// An order of tiles, for maps.
-struct IsTileBefore {
-  bool operator()(const geo::TileKey& a, const geo::TileKey& b) const {
-    return std::tie(a.level, a.y, a.x) < std::tie(b.level, b.y, b.x);
-  }
-};
 
 }  // namespace terrace::tiler

@@ -4,13 +4,11 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <utility>
 
 namespace terrace::tiler {
 namespace {
 
-// Metres: within a part of this length a ray is straight in degrees to a few millimetres.
+// Metres: within a part of this length a ray is a parabola above the ellipsoid to a micrometre.
 constexpr double kPartLength = 500;
 
 // A value along a part of a ray, by its values at 0, 0.5 and 1: a polynomial of the second degree.
@@ -70,119 +68,187 @@ class Clearances {
   bool has_gaps_ = false;
 };
 
+// A part of the surface that one list of triangles covers: degrees.
+struct Region {
+  double west, south, east, north;
+
+  bool Contains(const dem::GeoPosition& point) const {
+    constexpr double kSlack = 1e-9;  // 0.1 mm: a ray along an edge is on both sides of it, by rounding
+    return std::abs(std::remainder(point.longitude - (west + east) / 2, 360)) <= (east - west) / 2 + kSlack &&
+           std::abs(point.latitude - (south + north) / 2) <= (north - south) / 2 + kSlack;
+  }
+};
+
+// The part of a bucket within the child of its tile that contains the point. Beside this child another child may exist,
+// and cover the rest of the bucket.
+Region RegionAt(const DrawnMesh& mesh, const DrawnMesh::Bucket& bucket, const dem::GeoPosition& point, int deepest) {
+  const geo::TileKey child = TileAt(point, std::min(deepest, mesh.key().level + 1));
+  const double side = 180.0 / static_cast<double>(geo::TileRows(child.level));
+  const double west = static_cast<double>(child.x) * side - 180, south = static_cast<double>(child.y) * side - 90;
+  return {std::max(bucket.west, west), std::max(bucket.south, south), std::min(bucket.east, west + side),
+          std::min(bucket.north, south + side)};
+}
+
+// Where a straight line in space passes meridians and parallels. Also at poles, where degrees along the line are not
+// smooth.
+class Passes {
+ public:
+  explicit Passes(const dem::SightRay& ray)
+      : start_(geo::ToEcef(ray.from.longitude, ray.from.latitude, ray.from.height_m)),
+        way_(geo::ToEcef(ray.to.longitude, ray.to.latitude, ray.to.height_m) - start_) {}
+
+  // The first place after `share` where the line may leave a region, as a share of its length; infinity if there is
+  // none. Also a place on the opposite meridian, or on the parallel's mirror image.
+  double Next(const Region& region, double share) const {
+    double next = std::numeric_limits<double>::infinity();
+    const auto add = [&](double place) {
+      if (place > share) next = std::min(next, place);
+    };
+    for (const double longitude : {region.west, region.east}) AddMeridian(longitude, add);
+    for (const double latitude : {region.south, region.north}) AddParallel(latitude, add);
+    return next;
+  }
+
+ private:
+  // A meridian is a half plane.
+  void AddMeridian(double longitude, const auto& add) const {
+    const double sine = std::sin(geo::ToRadians(longitude)), cosine = std::cos(geo::ToRadians(longitude));
+    add((start_.y * cosine - start_.x * sine) / (way_.x * sine - way_.y * cosine));
+  }
+  // The places of a geodetic latitude, at all heights, are a cone around the axis: its normals meet there.
+  void AddParallel(double latitude, const auto& add) const {
+    const double sine = std::sin(geo::ToRadians(latitude)), cosine = std::cos(geo::ToRadians(latitude));
+    const double z = start_.z + geo::kEccentricitySquared * geo::PrimeVerticalRadius(latitude) * sine;
+    const double s2 = sine * sine, c2 = cosine * cosine;
+    const double a = (way_.x * way_.x + way_.y * way_.y) * s2 - way_.z * way_.z * c2;
+    const double b = 2 * ((start_.x * way_.x + start_.y * way_.y) * s2 - z * way_.z * c2);
+    const double c = (start_.x * start_.x + start_.y * start_.y) * s2 - z * z * c2;
+    // A root of a line that touches the cone, or by rounding does not quite, divides the line at its nearest place.
+    const double q = -(b + std::copysign(std::sqrt(std::max(0.0, b * b - 4 * a * c)), b)) / 2;
+    add(q / a);
+    add(c / q);
+  }
+
+  geo::Vec3 start_, way_;
+};
+
 // Follows rays over the meshes of tiles.
 class MeshWalk {
  public:
-  MeshWalk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of)
-      : has_tile_(has_tile), level_(level), options_(options), mesh_of_(mesh_of) {}
+  MeshWalk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of,
+           const std::stop_token& stop)
+      : tiles_(has_tile, level, "surface: the rays", mesh_of), options_(options), stop_(stop) {}
 
-  Result<dem::SightAnswer> Look(const dem::SightRay& ray, const std::stop_token& stop) {
+  // Divides a ray where it leaves a region.
+  Result<dem::SightAnswer> Look(const dem::SightRay& ray) {
     Clearances clearances;
-    const int parts = std::max(1, static_cast<int>(std::ceil(dem::LengthOf(ray) / kPartLength)));
-    for (int i = 0; i < parts; ++i) {
-      const Result<void> done = AddPart(ray, static_cast<double>(i) / parts, 1.0 / parts, clearances, stop);
-      if (!done) return tl::unexpected(done.error());
+    const Passes passes(ray);
+    const double length_m = dem::LengthOf(ray);
+    const double min_step = length_m > 0 ? std::min(1.0, kMinStep / length_m) : 1;
+    for (double share = 0; share < 1;) {
+      // Near a pole a ray crosses many regions.
+      if (stop_.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
+      const double inside = std::min(1.0, share + min_step / 2);
+      const dem::GeoPosition here = PlaceAt(ray, inside);
+      const Result<std::uint32_t> tile = tiles_.numbers().NumberAt(here);
+      if (!tile) return tl::unexpected(tile.error());
+      const Result<const DrawnMesh*> mesh = tiles_.MeshOf(*tile);
+      if (!mesh) return tl::unexpected(mesh.error());
+      const DrawnMesh::Bucket bucket = (*mesh)->BucketAt(here);
+      const Region region = RegionAt(**mesh, bucket, here, tiles_.numbers().level());
+      double next = std::min({1.0, share + kPartLength / length_m, passes.Next(region, inside)});
+      while (next - share > min_step && !region.Contains(PlaceAt(ray, (share + next) / 2))) next = (share + next) / 2;
+      next = std::min(1.0, std::max(next, share + min_step));
+      const Result<void> added = AddPart(ray, {share, next}, *tile, **mesh, bucket.triangles, clearances);
+      if (!added) return tl::unexpected(added.error());
+      share = next;
     }
     return clearances.Answer();
   }
 
  private:
-  Result<const DrawnMesh*> MeshAt(const dem::GeoPosition& point) {
-    const geo::TileKey key = DeepestTileAt(has_tile_, point, level_);
-    if (last_ != nullptr && last_->key() == key) return last_;
-    auto& mesh = meshes_[key];
-    if (mesh == nullptr) {
-      if (meshes_.size() > kMaxDrawnTiles) {
-        return MakeError(
-            ErrorCode::kInvalidArgument,
-            "surface: the rays cross more than {} tiles of level {}, which is the most for one request; ask "
-            "for fewer rays, or for a shallower level",
-            kMaxDrawnTiles, level_);
-      }
-      Result<std::shared_ptr<const DrawnMesh>> made = mesh_of_(key);
-      if (!made) return tl::unexpected(std::move(made).error());
-      mesh = *std::move(made);
-    }
-    return last_ = mesh.get();
+  // Of a ray, as shares of its length, or of a part, as shares of the part.
+  struct Interval {
+    double from, to;
+
+    double At(double s) const { return from + s * (to - from); }
+  };
+
+  dem::GeoPosition PlaceAt(const dem::SightRay& ray, double share) const {
+    const dem::SightPoint point = dem::PointAt(ray, share, options_);
+    return {point.longitude, point.latitude};
   }
 
-  // Divides a part of a ray where it leaves a bucket of a mesh.
-  Result<void> AddPart(const dem::SightRay& ray, double start, double length, Clearances& clearances,
-                       const std::stop_token& stop) {
-    const auto at = [&](double s) { return dem::PointAt(ray, start + s * length, options_); };
-    const dem::SightPoint first = at(0), last = at(1);
-    const double east = std::remainder(last.longitude - first.longitude, 360), north = last.latitude - first.latitude;
-    constexpr double kMinStep = 1e-6;
-    for (double s = 0;;) {
-      // Near a pole a part passes many buckets.
-      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
-      const double inside = std::min(1.0, s + kMinStep / 2);
-      const dem::GeoPosition here{std::remainder(first.longitude + inside * east, 360),
-                                  first.latitude + inside * north};
-      const Result<const DrawnMesh*> mesh = MeshAt(here);
-      if (!mesh) return tl::unexpected(mesh.error());
-      const DrawnMesh::Bucket bucket = (*mesh)->BucketAt(here);
-      double next = 1;
-      const auto leave = [&](double position, double low, double high, double speed) {
-        if (speed == 0) return;
-        next = std::min(next, inside + ((speed > 0 ? high : low) - position) / speed);
-      };
-      leave(here.longitude, bucket.west, bucket.east, east);
-      leave(here.latitude, bucket.south, bucket.north, north);
-      next = std::min(1.0, std::max(next, s + kMinStep));
-      AddInBucket(**mesh, bucket, {at(s), at((s + next) / 2), at(next)}, start + s * length, (next - s) * length,
-                  clearances);
-      if (next >= 1) return {};
-      s = next;
-    }
-  }
-
-  static void AddInBucket(const DrawnMesh& mesh, const DrawnMesh::Bucket& bucket,
-                          const std::array<dem::SightPoint, 3>& points, double start, double length,
-                          Clearances& clearances) {
-    const auto position = [&](int i) {
-      const dem::SightPoint& point = points[static_cast<std::size_t>(i)];
-      return dem::GeoPosition{point.longitude, point.latitude};
-    };
-    bool is_met = false;
-    for (const std::uint32_t triangle : bucket.triangles) {
-      const auto first = mesh.CrossingOf(triangle, position(0)), middle = mesh.CrossingOf(triangle, position(1)),
-                 last = mesh.CrossingOf(triangle, position(2));
+  // `triangles` lie over the part, which is short enough that heights and barycentric coordinates along it are
+  // polynomials of the second degree.
+  Result<void> AddPart(const dem::SightRay& ray, const Interval& part, std::uint32_t tile, const DrawnMesh& mesh,
+                       std::span<const std::uint32_t> triangles, Clearances& clearances) {
+    std::array<dem::SightPoint, 3> points;
+    for (std::size_t i = 0; i < 3; ++i) points[i] = dem::PointAt(ray, part.At(static_cast<double>(i) / 2), options_);
+    const auto place = [&](std::size_t i) { return dem::GeoPosition{points[i].longitude, points[i].latitude}; };
+    covered_.clear();
+    for (const std::uint32_t triangle : triangles) {
+      const auto first = mesh.CrossingOf(triangle, place(0)), middle = mesh.CrossingOf(triangle, place(1)),
+                 last = mesh.CrossingOf(triangle, place(2));
       if (!first || !middle || !last) continue;
-      double from = 0, to = 1;
-      for (std::size_t k = 0; k < 3; ++k) {
+      Interval over{0, 1};
+      for (std::size_t k = 0; k < 3 && over.from <= over.to; ++k) {
         const Along inside{first->inside[k], middle->inside[k], last->inside[k]};
-        if (inside.At(from) < 0 && inside.At(to) < 0) from = 2;
-        if (from > to) break;
-        if (inside.At(from) < 0) {
-          from = inside.Solve(0, from, to);
-        } else if (inside.At(to) < 0) {
-          to = inside.Solve(0, to, from);
+        if (inside.At(over.from) < 0 && inside.At(over.to) < 0) over.from = 2;
+        if (over.from > over.to) break;
+        if (inside.At(over.from) < 0) {
+          over.from = inside.Solve(0, over.from, over.to);
+        } else if (inside.At(over.to) < 0) {
+          over.to = inside.Solve(0, over.to, over.from);
         }
       }
-      if (from > to) continue;
-      is_met |= from <= 0.5 && to >= 0.5;
+      if (over.from > over.to) continue;
+      covered_.push_back(over);
       if (mesh.IsInHole(triangle)) {
         clearances.AddGap();
         continue;
       }
-      const Along over{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
-                       points[2].height_m - last->height_m};
-      clearances.Add(over, from, to, start, length);
+      const Along clearance{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
+                            points[2].height_m - last->height_m};
+      clearances.Add(clearance, over.from, over.to, part.from, part.to - part.from);
     }
-    if (is_met) return;
-    // Beside the tile's edge, within the distance of a chord from its parallel.
-    const double clearance_m = points[1].height_m - mesh.Nearest(position(1)).height_m;
-    if (std::isnan(clearance_m)) return clearances.AddGap();
-    clearances.Add({clearance_m, clearance_m, clearance_m}, 0, 1, start, length);
+    std::ranges::sort(covered_, {}, &Interval::from);
+    covered_.push_back({1, 1});
+    double reached = 0;
+    for (const Interval& over : covered_) {
+      if (over.from - reached > kMinBare) {
+        const Result<void> added = AddBare(ray, {part.At(reached), part.At(over.from)}, tile, clearances);
+        if (!added) return added;
+      }
+      reached = std::max(reached, over.to);
+    }
+    return {};
   }
 
-  const HasTile& has_tile_;
-  const int level_;
+  // A part with no triangle of its tile: beside the tile's edge, within the distance of a chord from its parallel, or
+  // in a hole.
+  Result<void> AddBare(const dem::SightRay& ray, const Interval& part, std::uint32_t tile, Clearances& clearances) {
+    std::array<double, 3> over{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      const dem::SightPoint point = dem::PointAt(ray, part.At(static_cast<double>(i) / 2), options_);
+      const Result<DrawnTiles::Reading> read = tiles_.ReadAt({point.longitude, point.latitude}, tile, stop_);
+      if (!read) return tl::unexpected(read.error());
+      over[i] = point.height_m - read->point.height_m;
+      if (!std::isnan(over[i])) continue;
+      clearances.AddGap();
+      return {};
+    }
+    clearances.Add({over[0], over[1], over[2]}, 0, 1, part.from, part.to - part.from);
+    return {};
+  }
+
+  static constexpr double kMinStep = 5e-4;  // metres
+  static constexpr double kMinBare = 1e-4;  // of a part: rounding makes shorter ones
+
+  DrawnTiles tiles_;
   const dem::SightOptions& options_;
-  const MeshOfTile& mesh_of_;
-  std::map<geo::TileKey, std::shared_ptr<const DrawnMesh>, IsTileBefore> meshes_;
-  const DrawnMesh* last_ = nullptr;
+  const std::stop_token& stop_;
+  std::vector<Interval> covered_;  // by triangles of the current part
 };
 
 double TotalLength(std::span<const dem::SightRay> rays) {
@@ -219,11 +285,11 @@ Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, in
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,
                                                      const std::stop_token& stop) {
-  MeshWalk walk(has_tile, level, options, mesh_of);
+  MeshWalk walk(has_tile, level, options, mesh_of, stop);
   std::vector<dem::SightAnswer> answers;
   answers.reserve(rays.size());
   for (const dem::SightRay& ray : rays) {
-    const Result<dem::SightAnswer> answer = walk.Look(ray, stop);
+    const Result<dem::SightAnswer> answer = walk.Look(ray);
     if (!answer) return tl::unexpected(answer.error());
     answers.push_back(*answer);
   }

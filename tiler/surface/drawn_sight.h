@@ -20,7 +20,7 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
 Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays);
 
 // As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:
-// the rays cross more than kMaxDrawnTiles tiles. Other errors: those of `mesh_of`.
+// the rays cross more than kMaxTilesRead tiles. Other errors: those of `mesh_of`.
 Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
                                                      const dem::SightOptions& options, const MeshOfTile& mesh_of,

@@ -270,7 +270,7 @@ TEST(Holes, GoAcrossRastersOfAGrid) {
   }
 }
 
-// A coarse source below has priority in a hole over the surface. Small voids are filled from the fine source.
+// A coarse source below has priority in a hole over the surface. Narrow voids are filled from the fine source.
 TEST(Holes, ShowASourceBelow) {
   const TempDir dir;
   const auto one_sample = Box(30, 30, 1, 1), large = Box(100, 100, 200, 200);

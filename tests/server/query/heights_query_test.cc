@@ -296,7 +296,7 @@ TEST(CertifiedPoints, LieInTheDeepestTilesThereAre) {
   ASSERT_TRUE(deepest);
   const std::vector<geo::TileKey> tiles = {{1, 2, 1}, {0, 1, 0}, {0, 0, 0}};
   EXPECT_EQ(deepest->tiles, tiles);
-  EXPECT_EQ(deepest->tile_of_point, (std::vector<std::size_t>{0, 1, 0, 2, 2, 2}));
+  EXPECT_EQ(deepest->tile_of_point, (std::vector<std::uint32_t>{0, 1, 0, 2, 2, 2}));
   EXPECT_EQ(deepest->errors_m.size(), 3u);
   EXPECT_EQ(CertifyingTilesOf(dataset, points, 0)->tiles, (std::vector<geo::TileKey>{{0, 1, 0}, {0, 0, 0}}));
 }
@@ -307,7 +307,7 @@ TEST(CertifiedPoints, AreRefusedInTooManyTiles) {
     dataset.available.push_back({{0, 0, geo::TileColumns(level) - 1, geo::TileRows(level) - 1}});
   }
   std::vector<dem::GeoPosition> points;
-  for (std::size_t i = 0; i <= kMaxCertifiedTiles; ++i) points.push_back({static_cast<double>(i) * 2.8125 - 179, 1});
+  for (std::size_t i = 0; i <= tiler::kMaxTilesRead; ++i) points.push_back({static_cast<double>(i) * 2.8125 - 179, 1});
   const auto refused = CertifyingTilesOf(dataset, points, 6);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);

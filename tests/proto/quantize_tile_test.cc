@@ -1,4 +1,4 @@
-#include "proto/mesh/tile_mesh.h"
+#include "proto/mesh/quantize_tile.h"
 
 #include <gtest/gtest.h>
 

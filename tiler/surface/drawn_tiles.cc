@@ -1,0 +1,77 @@
+#include "tiler/surface/drawn_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace terrace::tiler {
+namespace {
+
+// The tile beyond the northern or southern edge that the point is nearest to.
+geo::TileKey NeighbourAt(const geo::TileKey& key, const dem::GeoPosition& point) {
+  const double row = (point.latitude + 90) / 180 * static_cast<double>(geo::TileRows(key.level));
+  return geo::Neighbour(key, 0, row - static_cast<double>(key.y) < 0.5 ? -1 : 1);
+}
+
+}  // namespace
+
+geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
+  const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+  const auto number = [side](double degrees, std::int64_t count) {
+    return std::clamp<std::int64_t>(static_cast<std::int64_t>(std::floor(degrees / side)), 0, count - 1);
+  };
+  const double longitude = point.longitude == 180 ? -180 : point.longitude;
+  return {level, number(longitude + 180, geo::TileColumns(level)), number(point.latitude + 90, geo::TileRows(level))};
+}
+
+std::optional<std::uint32_t> TileNumbers::Add(const geo::TileKey& key) {
+  if (const auto found = numbers_.find(key); found != numbers_.end()) return found->second;
+  if (keys_.size() == kMaxTilesRead) return std::nullopt;
+  keys_.push_back(key);
+  return numbers_[key] = static_cast<std::uint32_t>(keys_.size() - 1);
+}
+
+Result<std::uint32_t> TileNumbers::NumberAt(const dem::GeoPosition& point) {
+  int level = level_;
+  geo::TileKey key = TileAt(point, level);
+  while (level > 0 && !has_tile_(key)) key = TileAt(point, --level);
+  if (const std::optional<std::uint32_t> number = Add(key)) return *number;
+  return MakeError(
+      ErrorCode::kInvalidArgument,
+      "{} lie in more than {} tiles of level {}, which is the most for one request; ask for fewer, or for a "
+      "shallower level",
+      subject_, kMaxTilesRead, level_);
+}
+
+std::optional<std::uint32_t> TileNumbers::NumberOf(const geo::TileKey& key) {
+  return geo::IsValid(key) && has_tile_(key) ? Add(key) : std::nullopt;
+}
+
+Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
+  meshes_.resize(numbers_.keys().size());
+  if (meshes_[number] == nullptr) {
+    Result<std::shared_ptr<const DrawnMesh>> made = mesh_of_(numbers_.keys()[number]);
+    if (!made) return tl::unexpected(std::move(made).error());
+    meshes_[number] = *std::move(made);
+  }
+  return meshes_[number].get();
+}
+
+Result<DrawnTiles::Reading> DrawnTiles::ReadAt(const dem::GeoPosition& point, std::uint32_t own,
+                                               const std::stop_token& stop) {
+  const auto read = [&](std::uint32_t tile) -> Result<Reading> {
+    const Result<const DrawnMesh*> mesh = MeshOf(tile);
+    if (!mesh) return tl::unexpected(mesh.error());
+    if (const std::optional<DrawnPoint> met = (*mesh)->AtBucket(point)) return Reading{*met, tile};
+    // On shallow levels all triangles are examined.
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
+    return Reading{(*mesh)->Nearest(point), tile};
+  };
+  const Result<Reading> inside = read(own);
+  if (!inside || !inside->point.is_beside) return inside;
+  const std::optional<std::uint32_t> neighbour = numbers_.NumberOf(NeighbourAt(numbers_.keys()[own], point));
+  if (!neighbour) return inside;
+  const Result<Reading> beyond = read(*neighbour);
+  return !beyond || !beyond->point.is_beside ? beyond : inside;
+}
+
+}  // namespace terrace::tiler
