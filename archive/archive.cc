@@ -10,7 +10,7 @@
 
 #include "archive/files/input_file.h"
 #include "archive/pmtiles/pmtiles_file.h"
-#include "archive/tile_scheme.h"
+#include "archive/pmtiles_mapping.h"
 #include "archive/unit_name.h"
 #include "engine/gdal/remote_file.h"
 #include "tiler/tile/tile_bounds.h"

@@ -131,7 +131,7 @@ class Baked final : public tiler::BakedTiles {
       const int deeper = manifest.kind.side_px == 512 ? 1 : 0;
       extent_.min_mercator_depth = manifest.min_level + deeper;
       extent_.max_mercator_depth = manifest.max_level + deeper;
-      extent_.height_bounds = HeightBounds(manifest);
+      extent_.height_tile_bounds = HeightTileBounds(manifest);
       return;
     }
     // Archives of one bake have the same tiles.

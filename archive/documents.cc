@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "archive/manifest_json.h"
-#include "archive/tile_scheme.h"
+#include "archive/pmtiles_mapping.h"
 #include "engine/dem/planned_tiles.h"
 #include "engine/geo/tile_cover.h"
 #include "proto/documents/layer_json.h"
@@ -34,7 +34,7 @@ std::string LayerJson(const Manifest& manifest) {
   return proto::EncodeLayerJson(layer);
 }
 
-dem::GeoBounds HeightBounds(const Manifest& manifest) {
+dem::GeoBounds HeightTileBounds(const Manifest& manifest) {
   const dem::GeoBounds& data = manifest.dataset.bounds;
   if (manifest.available.empty() || manifest.available.back().empty()) return data;
   const std::vector<geo::TileRange>& deepest = manifest.available.back();
@@ -58,7 +58,7 @@ std::string TileJson(const Manifest& manifest) {
   tiles.max_zoom = manifest.max_level;
   tiles.tile_size = manifest.kind.side_px;
   tiles.encoding = manifest.kind.height_encoding;
-  tiles.bounds = HeightBounds(manifest);
+  tiles.bounds = HeightTileBounds(manifest);
   return proto::EncodeTileJson(tiles);
 }
 

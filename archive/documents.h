@@ -13,7 +13,7 @@ namespace terrace::archive {
 std::string LayerJson(const Manifest& manifest);
 
 // The bounds of the deepest height tiles of an archive, within those of the dataset.
-dem::GeoBounds HeightBounds(const Manifest& manifest);
+dem::GeoBounds HeightTileBounds(const Manifest& manifest);
 
 // TileJSON of an archive of height tiles, with a template relative to itself.
 std::string TileJson(const Manifest& manifest);

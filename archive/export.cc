@@ -14,8 +14,8 @@
 #include "archive/files/output_file.h"
 #include "archive/files/zip_writer.h"
 #include "archive/pmtiles/pmtiles_writer.h"
+#include "archive/pmtiles_mapping.h"
 #include "archive/static_tileset.h"
-#include "archive/tile_scheme.h"
 #include "engine/core/errno_text.h"
 #include "engine/geo/mercator_grid.h"
 

@@ -12,7 +12,7 @@
 #include "archive/pmtiles/directory.h"
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/pmtiles/pmtiles_writer.h"
-#include "archive/tile_scheme.h"
+#include "archive/pmtiles_mapping.h"
 #include "archive/unit_name.h"
 #include "engine/common/content_hash.h"
 #include "tiler/tile/tile_bounds.h"

@@ -89,8 +89,8 @@ struct UnitPlan {
   static UnitPlan Make(const std::vector<Target>& targets, const Shard& shard);
 };
 
-// Bakes every unit that is not there yet. A unit that fails is tried again later. It is given up after kMaxAttempts
-// failures, or after one less if a source has changed (kChanged). The others are baked nevertheless. Returns the
+// Bakes every unit that is not there yet. A unit that fails is tried again later, until UnitQueue::Fail gives
+// it up. The others are baked nevertheless. Returns the
 // reports in the order of the plan. After a stop, unfinished units have neither files nor reports. The files do not
 // depend on the number of threads or on interruptions.
 std::vector<UnitReport> Bake(const tiler::TilePipeline& pipeline, const std::vector<Target>& targets,

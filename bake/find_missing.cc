@@ -4,7 +4,7 @@
 #include <string>
 
 #include "archive/pmtiles/pmtiles_file.h"
-#include "archive/tile_scheme.h"
+#include "archive/pmtiles_mapping.h"
 #include "archive/unit_name.h"
 #include "bake/unit_key.h"
 

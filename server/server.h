@@ -59,9 +59,9 @@ class Server {
   static Result<void> CheckAddress(const config::Config& config);
 
   // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
-  // dataset stays in the same generation. Applies cache_bytes, cache_control and request_deadline of `config`.
-  // Datasets that are pending answer 503. kInvalidArgument: a name is not valid, as in Start; nothing changes. May be
-  // called on any thread, but not concurrently.
+  // dataset stays in the same generation. Applies cache_bytes, cache_control, max_mesh_samples and
+  // request_deadline of `config`. Datasets that are pending answer 503. kInvalidArgument: a name is not valid, as in
+  // Start; nothing changes. May be called on any thread, but not concurrently.
   virtual Result<void> Replace(CatalogPtr catalog, const config::Config& config) = 0;
 
   // Requests a stop and waits for it.

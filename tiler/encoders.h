@@ -16,7 +16,8 @@ struct EncoderInput;  // tile_pipeline.h
 struct Encoder {
   TileFormat format;
   bool needs_refinement;
-  // Sets the bytes and times.encode. Meshes also set errors and counts, and add to times.refine. Formats without a
+  // Sets the bytes and times.encode. Meshes and height PNGs also set the errors; meshes set counts, and add to
+  // times.refine. Formats without a
   // refinement also set `refinement` to kNone, and times.read.
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };

@@ -126,7 +126,7 @@ class TilePipeline {
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
-  // rays cross too many samples. Other errors: those of the two functions above.
+  // rays cross too many samples. Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

@@ -251,7 +251,7 @@ std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
   const std::string_view what = (*reply)[0].text();
   if (what == "unit") return Accept(*reply);
   if (what == "incomplete") EndBecause(End::kIncomplete, {});
-  if (what == "finished") EndBecause(End::kFinished, {});
+  if (what == "finished") EndBecause(End::kFinishedByOther, {});
   if (what == "wait" || end() != End::kNone) return WaitOrOver();
   // The job is gone, or its stream.
   if (const auto entered = Enter(what != "gone"); !entered) {
@@ -283,7 +283,7 @@ std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply
   }
   if (is_finish) {
     finish_ = held;
-    end_ = End::kFinish;
+    end_ = End::kCheckNeeded;
     return Taken{Taken::State::kOver};
   }
   // A unit in hand comes again if the queue was filled anew, or if this process was stopped for longer than a lease.
@@ -405,13 +405,13 @@ Result<std::vector<DeadUnit>> RedisQueue::Dead() {
   return ReadDead(*connection_, options_.place);
 }
 
-void RedisQueue::Finished() {
+void RedisQueue::ReportFinished() {
   const std::lock_guard calls(calls_);
   {
     const std::lock_guard lock(mutex_);
     if (finish_) Send(*finish_, scripts::kFinished, {});
     finish_.reset();
-    end_ = End::kFinished;
+    end_ = End::kFinishedByOther;
   }
   (void)Flush();
 }

@@ -54,11 +54,11 @@ class RedisQueue : public UnitQueue {
 
   // Why Take returned kOver.
   enum class End {
-    kNone,        // it has not
-    kFinish,      // all are done, and this worker is to check them: then call Finished or AddMissing
-    kFinished,    // another worker has done that
-    kIncomplete,  // units were given up: Dead
-    kLost,        // Redis was unreachable for too long, or the job is another one now: Why
+    kNone,             // it has not
+    kCheckNeeded,      // all are done, and this worker is to check them: then call ReportFinished or AddMissing
+    kFinishedByOther,  // another worker has done that
+    kIncomplete,       // units were given up: Dead
+    kLost,             // Redis was unreachable for too long, or the job is another one now: Why
   };
   End end() const;
   Error Why() const;
@@ -67,9 +67,9 @@ class RedisQueue : public UnitQueue {
   // Gives back the units that were not done, and makes no call afterwards. False: Redis does not reply, so that others
   // get them when their lease has ended. Called when no other call is under way.
   bool Leave();
-  // After kFinish: the manifest is written.
-  void Finished();
-  // After kFinish: these units are absent although they were done. The job continues with them.
+  // After kCheckNeeded: the manifest is written.
+  void ReportFinished();
+  // After kCheckNeeded: these units are absent although they were done. The job continues with them.
   void AddMissing(const std::vector<std::size_t>& units);
 
  private:

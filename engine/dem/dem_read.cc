@@ -117,7 +117,7 @@ GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattic
   trace.cells = grid.CellsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor, trace.window);
   if (!trace.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
-    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // then the bound is infinite, too
+    constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // the bound uses the geoid's range instead
     trace.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
   }
   return trace;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/mosaic/window_values.h"
 #include "engine/raster/sample_grid.h"
 
 namespace terrace::dem {
@@ -16,9 +17,7 @@ struct VoidGrid {
   std::vector<float> heights;         // NaN: no height
   std::vector<std::uint8_t> unknown;  // 1: a height is to be computed, and `heights` is ignored; 0: nothing to compute
 
-  std::size_t At(std::int64_t column, std::int64_t row) const {
-    return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
-  }
+  std::size_t At(std::int64_t column, std::int64_t row) const { return IndexIn(window, column, row); }
 };
 
 // A set of unknown samples connected by their sides.

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/error/edge_rows.h"
 #include "proto/lattice_view.h"
-#include "proto/mesh/edge_rows.h"
 
 namespace terrace::proto {
 

@@ -8,10 +8,10 @@
 #include <utility>
 
 #include "engine/geo/ellipsoid.h"
+#include "proto/error/edge_rows.h"
 #include "proto/error/node_verticals.h"
 #include "proto/error/row_error.h"
 #include "proto/error/triangle_bound.h"
-#include "proto/mesh/edge_rows.h"
 #include "proto/mesh/tile_geometry.h"
 
 namespace terrace::proto {

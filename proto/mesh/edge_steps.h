@@ -2,9 +2,9 @@
 //
 // quantized-mesh stores a height as a 15-bit multiple of the tile's own step. Two tiles agree on an edge bit for bit if
 // the heights there are multiples of a step that the steps of both tiles divide. All steps here are powers of two. A
-// tile's own step (quantize_tile.h) is the finest that its relief allows, so an edge's step only has to be at least what
-// either tile needs. The need of a tile is derived from the RangeBound of its heights and not from its samples, because
-// the neighbour that computes the same edge has not read them:
+// tile's own step (quantize_tile.h) is the finest that its relief allows, so an edge's step only has to be at least
+// what either tile needs. The need of a tile is derived from the RangeBound of its heights and not from its samples,
+// because the neighbour that computes the same edge has not read them:
 //
 //   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
@@ -35,10 +35,10 @@ struct EdgeSteps {
   double Coarsest(tin::Side side) const;
 };
 
-// The smallest error that samples of each side, and of the four edges that meet at each corner, may have: that of the
-// tile unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared edges and
-// corners. An edge's step for its error is at least an 8192nd of the step for the tile's error, so that in the proof
-// above S <= 8192 M, and 16384 M + S < 32767 M holds.
+// The strictest bound on the errors of samples: on each side, and on the four edges that meet at each corner. It is the
+// tile's error unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared
+// edges and corners. An edge's step for its error is at least an 8192nd of the step for the tile's error, so that in
+// the proof above S <= 8192 M, and 16384 M + S < 32767 M holds.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);

@@ -11,8 +11,9 @@ namespace terrace::proto {
 // is an upper bound, wherever the ladder clamps (engine/geo/error_ladder.h). `error_m`: SkirtError of the request.
 double SkirtDepth(int level, double error_m);
 
-// The error that a tile's skirts are made for, in metres: the ladder error of its step. On a dataset's deepest level it
-// is at least the default error, because with `error=E&atleast=1` the deepest tile has E and its parent the default.
+// The error that a tile's skirts are made for, in metres: the ladder error of its step. On the deepest level of the
+// sources and below, it is at least the default error, because with `error=E&atleast=1` such a tile has E and the
+// parent of the first one the default.
 double SkirtError(int level, int step, bool is_deepest, double error_fraction);
 
 }  // namespace terrace::proto

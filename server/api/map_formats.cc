@@ -22,7 +22,7 @@ int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size) 
     case tiler::TileFormat::kGeodeticImagery:
       return std::max(dataset.imagery->max_geodetic_level - above, 0);
     default:
-      return MaxHeightLevel(dataset, size);
+      return MaxHeightTileLevel(dataset, size);
   }
 }
 

@@ -256,7 +256,7 @@ tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::Enco
   put("Content-Length", tile.bytes.size());
   head.body_bytes = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
-  if (!tiler::IsForMaps(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
+  if (!tiler::IsMapLayer(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {
     put("Terrain-Certified-Error", proto::FormatErrorUp(*tile.certified_error_m));
   }

@@ -58,11 +58,11 @@ Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
   tiles.tile_template =
       fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*context.request), PercentEncode(dataset.name),
                   WithToken(HeightTileQuery(dataset, *parameters), context));
-  tiles.min_zoom = MinHeightLevel(dataset, parameters->size);
-  tiles.max_zoom = MaxHeightLevel(dataset, parameters->size);
+  tiles.min_zoom = MinHeightTileLevel(dataset, parameters->size);
+  tiles.max_zoom = MaxHeightTileLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
-  tiles.bounds = dataset.height_bounds.value_or(dataset.bounds);
+  tiles.bounds = dataset.height_tile_bounds.value_or(dataset.bounds);
   return ServeTileJson(handlers, context, tiles);
 }
 

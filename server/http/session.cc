@@ -89,7 +89,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Evict() override { Post(&Session::EvictHere); }
   void Drain() override { Post(&Session::DrainHere); }
   void Abort() override { Post(&Session::AbortHere); }
-  void Preempt() override { Post(&Session::PreemptHere); }
+  void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
   // The current request.
@@ -116,7 +116,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   }
 
   // If its reply is being sent, or its body has no memory, there is nothing to release.
-  void PreemptHere() {
+  void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;  // also between the moment its body got memory and the moment it is woken
     if (is_receiving_ && has_upload_) stream_.Cancel();

@@ -52,7 +52,7 @@ class SingleFlight {
   SingleFlight& operator=(const SingleFlight&) = delete;
 
   // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `order`. `name` is
-  // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or displaced the
+  // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the
   // flight's job. kCancelled: the order's deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
   // pool is cancelled. Otherwise the result of `build`.
   asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobOrder order);

@@ -32,7 +32,7 @@ Error FailureOf(std::string_view name, const std::exception& thrown) {
 
 Error DroppedJobError(std::string_view name) {
   try {
-    return Error{ErrorCode::kOverloaded, std::string(name) + ": displaced from the full queue of work"};
+    return Error{ErrorCode::kOverloaded, std::string(name) + ": dropped from the full queue of work"};
   } catch (const std::exception&) {
     return Error{ErrorCode::kOverloaded, "no memory"};
   }
@@ -51,7 +51,7 @@ WorkerPool::WorkerPool(unsigned threads, std::size_t queue_length, Now now)
 WorkerPool::~WorkerPool() { Shutdown(); }
 
 Result<void> WorkerPool::Submit(PoolJobPtr job) {
-  PoolJobPtr displaced;
+  PoolJobPtr dropped;
   {
     const std::lock_guard lock(mutex_);
     if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
@@ -62,11 +62,11 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     }
     queue_.Push(job, now);
     // Jobs that an idle thread is about to fetch are not waiting: a pool with queue length 0 still works.
-    if (queue_.size() > queue_length_ + idle_) displaced = queue_.RemoveNewestOfLargest();
-    if (displaced == job) return MakeError(ErrorCode::kOverloaded, "the queue of work is full");
+    if (queue_.size() > queue_length_ + idle_) dropped = queue_.RemoveNewestOfLargest();
+    if (dropped == job) return MakeError(ErrorCode::kOverloaded, "the queue of work is full");
   }
   wake_.notify_one();
-  if (displaced && displaced->on_dropped) displaced->on_dropped();
+  if (dropped && dropped->on_dropped) dropped->on_dropped();
   return {};
 }
 

@@ -22,9 +22,9 @@ class Connection {
   virtual ~Connection() = default;
 
   enum class Phase : std::uint8_t {
-    kIdle,      // a reply was sent, no next request has arrived
-    kReceives,  // no complete request, head and body, has arrived yet, or TLS is being negotiated
-    kServes,
+    kIdle,      // after a reply, until the head of the next request is complete
+    kReceives,  // TLS is being negotiated, or the first head or a body is being read
+    kServes,    // from the end of a head on, except while its body is being read
   };
   virtual Phase phase() const = 0;
 
@@ -34,7 +34,7 @@ class Connection {
   virtual void Drain() = 0;
   virtual void Abort() = 0;
   // Refuses the current request, because others need the memory of its body.
-  virtual void Preempt() { Abort(); }
+  virtual void Displace() { Abort(); }
 };
 
 class ConnectionSet {

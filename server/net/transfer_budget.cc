@@ -88,7 +88,7 @@ asio::awaitable<std::optional<TransferBudget::Hold>> TransferBudget::HoldWhenRoo
     }
     if (hold || now >= deadline) co_return hold;
     for (const auto& connection : victims.cut) connection->Abort();
-    for (const auto& connection : victims.displaced) connection->Preempt();
+    for (const auto& connection : victims.displaced) connection->Displace();
     waiter.timer->expires_after(std::min<Clock::duration>(deadline - now, kCheckPeriod));
     boost::system::error_code ignored;  // woken, or time for a check
     co_await waiter.timer->async_wait(asio::redirect_error(asio::use_awaitable, ignored));

@@ -7,8 +7,8 @@
 // - A body that many replies share counts once.
 // - Bodies that do not fit wait (HoldWhenRoom). Next is the oldest body of the client that has used the pool least in
 //   the last seconds: bytes times seconds, with a half-life of ten seconds, including what it holds now.
-// - The first reply of a client may have any size. With further ones, a client may hold at most twice what then stays
-//   free, which is two thirds of what others do not use. This leaves memory for the next client.
+// - The first reply of a client may have any size. A client with several replies may hold at most two thirds of the
+//   memory that other clients do not use. This leaves memory for the next client.
 // - A client has kGrace to take a reply that is being sent, and gains one second per kRate bytes that it takes. Its
 //   reply is late once it lags kGrace behind this rate. An upload is late if it has not arrived within kGrace plus one
 //   second per kRate bytes.

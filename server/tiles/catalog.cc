@@ -50,7 +50,7 @@ void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   view.floor_m = extent.floor_m;
   view.min_mercator_depth = extent.min_mercator_depth;
   view.max_mercator_depth = extent.max_mercator_depth;
-  view.height_bounds = extent.height_bounds;
+  view.height_tile_bounds = extent.height_tile_bounds;
 }
 
 DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, const tiler::Dataset& dataset) {
@@ -149,13 +149,15 @@ bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile) {
 }
 
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size) {
-  return key.level <= MaxHeightLevel(dataset, size) && tiler::IsInScheme(key, /*is_mercator=*/true) &&
+  return key.level <= MaxHeightTileLevel(dataset, size) && tiler::IsInScheme(key, /*is_mercator=*/true) &&
          Intersects(dataset.bounds, tiler::TileBounds(key, /*is_mercator=*/true));
 }
 
-int MaxHeightLevel(const DatasetView& dataset, int size) { return dataset.max_mercator_depth - (size == 512 ? 1 : 0); }
+int MaxHeightTileLevel(const DatasetView& dataset, int size) {
+  return dataset.max_mercator_depth - (size == 512 ? 1 : 0);
+}
 
-int MinHeightLevel(const DatasetView& dataset, int size) {
+int MinHeightTileLevel(const DatasetView& dataset, int size) {
   return std::max(dataset.min_mercator_depth - (size == 512 ? 1 : 0), 0);
 }
 

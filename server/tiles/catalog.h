@@ -47,11 +47,11 @@ struct DatasetView {
   std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};
-  std::optional<int> source_max_level;  // DemSource::max_source_level; nothing: the deepest level
-  int metadata_levels = 0;              // tiles at multiples of this level have metadata; 0: none
-  // The geo::MercatorGrids of height tiles, and the bounds of these tiles; nothing: those of the dataset.
-  int min_mercator_depth = 0, max_mercator_depth = 1;
-  std::optional<dem::GeoBounds> height_bounds;
+  std::optional<int> source_max_level;                 // DemSource::max_source_level; nothing: the deepest level
+  int metadata_levels = 0;                             // tiles at multiples of this level have metadata; 0: none
+  int min_mercator_depth = 0, max_mercator_depth = 1;  // of the geo::MercatorGrids of height tiles
+  // Of height tiles; nothing: `bounds`.
+  std::optional<dem::GeoBounds> height_tile_bounds;
   std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
   // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
   std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
@@ -90,11 +90,11 @@ dem::GeoBounds FinestBounds(const DatasetView& dataset);
 // Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.
 bool Intersects(const dem::GeoBounds& box, const dem::GeoBounds& tile);
 
-// Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightLevel, and it intersects the
+// Whether a Web Mercator tile of `size` pixels exists: its level is 0 .. MaxHeightTileLevel, and it intersects the
 // dataset's bounds. Also false for keys outside the scheme.
 bool IsHeightTileAvailable(const DatasetView& dataset, const geo::TileKey& key, int size);
-int MaxHeightLevel(const DatasetView& dataset, int size);
+int MaxHeightTileLevel(const DatasetView& dataset, int size);
 // The first level of height tiles in an archive; 0 if the dataset has sources.
-int MinHeightLevel(const DatasetView& dataset, int size);
+int MinHeightTileLevel(const DatasetView& dataset, int size);
 
 }  // namespace terrace::server

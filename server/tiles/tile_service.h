@@ -68,7 +68,8 @@ class TileService {
     return pool_.Run<T>(std::move(work), OrderOf(length, deadline, client));
   }
 
-  // Removes the tiles of datasets that are not in `catalog` from the cache, and refuses such tiles from now on.
+  // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed.
+  // Refuses such tiles from now on.
   void RetainTilesOf(const Catalog& catalog);
 
   // TileTiers::Erase.

@@ -5,8 +5,8 @@
 
 #include "archive/archive.h"
 #include "archive/pmtiles/pmtiles_file.h"
+#include "archive/pmtiles_mapping.h"
 #include "archive/static_tileset.h"
-#include "archive/tile_scheme.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
 

@@ -30,8 +30,8 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
                                double error_m);
 
-// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its samples is
-// in the hole or is a vertex of the hole's outline.
+// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its nodes is in
+// the hole or forced (MeshDemands), and at least one is in the hole.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
 // The same for a field of `width` nodes a row.

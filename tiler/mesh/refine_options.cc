@@ -82,7 +82,7 @@ double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
 // Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
 // error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
 // second.
-tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
+tin::GreedyOptions BaseRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
   tin::GreedyOptions options;
   options.curvature = MakeCurvature(lattice);
   options.seeds = MakeSeedGrids(lattice);

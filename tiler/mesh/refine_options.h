@@ -11,6 +11,6 @@
 namespace terrace::tiler {
 
 // `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
-tin::GreedyOptions MakeRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
+tin::GreedyOptions BaseRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
 
 }  // namespace terrace::tiler

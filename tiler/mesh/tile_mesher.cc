@@ -120,7 +120,7 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
 tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
                                    tin::Criterion criterion) {
   const proto::EdgeErrors none(proto::kHeightResolution);
-  tin::GreedyOptions plan = MakeRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
+  tin::GreedyOptions plan = BaseRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
   plan.criterion = criterion;
   plan.limits = LimitsOf(source, lattice.key);
   return plan;

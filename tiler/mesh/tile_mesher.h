@@ -58,8 +58,8 @@ Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::Latti
 
 // ReplayMesh, then quantizes, measures, and inserts samples that quantization pushed over the bound. `refinement` was
 // run with RefineOptionsOf to this error or a finer one, or until the format's vertex limit; in that case the inside is
-// coarser than requested and the edges are not. If quantization would flip a triangle, the tile is meshed with the
-// default options. kCancelled: stopped.
+// coarser than requested and the edges are not. If quantization would flip a triangle, the tile is refined
+// anew by the Delaunay criterion, without drop pass and WithInnerVertices. kCancelled: stopped.
 Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
                             const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop);

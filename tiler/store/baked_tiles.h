@@ -26,7 +26,7 @@ struct BakedExtent {
   std::size_t sources = 0;   // number of sources of the baked dataset
   int max_source_level = 0;  // of the baked dataset without edits (dem::DemSource::max_source_level)
   int min_mercator_depth = 0, max_mercator_depth = 0;  // of the height tiles in the archive
-  dem::GeoBounds height_bounds;                        // of these tiles, within `bounds`
+  dem::GeoBounds height_tile_bounds;                   // of these tiles, within `bounds`
   bool normals = false, water_mask = false;            // extensions of quantized-mesh tiles
   int metadata_levels = 0;                             // tiles at multiples of it have metadata; 0: none
   std::vector<int> error_steps;                        // of tiles with a mesh, by level; empty: 0

@@ -49,8 +49,8 @@ class ByteCache {
   // and half of a ghost's nodes.
   static constexpr std::size_t kEntryOverheadBytes = 640;
 
-  // 0 bytes: off; Find never finds anything. A value larger than a shard is not kept. A shard has at least 4 MB,
-  // except in a cache of less than kMinShardedBytes, which is one shard.
+  // 0 bytes: off; Find never finds anything. A value larger than a shard is not kept. A new cache has shards of at
+  // least 4 MB, or one shard if it has less than kMinShardedBytes. SetCapacity keeps the number of shards.
   explicit ByteCache(std::size_t capacity_bytes) {
     const std::size_t count = capacity_bytes >= kMinShardedBytes ? kShards : 1;
     shards_.reserve(count);

@@ -60,7 +60,7 @@ std::string RecordKey(const CacheKey& key) {
   writer.Put(static_cast<std::uint8_t>(metadata));
   writer.Put(static_cast<std::uint8_t>(height_encoding));
   writer.Put(static_cast<std::int32_t>(side_px));
-  if (IsForMaps(format)) {
+  if (IsMapLayer(format)) {
     const auto& [picture, azimuth_deg, altitude_deg, z_factor_hundredths, slope_style, interval_cm] = map;
     writer.Put(static_cast<std::uint8_t>(picture));
     writer.Put(azimuth_deg);

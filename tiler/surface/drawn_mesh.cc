@@ -8,8 +8,6 @@
 namespace terrace::tiler {
 namespace {
 
-// Barycentric coordinates: a point this far outside counts as inside, so that no point falls between two triangles.
-constexpr double kSlack = 1e-9;
 // Tiles of at most 11 degrees: the plumb lines of a tile are nearly parallel.
 constexpr int kBoundedLevel = 4;
 
@@ -39,7 +37,7 @@ struct DrawnMesh::Meeting {
   double height_m = 0;
   std::uint32_t triangle = 0;
 
-  bool is_met() const { return inside >= -kSlack; }
+  bool is_met() const { return inside >= -DrawnMesh::kSlack; }
   void MeetOrPass(const DrawnMesh& mesh, const PlumbLine& line, std::uint32_t other);
   // The same of all triangles, or of the buckets around a position until no other can be as near. Of triangles that are
   // not met, those farther than `reach_m` do not matter.

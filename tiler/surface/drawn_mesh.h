@@ -51,7 +51,11 @@ class DrawnMesh {
   };
   Bucket BucketAt(const dem::GeoPosition& point) const;
 
-  // Where a plumb line meets the plane of a triangle; nothing if the triangle is seen on edge.
+  // Barycentric coordinates: a point this far outside counts as inside, so that no point falls between two triangles.
+  static constexpr double kSlack = 1e-8;
+
+  // Where a plumb line meets the plane of a triangle; nothing if the triangle is seen on edge, or narrower than a tenth
+  // of a micrometre.
   struct Crossing {
     std::array<double, 3> inside;  // barycentric coordinates
     double height_m;               // above the ellipsoid

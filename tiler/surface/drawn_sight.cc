@@ -73,7 +73,7 @@ struct Region {
   double west, south, east, north;
 
   bool Contains(const dem::GeoPosition& point) const {
-    constexpr double kSlack = 1e-9;  // 0.1 mm: a ray along an edge is on both sides of it, by rounding
+    constexpr double kSlack = 1e-11;  // a micrometre: a ray along an edge is on both sides of it, by rounding
     return std::abs(std::remainder(point.longitude - (west + east) / 2, 360)) <= (east - west) / 2 + kSlack &&
            std::abs(point.latitude - (south + north) / 2) <= (north - south) / 2 + kSlack;
   }
@@ -89,16 +89,17 @@ Region RegionAt(const DrawnMesh& mesh, const DrawnMesh::Bucket& bucket, const de
           std::min(bucket.north, south + side)};
 }
 
-// Where a straight line in space passes meridians and parallels. Also at poles, where degrees along the line are not
-// smooth.
-class Passes {
+// Where a ray crosses the borders of regions. The ray is a straight line in space, because its degrees are not smooth
+// at poles.
+class BorderCrossings {
  public:
-  explicit Passes(const dem::SightRay& ray)
+  explicit BorderCrossings(const dem::SightRay& ray)
       : start_(geo::ToEcef(ray.from.longitude, ray.from.latitude, ray.from.height_m)),
         way_(geo::ToEcef(ray.to.longitude, ray.to.latitude, ray.to.height_m) - start_) {}
 
-  // The first place after `share` where the line may leave a region, as a share of its length; infinity if there is
-  // none. Also a place on the opposite meridian, or on the parallel's mirror image.
+  // The first place after `share` where the ray may leave a region, as a share of its length; infinity if there is
+  // none. The ray may also stay in the region there: the opposite meridian and the mirror image of a parallel count
+  // too.
   double Next(const Region& region, double share) const {
     double next = std::numeric_limits<double>::infinity();
     const auto add = [&](double place) {
@@ -115,7 +116,8 @@ class Passes {
     const double sine = std::sin(geo::ToRadians(longitude)), cosine = std::cos(geo::ToRadians(longitude));
     add((start_.y * cosine - start_.x * sine) / (way_.x * sine - way_.y * cosine));
   }
-  // The places of a geodetic latitude, at all heights, are a cone around the axis: its normals meet there.
+  // The places of one geodetic latitude, at all heights, are a cone: the normals of the ellipsoid meet in one point of
+  // the axis.
   void AddParallel(double latitude, const auto& add) const {
     const double sine = std::sin(geo::ToRadians(latitude)), cosine = std::cos(geo::ToRadians(latitude));
     const double z = start_.z + geo::kEccentricitySquared * geo::PrimeVerticalRadius(latitude) * sine;
@@ -123,7 +125,7 @@ class Passes {
     const double a = (way_.x * way_.x + way_.y * way_.y) * s2 - way_.z * way_.z * c2;
     const double b = 2 * ((start_.x * way_.x + start_.y * way_.y) * s2 - z * way_.z * c2);
     const double c = (start_.x * start_.x + start_.y * start_.y) * s2 - z * z * c2;
-    // A root of a line that touches the cone, or by rounding does not quite, divides the line at its nearest place.
+    // If the line misses the cone, by rounding or by far, the places found divide the ray where it need not be divided.
     const double q = -(b + std::copysign(std::sqrt(std::max(0.0, b * b - 4 * a * c)), b)) / 2;
     add(q / a);
     add(c / q);
@@ -142,21 +144,21 @@ class MeshWalk {
   // Divides a ray where it leaves a region.
   Result<dem::SightAnswer> Look(const dem::SightRay& ray) {
     Clearances clearances;
-    const Passes passes(ray);
+    const BorderCrossings borders(ray);
     const double length_m = dem::LengthOf(ray);
     const double min_step = length_m > 0 ? std::min(1.0, kMinStep / length_m) : 1;
     for (double share = 0; share < 1;) {
       // Near a pole a ray crosses many regions.
       if (stop_.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
-      const double inside = std::min(1.0, share + min_step / 2);
-      const dem::GeoPosition here = PlaceAt(ray, inside);
+      const double just_after = std::min(1.0, share + min_step / 2);  // not on the border where the part begins
+      const dem::GeoPosition here = PlaceAt(ray, just_after);
       const Result<std::uint32_t> tile = tiles_.numbers().NumberAt(here);
       if (!tile) return tl::unexpected(tile.error());
       const Result<const DrawnMesh*> mesh = tiles_.MeshOf(*tile);
       if (!mesh) return tl::unexpected(mesh.error());
       const DrawnMesh::Bucket bucket = (*mesh)->BucketAt(here);
       const Region region = RegionAt(**mesh, bucket, here, tiles_.numbers().level());
-      double next = std::min({1.0, share + kPartLength / length_m, passes.Next(region, inside)});
+      double next = std::min({1.0, share + kPartLength / length_m, borders.Next(region, just_after)});
       while (next - share > min_step && !region.Contains(PlaceAt(ray, (share + next) / 2))) next = (share + next) / 2;
       next = std::min(1.0, std::max(next, share + min_step));
       const Result<void> added = AddPart(ray, {share, next}, *tile, **mesh, bucket.triangles, clearances);
@@ -187,13 +189,14 @@ class MeshWalk {
     for (std::size_t i = 0; i < 3; ++i) points[i] = dem::PointAt(ray, part.At(static_cast<double>(i) / 2), options_);
     const auto place = [&](std::size_t i) { return dem::GeoPosition{points[i].longitude, points[i].latitude}; };
     covered_.clear();
+    constexpr double kSlack = DrawnMesh::kSlack;
     for (const std::uint32_t triangle : triangles) {
       const auto first = mesh.CrossingOf(triangle, place(0)), middle = mesh.CrossingOf(triangle, place(1)),
                  last = mesh.CrossingOf(triangle, place(2));
       if (!first || !middle || !last) continue;
       Interval over{0, 1};
       for (std::size_t k = 0; k < 3 && over.from <= over.to; ++k) {
-        const Along inside{first->inside[k], middle->inside[k], last->inside[k]};
+        const Along inside{first->inside[k] + kSlack, middle->inside[k] + kSlack, last->inside[k] + kSlack};
         if (inside.At(over.from) < 0 && inside.At(over.to) < 0) over.from = 2;
         if (over.from > over.to) break;
         if (inside.At(over.from) < 0) {
@@ -225,8 +228,8 @@ class MeshWalk {
     return {};
   }
 
-  // A part with no triangle of its tile: beside the tile's edge, within the distance of a chord from its parallel, or
-  // in a hole.
+  // A part above none of the triangles: beside the tile's edge, within the distance of a chord from its parallel, in a
+  // hole, or where the list lacks a triangle.
   Result<void> AddBare(const dem::SightRay& ray, const Interval& part, std::uint32_t tile, Clearances& clearances) {
     std::array<double, 3> over{};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -242,7 +245,7 @@ class MeshWalk {
     return {};
   }
 
-  static constexpr double kMinStep = 5e-4;  // metres
+  static constexpr double kMinStep = 5e-4;  // metres: far above rounding; next to a pole, regions are narrower
   static constexpr double kMinBare = 1e-4;  // of a part: rounding makes shorter ones
 
   DrawnTiles tiles_;

@@ -23,9 +23,12 @@ geo::TileKey TileAt(const dem::GeoPosition& point, int level) {
   return {level, number(longitude + 180, geo::TileColumns(level)), number(point.latitude + 90, geo::TileRows(level))};
 }
 
-std::optional<std::uint32_t> TileNumbers::Add(const geo::TileKey& key) {
-  if (const auto found = numbers_.find(key); found != numbers_.end()) return found->second;
-  if (keys_.size() == kMaxTilesRead) return std::nullopt;
+std::optional<std::uint32_t> TileNumbers::Find(const geo::TileKey& key) const {
+  const auto found = numbers_.find(key);
+  return found == numbers_.end() ? std::nullopt : std::optional(found->second);
+}
+
+std::uint32_t TileNumbers::Add(const geo::TileKey& key) {
   keys_.push_back(key);
   return numbers_[key] = static_cast<std::uint32_t>(keys_.size() - 1);
 }
@@ -34,7 +37,8 @@ Result<std::uint32_t> TileNumbers::NumberAt(const dem::GeoPosition& point) {
   int level = level_;
   geo::TileKey key = TileAt(point, level);
   while (level > 0 && !has_tile_(key)) key = TileAt(point, --level);
-  if (const std::optional<std::uint32_t> number = Add(key)) return *number;
+  if (const std::optional<std::uint32_t> known = Find(key)) return *known;
+  if (keys_.size() - beside_ < kMaxTilesRead) return Add(key);
   return MakeError(
       ErrorCode::kInvalidArgument,
       "{} lie in more than {} tiles of level {}, which is the most for one request; ask for fewer, or for a "
@@ -42,8 +46,12 @@ Result<std::uint32_t> TileNumbers::NumberAt(const dem::GeoPosition& point) {
       subject_, kMaxTilesRead, level_);
 }
 
-std::optional<std::uint32_t> TileNumbers::NumberOf(const geo::TileKey& key) {
-  return geo::IsValid(key) && has_tile_(key) ? Add(key) : std::nullopt;
+std::optional<std::uint32_t> TileNumbers::NumberBeside(const geo::TileKey& key) {
+  if (!geo::IsValid(key) || !has_tile_(key)) return std::nullopt;
+  if (const std::optional<std::uint32_t> known = Find(key)) return known;
+  if (beside_ == kMaxTilesRead) return std::nullopt;
+  ++beside_;
+  return Add(key);
 }
 
 Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
@@ -68,7 +76,7 @@ Result<DrawnTiles::Reading> DrawnTiles::ReadAt(const dem::GeoPosition& point, st
   };
   const Result<Reading> inside = read(own);
   if (!inside || !inside->point.is_beside) return inside;
-  const std::optional<std::uint32_t> neighbour = numbers_.NumberOf(NeighbourAt(numbers_.keys()[own], point));
+  const std::optional<std::uint32_t> neighbour = numbers_.NumberBeside(NeighbourAt(numbers_.keys()[own], point));
   if (!neighbour) return inside;
   const Result<Reading> beyond = read(*neighbour);
   return !beyond || !beyond->point.is_beside ? beyond : inside;

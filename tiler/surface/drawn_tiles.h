@@ -10,6 +10,7 @@
 #include <stop_token>
 #include <string_view>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "engine/core/result.h"
@@ -19,7 +20,7 @@
 
 namespace terrace::tiler {
 
-// Limit of the tiles that one request reads: each of them may have to be made.
+// Limit of the tiles that the points or rays of one request lie in: each of them may have to be made.
 inline constexpr std::size_t kMaxTilesRead = 64;
 
 // Whether a tile exists.
@@ -41,24 +42,27 @@ struct IsTileBefore {
 class TileNumbers {
  public:
   // Reads tiles of `level`, and ancestors where these do not exist. `subject`: what the client asked for, for messages,
-  // as "surface: the points".
+  // as "surface: the points"; must outlive this object.
   TileNumbers(HasTile has_tile, int level, std::string_view subject)
       : has_tile_(std::move(has_tile)), level_(level), subject_(subject) {}
 
   // Number of the deepest tile that contains a point. kInvalidArgument, with a message for the client: the tile would
   // be one more than kMaxTilesRead.
   Result<std::uint32_t> NumberAt(const dem::GeoPosition& point);
-  // Number of a tile; nothing if the tile does not exist or would be one more than kMaxTilesRead.
-  std::optional<std::uint32_t> NumberOf(const geo::TileKey& key);
+  // Number of a tile beside one of these; nothing if it does not exist, or if kMaxTilesRead were added already. Tiles
+  // that are added here do not count for NumberAt.
+  std::optional<std::uint32_t> NumberBeside(const geo::TileKey& key);
 
   const std::vector<geo::TileKey>& keys() const { return keys_; }  // by number
   int level() const { return level_; }
 
  private:
-  std::optional<std::uint32_t> Add(const geo::TileKey& key);
+  std::optional<std::uint32_t> Find(const geo::TileKey& key) const;
+  std::uint32_t Add(const geo::TileKey& key);
 
   HasTile has_tile_;
   int level_;
+  std::size_t beside_ = 0;  // tiles that NumberBeside added
   std::string_view subject_;
   std::map<geo::TileKey, std::uint32_t, IsTileBefore> numbers_;
   std::vector<geo::TileKey> keys_;

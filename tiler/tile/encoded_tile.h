@@ -27,9 +27,11 @@ struct HeaderLines {
 };
 
 struct EncodedTile {
-  std::string bytes;       // the body in its content coding
-  std::string etag;        // strong, with the quotes
-  double max_error_m = 0;  // measured on the encoded integers: the Terrain-Max-Error header
+  std::string bytes;  // the body in its content coding
+  std::string etag;   // strong, with the quotes
+  // The Terrain-Max-Error header: of tiles with a mesh, measured on the encoded integers; of height PNGs, the rounding
+  // of heights to colours; of area meshes, measured before encoding.
+  double max_error_m = 0;
   // Metres, an upper bound of the distance to every sample of the sources: the Terrain-Certified-Error header. Empty
   // for formats without a surface.
   std::optional<double> certified_error_m = {};

@@ -13,8 +13,9 @@ struct RequestedError {
   bool at_least = false;           // the larger of error_m and the level's default error is used
 };
 
-// The step on the level's ladder for a requested error. `is_deepest`: the level is the deepest of the dataset. No finer
-// level follows it, so `atleast` does not limit its tiles to their default error. `default_steps`: by level, the steps
+// The step on the level's ladder for a requested error. `is_deepest`: the level is the deepest of the
+// sources, or one that edits added below it. Finer levels add no detail of the sources, so `atleast` does not limit its
+// tiles to their default error. `default_steps`: by level, the steps
 // if no error is requested; 0 beyond (BakedExtent::error_steps).
 int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction,
               std::span<const int> default_steps = {});

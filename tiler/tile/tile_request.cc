@@ -25,7 +25,7 @@ std::size_t TileRequestHash::operator()(const TileRequest& request) const noexce
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.x));
   hash = Mix(hash ^ static_cast<std::uint64_t>(request.key.y));
   hash = Mix(hash ^ static_cast<std::uint64_t>(static_cast<std::int64_t>(request.error_step)));
-  if (IsForMaps(request.format)) {
+  if (IsMapLayer(request.format)) {
     const MapParameters& map = request.map;
     hash = Mix(hash ^ (static_cast<std::uint64_t>(map.interval_cm) << 32 |
                        static_cast<std::uint64_t>(map.z_factor_hundredths) << 16 | map.azimuth_deg));

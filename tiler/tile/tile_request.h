@@ -32,7 +32,7 @@ constexpr bool IsMercator(TileFormat format) {
   return format == TileFormat::kHeightPng || format == TileFormat::kHillshade || format == TileFormat::kSlope ||
          format == TileFormat::kContours || format == TileFormat::kImagery;
 }
-constexpr bool IsForMaps(TileFormat format) { return format > TileFormat::kHeightPng; }
+constexpr bool IsMapLayer(TileFormat format) { return format > TileFormat::kHeightPng; }
 
 // Pixels along an edge of a height tile or of a picture for maps; the first is the default.
 inline constexpr std::array<int, 2> kSidesPx = {256, 512};
@@ -46,10 +46,9 @@ struct TileRequest {
   proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
-  // Tiles of IsMercator(format), and kGeodeticImagery: side_px * side_px pixels.
-  proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;
-  int side_px = kSidesPx[0];
-  MapParameters map;  // IsForMaps(format)
+  proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
+  int side_px = kSidesPx[0];  // pixels along an edge: IsMercator(format), and kGeodeticImagery
+  MapParameters map;          // IsMapLayer(format)
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };

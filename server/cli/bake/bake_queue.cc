@@ -104,7 +104,7 @@ std::optional<int> FinishJob(const QueuedBake& bake, bake::RedisQueue& queue) {
     return std::nullopt;
   }
   if (const auto finished = bake.finish(all); !finished) return Fail(finished.error());
-  queue.Finished();
+  queue.ReportFinished();
   return kExitOk;
 }
 
@@ -181,10 +181,10 @@ int BakeFromQueue(const QueuedBake& bake, bake::Counters& counters, std::vector<
       return kExitFailure;
     }
     switch ((*queue)->end()) {
-      case bake::RedisQueue::End::kFinish:
+      case bake::RedisQueue::End::kCheckNeeded:
         if (const auto code = FinishJob(bake, **queue)) return *code;
         break;
-      case bake::RedisQueue::End::kFinished:
+      case bake::RedisQueue::End::kFinishedByOther:
         return kExitOk;
       case bake::RedisQueue::End::kIncomplete:
         return ListDead(bake, **queue);

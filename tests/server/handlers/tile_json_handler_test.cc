@@ -51,7 +51,7 @@ TEST_F(TileJsonHandlerTest, NamesTilesAsTheClientCanAskForThem) {
 TEST_F(TileJsonHandlerTest, PromisesTheTilesOfAnArchiveAlone) {
   EXPECT_EQ(Parse(Get("/a%20b/tiles.json"))["minzoom"], 0);
   datasets_[0].min_mercator_depth = 4;
-  datasets_[0].height_bounds = {1, 2, 3, 4};
+  datasets_[0].height_tile_bounds = {1, 2, 3, 4};
   const auto json = Parse(Get("/a%20b/tiles.json"));
   EXPECT_EQ(json["minzoom"], 4);
   EXPECT_EQ(json["bounds"], nlohmann::json({1.0, 2.0, 3.0, 4.0}));

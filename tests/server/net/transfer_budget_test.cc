@@ -19,7 +19,7 @@ struct FakeTransfer : Connection {
   void Evict() override {}
   void Drain() override {}
   void Abort() override { ++aborts; }
-  void Preempt() override { ++displaced; }
+  void Displace() override { ++displaced; }
   int aborts = 0, displaced = 0;
 };
 

@@ -100,5 +100,45 @@ TEST(DrawnSight, AgreesWithHeightsAcrossLevels) {
   }
 }
 
+// Along a meridian between two tiles every place is on the edges of triangles.
+TEST(DrawnSight, AgreesWithHeightsAlongTheEdgesOfTiles) {
+  const dem::TempDir dir;
+  dem::RasterSpec spec{.width = 200, .height = 200, .geo_transform = {11.15, .001, 0, 46, 0, -.001}};
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> height(0, 300), latitude(45.82, 45.98), along(0.002, 0.02);
+  spec.value = [&](int, int) { return height(random); };
+  const TilePipeline pipeline = OpenOne(dir, spec);
+  for (const int level : {9, 12, 13}) {
+    for (int i = 0; i < 10; ++i) {
+      const double south = latitude(random);
+      const dem::SightRay ray{{11.25, south, 320}, {11.25, south + along(random), 320}};
+      SCOPED_TRACE(testing::Message() << level << ": " << south << " to " << ray.to.latitude);
+      ExpectAgreesWithHeights(pipeline, {level, {}, TileFormat::kQuantizedMesh, proto::GlbCompression::kDraco}, ray,
+                              0.5);
+    }
+  }
+}
+
+// The rays lie in the strips that flat triangles leave out north of an edge. There the southern tiles are read, too,
+// but do not count.
+TEST(DrawnSight, CountsTheTilesThatRaysLieIn) {
+  const dem::TempDir dir;
+  const dem::RasterSpec flat{
+      .width = 4600, .height = 200, .geo_transform = {0, .005, 0, 45.5, 0, -.005}, .value = [](int, int) {
+        return 5.0;
+      }};
+  const TilePipeline pipeline = OpenOne(dir, flat);
+  std::vector<dem::SightRay> rays;
+  for (std::size_t i = 0; i < kMaxTilesRead; ++i) {
+    const double longitude = 0.06 + static_cast<double>(i) * 180 / 512;
+    rays.push_back({{longitude, 45.000005, 10}, {longitude + 0.0001, 45.000005, 10}});
+  }
+  const DrawnSurface surface{9, {}, TileFormat::kQuantizedMesh, proto::GlbCompression::kDraco};
+  const auto answers = pipeline.LookAlong(0, surface, rays, {}, {});
+  EXPECT_TRUE(answers) << (answers ? "" : answers.error().message);
+  rays.push_back({{22.7, 45.1, 10}, {22.7001, 45.1, 10}});
+  EXPECT_FALSE(pipeline.LookAlong(0, surface, rays, {}, {}));
+}
+
 }  // namespace
 }  // namespace terrace::tiler

@@ -1,4 +1,4 @@
-#include "archive/tile_scheme.h"
+#include "archive/pmtiles_mapping.h"
 
 #include <fmt/format.h>
 
