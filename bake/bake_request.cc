@@ -199,8 +199,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.available = request.bbox ? TilesWithin(source.Availability(), *request.bbox) : source.Availability();
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
-      manifest.error_steps.push_back(
-          tiler::ErrorStep(request.requested, level, level >= source.max_source_level(), dataset.error_fraction));
+      manifest.error_steps.push_back(tiler::ErrorStep(request.requested, level, dataset.error_scale()));
     }
   }
   return manifests;

@@ -27,10 +27,10 @@ asio::awaitable<void> Pause() {
 }
 
 // Unknown names must not become labels of metrics.
-void SetLabels(const RequestContext& context, const Handlers& handlers, Response& response) {
+void SetLabels(const RequestContext& context, const HandlerState& state, Response& response) {
   response.labels.route = context.route.row->label;
   const std::string& dataset = context.route.dataset;
-  if (!dataset.empty() && FindDataset(dataset, handlers.catalog->datasets)) response.labels.subject = dataset;
+  if (!dataset.empty() && FindDataset(dataset, state.catalog->datasets)) response.labels.subject = dataset;
 }
 
 }  // namespace
@@ -69,12 +69,12 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   Answer Handle(const Request&) override {
     const RouteRow& row = *context_.route.row;
     if (application_.opening() && !row.needs_no_catalog) return AfterOpening();
-    HandlersPtr handlers = application_.Current();
-    if (std::optional<Response> pending = RefusePending(*handlers)) return *std::move(pending);
-    Answer answer = row.handle(*handlers, context_);
+    HandlerStatePtr state = application_.Current();
+    if (std::optional<Response> pending = RefusePending(*state)) return *std::move(pending);
+    Answer answer = row.handle(*state, context_);
     auto* response = std::get_if<Response>(&answer);
-    if (response == nullptr) return Finish(std::move(handlers), std::get<asio::awaitable<Response>>(std::move(answer)));
-    SetLabels(context_, *handlers, *response);
+    if (response == nullptr) return Finish(std::move(state), std::get<asio::awaitable<Response>>(std::move(answer)));
+    SetLabels(context_, *state, *response);
     return answer;
   }
 
@@ -103,10 +103,10 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   }
 
   // A dataset that is not open yet.
-  std::optional<Response> RefusePending(const Handlers& handlers) const {
-    const std::vector<std::string>& names = handlers.catalog->pending;
+  std::optional<Response> RefusePending(const HandlerState& state) const {
+    const std::vector<std::string>& names = state.catalog->pending;
     if (std::ranges::find(names, context_.route.dataset) == names.end()) return std::nullopt;
-    for (const PendingDataset& pending : application_.PendingOf(*handlers.catalog)) {
+    for (const PendingDataset& pending : application_.PendingOf(*state.catalog)) {
       if (pending.name != context_.route.dataset) continue;
       Response response = PendingResponse(pending, context_.request->id);
       response.labels.route = context_.route.row->label;
@@ -116,7 +116,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   }
 
   asio::awaitable<Response> AfterOpening();
-  asio::awaitable<Response> Finish(HandlersPtr handlers, asio::awaitable<Response> answer);
+  asio::awaitable<Response> Finish(HandlerStatePtr state, asio::awaitable<Response> answer);
 
   TerrainApplication& application_;
   const ClientIdentity peer_;
@@ -136,8 +136,8 @@ asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
   co_return co_await std::get<asio::awaitable<Response>>(std::move(answer));
 }
 
-// Keeps the handlers alive until the answer is ready. If a source turns out to be replaced, the next catalog answers.
-asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handlers, asio::awaitable<Response> answer) {
+// Keeps the state alive until the answer is ready. If a source turns out to be replaced, the next catalog answers.
+asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlerStatePtr state, asio::awaitable<Response> answer) {
   const auto give_up = Clock::now() + kReplaceTime;
   for (Answer next = std::move(answer);;) {
     if (auto* later = std::get_if<asio::awaitable<Response>>(&next)) {
@@ -145,14 +145,14 @@ asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlersPtr handle
       next = std::move(response);
     }
     Response& response = std::get<Response>(next);
-    SetLabels(context_, *handlers, response);
+    SetLabels(context_, *state, response);
     if (!response.try_again || !application_.parts_.on_source_changed) co_return std::move(response);
     application_.parts_.on_source_changed();
     std::string dataset = response.labels.subject;
-    const bool is_replaced = co_await application_.NextCatalog(handlers, std::move(dataset), give_up);
+    const bool is_replaced = co_await application_.NextCatalog(state, std::move(dataset), give_up);
     if (!is_replaced) co_return std::move(response);
-    handlers = application_.Current();
-    next = context_.route.row->handle(*handlers, context_);
+    state = application_.Current();
+    next = context_.route.row->handle(*state, context_);
   }
 }
 
@@ -166,15 +166,15 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
 
 TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
     : parts_(std::move(parts)), started_(config), deadline_(config.request_deadline), opening_(catalog == nullptr) {
-  handlers_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
+  state_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
 
 // Admission uses the limit of locations and the proxies of the start. Replies must agree with it.
-TerrainApplication::HandlersPtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
+TerrainApplication::HandlerStatePtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
   config.max_locations = started_.max_locations;
   config.trusted_proxies = started_.trusted_proxies;
   config.forwarded_header = started_.forwarded_header;
-  return std::make_shared<const Handlers>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
+  return std::make_shared<const HandlerState>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
 }
 
 std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::address& peer) {
@@ -187,10 +187,10 @@ std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
 }
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {
-  HandlersPtr handlers = Make(std::move(catalog), config);  // the old ones are destroyed after the lock is released
+  HandlerStatePtr state = Make(std::move(catalog), config);  // the old one is destroyed after the lock is released
   deadline_.store(config.request_deadline, std::memory_order_relaxed);
   const std::lock_guard lock(mutex_);
-  handlers_.swap(handlers);
+  state_.swap(state);
   const bool is_first = opening_.exchange(false);
   if (!is_first) ++replaced_;
   return is_first;
@@ -230,9 +230,9 @@ std::uint64_t TerrainApplication::replaced() const {
   return replaced_;
 }
 
-TerrainApplication::HandlersPtr TerrainApplication::Current() const {
+TerrainApplication::HandlerStatePtr TerrainApplication::Current() const {
   const std::lock_guard lock(mutex_);
-  return handlers_;
+  return state_;
 }
 
 bool TerrainApplication::HasLastingProblem(const std::string& dataset) const {
@@ -252,7 +252,7 @@ asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
 }
 
 // Returns false if none comes in time.
-asio::awaitable<bool> TerrainApplication::NextCatalog(HandlersPtr now, std::string dataset,
+asio::awaitable<bool> TerrainApplication::NextCatalog(HandlerStatePtr now, std::string dataset,
                                                       Clock::time_point give_up) const {
   while (Current() == now) {
     if (draining() || HasLastingProblem(dataset) || Clock::now() >= give_up) co_return false;

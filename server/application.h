@@ -64,21 +64,22 @@ class TerrainApplication final : public Application, public ProcessState {
 
  private:
   class Handler;
-  using HandlersPtr = std::shared_ptr<const Handlers>;
+  using HandlerStatePtr = std::shared_ptr<const HandlerState>;
 
   bool draining() const override { return parts_.access.connections.draining(); }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { return parts_.metrics_page.Get(); }
 
-  HandlersPtr Make(CatalogPtr catalog, config::Config config) const;
-  HandlersPtr Current() const;
+  HandlerStatePtr Make(CatalogPtr catalog, config::Config config) const;
+  HandlerStatePtr Current() const;
   bool HasLastingProblem(const std::string& dataset) const;
 
   asio::awaitable<bool> FirstCatalog() const;
-  asio::awaitable<bool> NextCatalog(HandlersPtr now, std::string dataset, TileService::Clock::time_point give_up) const;
+  asio::awaitable<bool> NextCatalog(HandlerStatePtr now, std::string dataset,
+                                    TileService::Clock::time_point give_up) const;
 
   const ApplicationParts parts_;
   mutable std::mutex mutex_;
-  HandlersPtr handlers_;  // never null; guarded by mutex_, as the next three are
+  HandlerStatePtr state_;  // never null; guarded by mutex_, as the next three are
   std::uint64_t replaced_ = 0;
   std::map<std::string, std::string> problems_;
   std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets

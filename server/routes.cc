@@ -150,12 +150,12 @@ std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * ma
 std::size_t MaxRaysBytes(std::size_t max_rays) { return 4096 + 192 * max_rays; }
 
 // RouteRow::handle of documents.
-template <DocumentAnswer (*describe)(const Handlers&, const RequestContext&)>
-Answer Write(const Handlers& from, const RequestContext& context) {
+template <DocumentAnswer (*describe)(const HandlerState&, const RequestContext&)>
+Answer Write(const HandlerState& from, const RequestContext& context) {
   return from.documents.Make(describe(from, context), context);
 }
 
-DocumentAnswer DescribeUrls(const Handlers& from, const RequestContext& context);
+DocumentAnswer DescribeUrls(const HandlerState& from, const RequestContext& context);
 
 // Most frequent routes first.
 constexpr RouteRow kRows[] = {
@@ -298,7 +298,7 @@ constexpr RouteRow kRows[] = {
      .needs_no_catalog = true},
 };
 
-DocumentAnswer DescribeUrls(const Handlers&, const RequestContext& context) {
+DocumentAnswer DescribeUrls(const HandlerState&, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }

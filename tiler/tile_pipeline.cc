@@ -15,8 +15,9 @@
 #include "tiler/map/map_heights.h"
 #include "tiler/map/relief.h"
 #include "tiler/mesh/mesh_limits.h"
+#include "tiler/surface/drawn_points.h"
 #include "tiler/surface/drawn_sight.h"
-#include "tiler/surface/drawn_triangles.h"
+#include "tiler/surface/quantized_mesh_triangles.h"
 #include "tiler/surface/source_normals.h"
 #include "tiler/tile/strong_etag.h"
 
@@ -71,6 +72,11 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 }
 
 }  // namespace
+
+ErrorScale Dataset::error_scale() const {
+  if (source) return {error_fraction, source->max_source_level()};
+  return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
+}
 
 std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request) {
   int size = request.side_px, margin = 0;
@@ -230,10 +236,7 @@ MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& sur
     TileRequest request;
     request.dataset = dataset;
     request.key = key;
-    const int finest = of.source ? of.source->max_source_level() : of.baked->extent().max_source_level;
-    std::span<const int> default_steps;
-    if (!of.source) default_steps = of.baked->extent().error_steps;
-    request.error_step = ErrorStep(surface.requested, key.level, key.level >= finest, of.error_fraction, default_steps);
+    request.error_step = ErrorStep(surface.requested, key.level, of.error_scale());
     request.format = surface.format;
     request.compression = surface.compression;
     return MeshOf(of, request, stop);

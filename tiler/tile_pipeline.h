@@ -23,8 +23,11 @@
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/surface/drawn_mesh_cache.h"
-#include "tiler/surface/drawn_points.h"
+#include "tiler/surface/drawn_surface.h"
+#include "tiler/surface/drawn_tiles.h"
+#include "tiler/surface/point_heights.h"
 #include "tiler/tile/encoded_tile.h"
+#include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
@@ -71,6 +74,7 @@ struct Dataset {
   // stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
+  ErrorScale error_scale() const;
   std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
 };
 

@@ -20,7 +20,7 @@ int NumberOf(std::string_view text) {
 }
 
 // XAUTOCLAIM came with 6.2.
-Result<void> CheckVersion(redis::Connection& connection, const JobConnection& place) {
+Result<void> CheckVersion(redis::Connection& connection, const JobAddress& job) {
   const auto info = connection.Call({"INFO", "server"});
   if (!info) return tl::unexpected(info.error());
   constexpr std::string_view kField = "redis_version:";
@@ -36,12 +36,12 @@ Result<void> CheckVersion(redis::Connection& connection, const JobConnection& pl
   return MakeError(ErrorCode::kInvalidArgument,
                    "Redis at {}: has version {}, and the queue needs 6.2 or later (XAUTOCLAIM); take a newer Redis, or "
                    "bake with --shard",
-                   place.address.Text(), version);
+                   job.address.Text(), version);
 }
 
 }  // namespace
 
-std::string JobConnection::Key(const std::string& what) const { return fmt::format("terrace:{{{}}}:{}", name, what); }
+std::string JobAddress::Key(const std::string& what) const { return fmt::format("terrace:{{{}}}:{}", name, what); }
 
 Result<void> CheckJobName(const std::string& name) {
   constexpr std::size_t kMaxSize = 64;
@@ -55,26 +55,26 @@ Result<void> CheckJobName(const std::string& name) {
                    kMaxSize);
 }
 
-Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobConnection& place) {
+Result<std::unique_ptr<redis::Connection>> ConnectToJob(const JobAddress& job) {
   redis::ConnectionOptions options;
-  options.connect_timeout = options.command_timeout = place.timeout;
-  options.ca_file = place.ca_file;
-  options.stop = place.stop;
-  auto connection = redis::Connection::Open(place.address, options);
+  options.connect_timeout = options.command_timeout = job.timeout;
+  options.ca_file = job.ca_file;
+  options.stop = job.stop;
+  auto connection = redis::Connection::Open(job.address, options);
   if (!connection) return connection;
-  if (auto checked = CheckVersion(**connection, place); !checked) return tl::unexpected(checked.error());
+  if (auto checked = CheckVersion(**connection, job); !checked) return tl::unexpected(checked.error());
   return connection;
 }
 
-redis::Command ScriptCommand(const JobConnection& place, const char* script, std::vector<std::string> arguments) {
+redis::Command ScriptCommand(const JobAddress& job, const char* script, std::vector<std::string> arguments) {
   redis::Command command = {"EVAL", std::string(scripts::kPrelude) + script, std::to_string(kKeys.size())};
-  for (const char* const key : kKeys) command.push_back(place.Key(key));
+  for (const char* const key : kKeys) command.push_back(job.Key(key));
   std::ranges::move(arguments, std::back_inserter(command));
   return command;
 }
 
-Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobConnection& place) {
-  const auto reply = connection.Call({"XRANGE", place.Key("dead"), "-", "+"});
+Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobAddress& job) {
+  const auto reply = connection.Call({"XRANGE", job.Key("dead"), "-", "+"});
   if (!reply) return tl::unexpected(reply.error());
   std::vector<DeadUnit> dead;
   for (std::size_t i = 0; i < reply->size(); ++i) {
@@ -85,9 +85,8 @@ Result<std::vector<DeadUnit>> ReadDead(redis::Connection& connection, const JobC
   return dead;
 }
 
-Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection,
-                                                                 const JobConnection& place) {
-  const auto reply = connection.Call({"HGETALL", place.Key("job")});
+Result<std::vector<std::pair<std::string, std::string>>> ReadJob(redis::Connection& connection, const JobAddress& job) {
+  const auto reply = connection.Call({"HGETALL", job.Key("job")});
   if (!reply) return tl::unexpected(reply.error());
   std::vector<std::pair<std::string, std::string>> fields;
   for (std::size_t i = 0; i + 1 < reply->size(); i += 2) {
@@ -101,13 +100,13 @@ std::string FieldOf(const std::vector<std::pair<std::string, std::string>>& fiel
   return found == fields.end() ? std::string() : found->second;
 }
 
-Result<void> RemoveJob(redis::Connection& connection, const JobConnection& place) {
+Result<void> RemoveJob(redis::Connection& connection, const JobAddress& job) {
   redis::Command command = {"DEL"};
-  for (const char* const key : kKeys) command.push_back(place.Key(key));
+  for (const char* const key : kKeys) command.push_back(job.Key(key));
   const auto reply = connection.Call(command);
   if (!reply) return tl::unexpected(reply.error());
   if (reply->integer() > 0) return {};
-  return MakeError(ErrorCode::kNotFound, "Redis at {}: has no job {}", place.address.Text(), place.name);
+  return MakeError(ErrorCode::kNotFound, "Redis at {}: has no job {}", job.address.Text(), job.name);
 }
 
 }  // namespace terrace::bake

@@ -75,39 +75,39 @@ std::vector<JobStatus::Running> RunningUnits(const redis::ReplyView& pending, co
 
 }  // namespace
 
-Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobConnection& place) {
-  const auto job = ReadJob(connection, place);
-  if (!job) return tl::unexpected(job.error());
-  if (job->empty()) {
+Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobAddress& job) {
+  const auto fields = ReadJob(connection, job);
+  if (!fields) return tl::unexpected(fields.error());
+  if (fields->empty()) {
     return MakeError(ErrorCode::kNotFound,
                      "Redis at {}: has no job {}; either none was begun, or Redis lost it: the next worker fills it "
                      "again",
-                     place.address.Text(), place.name);
+                     job.address.Text(), job.name);
   }
-  const std::string units = place.Key("units");
+  const std::string units = job.Key("units");
   enum Reply : std::size_t { kTime, kQueued, kPending, kTaken, kDone, kState };
   const std::array<redis::Command, 6> commands = {{{"TIME"},
                                                    {"XLEN", units},
                                                    {"XPENDING", units, "bakers", "-", "+", "100000"},
-                                                   {"HGETALL", place.Key("taken")},
-                                                   {"XRANGE", place.Key("done"), "-", "+"},
-                                                   {"HGET", place.Key("job"), "state"}}};
+                                                   {"HGETALL", job.Key("taken")},
+                                                   {"XRANGE", job.Key("done"), "-", "+"},
+                                                   {"HGET", job.Key("job"), "state"}}};
   const auto replies = connection.CallAll(commands);
   if (!replies) return tl::unexpected(replies.error());
   for (std::size_t i = 0; i < replies->size(); ++i) {
     if ((*replies)[i].is_error()) return tl::unexpected(connection.Refusal(commands[i].front(), (*replies)[i]));
   }
-  auto dead = ReadDead(connection, place);
+  auto dead = ReadDead(connection, job);
   if (!dead) return tl::unexpected(dead.error());
 
   JobStatus status;
   status.dead = *std::move(dead);
   status.state = (*replies)[kState].text();
-  for (const auto& field : *job) {
+  for (const auto& field : *fields) {
     if (!IsOfQueue(field.first)) status.identity.push_back(field);
   }
-  status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(Int64Of(FieldOf(*job, "units")), 0));
-  status.lease_seconds = static_cast<double>(Int64Of(FieldOf(*job, "lease_ms"))) / 1000;
+  status.units = static_cast<std::uint64_t>(std::max<std::int64_t>(Int64Of(FieldOf(*fields, "units")), 0));
+  status.lease_seconds = static_cast<double>(Int64Of(FieldOf(*fields, "lease_ms"))) / 1000;
   const std::int64_t now_ms = Int64Of((*replies)[kTime][0].text()) * 1000 + Int64Of((*replies)[kTime][1].text()) / 1000;
   status.running = RunningUnits((*replies)[kPending], (*replies)[kTaken], now_ms);
   const bool is_finishing = std::ranges::any_of(

@@ -30,6 +30,6 @@ struct JobStatus {
 };
 
 // kNotFound: there is no such job, or Redis lost it. Errors: as redis::Connection::Call.
-Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobConnection& place);
+Result<JobStatus> ReadJobStatus(redis::Connection& connection, const JobAddress& job);
 
 }  // namespace terrace::bake

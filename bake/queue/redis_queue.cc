@@ -67,7 +67,7 @@ bool RedisQueue::Leave() {
 }
 
 Result<void> RedisQueue::Connect() {
-  auto connection = ConnectToJob(options_.place);
+  auto connection = ConnectToJob(options_.job);
   if (!connection) return tl::unexpected(connection.error());
   connection_ = *std::move(connection);
   return {};
@@ -77,13 +77,13 @@ Result<void> RedisQueue::Connect() {
 Result<void> RedisQueue::Enter(bool is_emptied) {
   constexpr int kTries = 5;  // others may fill it at the same time
   for (int i = 0; i < kTries; ++i) {
-    const auto job = ReadJob(*connection_, options_.place);
-    if (!job) return tl::unexpected(job.error());
-    const std::string incarnation = FieldOf(*job, "incarnation");
-    if (FieldOf(*job, "state") == "baking") {
-      if (auto same = CheckIdentity(*job); !same) return same;
+    const auto fields = ReadJob(*connection_, options_.job);
+    if (!fields) return tl::unexpected(fields.error());
+    const std::string incarnation = FieldOf(*fields, "incarnation");
+    if (FieldOf(*fields, "state") == "baking") {
+      if (auto same = CheckIdentity(*fields); !same) return same;
       if (!is_emptied || incarnation != Incarnation()) {
-        const auto number = ParseNumber<milliseconds::rep>(FieldOf(*job, "lease_ms")).value_or(0);
+        const auto number = ParseNumber<milliseconds::rep>(FieldOf(*fields, "lease_ms")).value_or(0);
         SetJob(incarnation, milliseconds(number > 0 ? number : options_.lease.count()));
         return {};
       }
@@ -93,13 +93,13 @@ Result<void> RedisQueue::Enter(bool is_emptied) {
     if (*filled) return {};
   }
   return MakeError(ErrorCode::kUnavailable, "Redis at {}: job {} is begun again and again by others; look who uses it",
-                   options_.place.address.Text(), options_.place.name);
+                   options_.job.address.Text(), options_.job.name);
 }
 
-Result<void> RedisQueue::CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const {
+Result<void> RedisQueue::CheckIdentity(const std::vector<std::pair<std::string, std::string>>& fields) const {
   std::string differences;
   for (const auto& [what, value] : options_.identity) {
-    const std::string theirs = FieldOf(job, what);
+    const std::string theirs = FieldOf(fields, what);
     if (theirs == value) continue;
     differences += fmt::format("{}{} \"{}\", not \"{}\"", differences.empty() ? "" : "; ", what, theirs, value);
   }
@@ -107,7 +107,7 @@ Result<void> RedisQueue::CheckIdentity(const std::vector<std::pair<std::string, 
   return MakeError(ErrorCode::kInvalidArgument,
                    "Redis at {}: job {} is another bake: {}; give the same arguments, another --job, or forget that "
                    "job with 'terrace bake status --job {} --remove'",
-                   options_.place.address.Text(), options_.place.name, differences, options_.place.name);
+                   options_.job.address.Text(), options_.job.name, differences, options_.job.name);
 }
 
 // False: another worker has changed the job meanwhile.
@@ -124,7 +124,7 @@ Result<bool> RedisQueue::Fill(const std::string& incarnation) {
     arguments.push_back(std::move(value));
   }
   for (const std::size_t unit : options_.find_missing()) arguments.push_back(options_.units[unit]);
-  const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kFill, std::move(arguments)));
+  const auto reply = connection_->Call(ScriptCommand(options_.job, scripts::kFill, std::move(arguments)));
   if (!reply) return tl::unexpected(reply.error());
   if ((*reply)[0].text() != "ok") return false;
   SetJob(mine, options_.lease);
@@ -132,14 +132,14 @@ Result<bool> RedisQueue::Fill(const std::string& incarnation) {
 }
 
 Result<void> RedisQueue::Revive() {
-  const auto dead = ReadDead(*connection_, options_.place);
+  const auto dead = ReadDead(*connection_, options_.job);
   if (!dead) return tl::unexpected(dead.error());
   if (dead->empty()) return {};
   std::vector<std::string> arguments = {Incarnation()};
   for (const DeadUnit& unit : *dead) {
     if (index_.contains(unit.unit)) arguments.push_back(unit.unit);
   }
-  const auto reply = connection_->Call(ScriptCommand(options_.place, scripts::kRevive, std::move(arguments)));
+  const auto reply = connection_->Call(ScriptCommand(options_.job, scripts::kRevive, std::move(arguments)));
   if (!reply) return tl::unexpected(reply.error());
   return {};
 }
@@ -161,7 +161,7 @@ void RedisQueue::NoteAway(const Error& why) {
   next_connect_ = now + kPauseWithoutRedis;
   if (!away_since_) {
     away_since_ = now;
-    if (options_.on_message && !options_.place.stop.stop_requested()) {
+    if (options_.on_message && !options_.job.stop.stop_requested()) {
       options_.on_message(fmt::format("{}; waiting for it up to {} s", why.message, options_.patience.count() / 1000));
     }
   }
@@ -171,7 +171,7 @@ void RedisQueue::NoteAway(const Error& why) {
 void RedisQueue::NoteBack() {
   if (!away_since_) return;
   away_since_.reset();
-  if (options_.on_message) options_.on_message(fmt::format("Redis at {}: is back", options_.place.address.Text()));
+  if (options_.on_message) options_.on_message(fmt::format("Redis at {}: is back", options_.job.address.Text()));
 }
 
 Result<redis::Reply> RedisQueue::Exchange(const redis::Command& command) {
@@ -246,7 +246,7 @@ std::optional<UnitQueue::Taken> RedisQueue::TakeOnce() {
     if (Clock::now() < next_take_) return Taken{Taken::State::kWait};
     arguments = {incarnation_, options_.worker, Millis(lease_)};
   }
-  const auto reply = Exchange(ScriptCommand(options_.place, scripts::kTake, std::move(arguments)));
+  const auto reply = Exchange(ScriptCommand(options_.job, scripts::kTake, std::move(arguments)));
   if (!reply) return WaitOrOver();
   const std::string_view what = (*reply)[0].text();
   if (what == "unit") return Accept(*reply);
@@ -295,7 +295,7 @@ std::optional<UnitQueue::Taken> RedisQueue::Accept(const redis::ReplyView& reply
 
 void RedisQueue::Send(const Held& held, const char* script, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), {held.incarnation, held.id});
-  outbox_.push_back({ScriptCommand(options_.place, script, std::move(arguments)), {}});
+  outbox_.push_back({ScriptCommand(options_.job, script, std::move(arguments)), {}});
 }
 
 // The acknowledgement goes with the next command: the thread takes its next unit now.
@@ -360,13 +360,13 @@ void RedisQueue::Beat() {
   // A call that takes longer is abandoned, so that the next one comes in time. Take notes whether Redis is away.
   constexpr milliseconds kMinTimeout{500};
   if (!beat_connection_ || beat_connection_->HasEnded()) {
-    JobConnection place = options_.place;
-    place.timeout = std::min(place.timeout, std::max(Lease() / 3, kMinTimeout));
-    auto connection = ConnectToJob(place);
+    JobAddress job = options_.job;
+    job.timeout = std::min(job.timeout, std::max(Lease() / 3, kMinTimeout));
+    auto connection = ConnectToJob(job);
     if (!connection) return;
     beat_connection_ = *std::move(connection);
   }
-  if (!beat_connection_->Call(ScriptCommand(options_.place, scripts::kBeat, std::move(arguments)))) {
+  if (!beat_connection_->Call(ScriptCommand(options_.job, scripts::kBeat, std::move(arguments)))) {
     beat_connection_ = nullptr;
   }
 }
@@ -402,7 +402,7 @@ Result<std::vector<DeadUnit>> RedisQueue::Dead() {
   if (!connection_) {
     if (auto connected = Connect(); !connected) return tl::unexpected(connected.error());
   }
-  return ReadDead(*connection_, options_.place);
+  return ReadDead(*connection_, options_.job);
 }
 
 void RedisQueue::ReportFinished() {

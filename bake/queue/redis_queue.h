@@ -25,7 +25,7 @@
 namespace terrace::bake {
 
 struct RedisQueueOptions {
-  JobConnection place;
+  JobAddress job;
   JobIdentity identity;
   std::string worker;              // the name of this process among the workers of the job
   std::vector<std::string> units;  // the names of the units of the plan, by index
@@ -83,7 +83,7 @@ class RedisQueue : public UnitQueue {
   explicit RedisQueue(RedisQueueOptions options);
   // `calls_` is held by the caller of these, `mutex_` is not.
   Result<void> Enter(bool is_emptied);
-  Result<void> CheckIdentity(const std::vector<std::pair<std::string, std::string>>& job) const;
+  Result<void> CheckIdentity(const std::vector<std::pair<std::string, std::string>>& fields) const;
   Result<bool> Fill(const std::string& incarnation);
   Result<void> Revive();
   Result<void> Connect();

@@ -19,7 +19,8 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::Fill for a window. If `part` is set, the trace covers that part only and has no positions.
+// The trace of RasterGrid::AddHeights for a window. If `part` is set, the trace covers that part only and has no
+// positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};

@@ -37,7 +37,7 @@ struct GridRange {
   bool shows_others = true;  // part of the tile may lie outside the raster grid or in its voids
 };
 
-// What Fill read for a window. The error bounds compare served heights with these samples. Heights in metres.
+// What AddHeights read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
   // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
   // raster grid may have no position.
@@ -62,14 +62,13 @@ struct GridOptions {
   double feather_m = 0;
 };
 
-// Heights of a window's nodes in metres, one per node. Raster grids fill them in turn.
+// Heights of a window's nodes in metres, one per node. Raster grids add theirs in turn.
 struct NodeHeights {
-  std::span<float> heights;  // NaN: not filled yet
-  // Blend weights of the heights filled in, greater than 0, up to 1; the raster grids below have the rest. Empty:
-  // all 1.
+  std::span<float> heights;  // NaN: none yet
+  // Blend weights of the heights added, greater than 0, up to 1; the raster grids below have the rest. Empty: all 1.
   std::span<float> weights = {};
-  // Smooth surface for holes where no raster grid has a height. NaN: not filled yet. Null: not wanted. Empty: no node
-  // has one yet.
+  // Smooth surface for holes where no raster grid has a height. NaN: none yet. Null: not wanted. Empty: no node has one
+  // yet.
   std::vector<float>* smooth = nullptr;
   bool are_void = false;  // all heights are NaN
 };
@@ -112,29 +111,29 @@ class RasterGrid {
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
   // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
   template <typename NodeGrid>
-  Result<void> Fill(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum, const NodeHeights& nodes,
-                    const std::stop_token& stop, GridTrace* trace = nullptr) const;
+  Result<void> AddHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                          const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells of the window's nodes that Fill uses, with columns moved near those of a trace's window.
+  // Returns the cells of the window's nodes that AddHeights uses, with columns moved near those of a trace's window.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
-  // Fill for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is void, for
-  // points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of Fill and of the
-  // geoid for `datum`.
-  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
-                          std::span<std::uint8_t> filled, const std::stop_token& stop) const;
+  // AddHeights for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
+  // void, for points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of
+  // AddHeights and of the geoid for `datum`.
+  Result<void> AddPointHeights(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+                               std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
-  // Whether a position lies in a member, the condition for a height from FillPoints. With wrapping: columns 0 ..
+  // Whether a position lies in a member, the condition for a height from AddPointHeights. With wrapping: columns 0 ..
   // columns().
   bool Covers(const Position& pixel) const { return cover_.Inside(std::span(&pixel, 1))[0] != 0; }
 
   // Returns the block of cells with these numbers (PointBlockKey), and keeps it. Does not check whether the files are
-  // unchanged if the block was kept. Errors: those of Fill.
+  // unchanged if the block was kept. Errors: those of AddHeights.
   Result<PointBlockPtr> FindPointBlock(std::int64_t block_column, std::int64_t block_row,
                                        const std::stop_token& stop) const;
 
   // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
-  // that wraps, columns are taken modulo columns(). Errors: those of Fill.
+  // that wraps, columns are taken modulo columns(). Errors: those of AddHeights.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
     return ReadAverages(1, window, stop);
   }
@@ -159,7 +158,7 @@ class RasterGrid {
   // Which voids of a member are holes, by region.
   std::span<const std::uint8_t> HoleRegions(std::size_t member) const { return voids_.HoleRegions(member); }
 
-  // Returns bounds on the ellipsoidal heights that Fill gives to the tile's nodes, edges included, in metres.
+  // Returns bounds on the ellipsoidal heights that AddHeights gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
 
  private:
@@ -211,9 +210,9 @@ class RasterGrid {
   NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // `inside`: one entry per node, 0 where it is not to be filled. `undulations`: one per node, added to heights; empty:
   // none are.
-  Result<void> FillAt(NodePositions positions, std::span<const std::uint8_t> inside,
-                      std::span<const double> undulations, int factor, const NodeHeights& nodes,
-                      const std::stop_token& stop, GridTrace* trace = nullptr) const;
+  Result<void> AddHeightsAt(NodePositions positions, std::span<const std::uint8_t> inside,
+                            std::span<const double> undulations, int factor, const NodeHeights& nodes,
+                            const std::stop_token& stop, GridTrace* trace = nullptr) const;
   void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
                    const std::vector<float>& filled, std::span<const double> undulations, GridTrace& trace) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north

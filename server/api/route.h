@@ -13,7 +13,7 @@ namespace terrace::server {
 
 struct RequestContext;  // request_context.h
 struct RouteRow;
-struct Handlers;       // server/handlers/handlers.h
+struct HandlerState;   // server/handlers/handlers.h
 class Segments;        // server/routes.h
 struct TileFormatRow;  // tile_formats.h
 struct Operation;      // server/openapi/operation.h
@@ -41,7 +41,7 @@ enum class DatasetScope : std::uint8_t {
 struct RouteRow {
   std::string_view label;    // in logs and metrics
   std::string_view pattern;  // "/{dataset}/layer.json": '{' in a segment matches any; "..." at the end: one or more
-  Answer (*handle)(const Handlers& handlers, const RequestContext& context);
+  Answer (*handle)(const HandlerState& state, const RequestContext& context);
   // What /openapi.json says about the URL; of tiles see TileFormatRow::operation. Null: a test fails.
   const Operation* operation = nullptr;
   // Reads what the URL names besides its dataset. Returns false if the URL names nothing. Null: nothing to read.

@@ -40,13 +40,14 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   const Result<TileParameters> parameters = ParseTileParameters(query, /*allow_at_least=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
+  tile.error_step = ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
   tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
   tile.extensions.normals = wanted.normals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
   tile.extensions.water_mask = wanted.water_mask && dataset.has_water;
-  tile.extensions.metadata = wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels,
-                                                                       dataset.max_source_level(), dataset.available);
+  tile.extensions.metadata =
+      wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.error_scale.max_source_level,
+                                                dataset.available);
   return {};
 }
 
@@ -59,7 +60,7 @@ Result<void> ReadGlb(std::string_view query, const RequestFields& fields, const 
       ParseTileParameters(query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return tl::unexpected(parameters.error());
   if (!IsAvailable(dataset, tile.key)) return NoSuchTile();
-  tile.error_step = ErrorStepOf(parameters->requested, tile.key.level, dataset);
+  tile.error_step = ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
   tile.compression = parameters->compression.value_or(dataset.glb_compression);
   if (dataset.texture) tile.texture = parameters->texture.value_or(*dataset.texture);
   if (CodingHelps(tile)) tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
@@ -179,12 +180,6 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
   proto::TileExtensions wanted = proto::ExtensionsInAccept(accept);
   for (const std::string& names : query_extensions) wanted = wanted | proto::ParseExtensions(names);
   return wanted;
-}
-
-int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset) {
-  std::span<const int> default_steps;
-  if (dataset.baked_alone) default_steps = dataset.baked_alone->extent().error_steps;
-  return ErrorStep(requested, level, level >= dataset.max_source_level(), dataset.error_fraction, default_steps);
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {

@@ -16,12 +16,9 @@
 #include "server/query/tile_query.h"
 #include "server/tiles/catalog.h"
 #include "tiler/tile/encoded_tile.h"
-#include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::server {
-
-using tiler::ErrorStep;
 
 struct TileFormatRow {
   tiler::TileFormat format;
@@ -70,9 +67,6 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding,
 // The extensions named by `extensions=a-b` parameters anywhere in Accept and by the query's values. Unknown names are
 // ignored. 3DTilesRendererJS adds the parameter to application/octet-stream.
 proto::TileExtensions WantedExtensions(std::string_view accept, const std::vector<std::string>& query_extensions);
-
-// ErrorStep for a level of this dataset. Without sources, requests without an error get the step of the archive.
-int ErrorStepOf(const RequestedError& requested, int level, const DatasetView& dataset);
 
 // The header lines of a reply that describe its tile, written once and kept with the tile: Content-Type,
 // Content-Encoding and Content-Length; ETag, Terrain-Max-Error and Terrain-Certified-Error. `tile` is the tile of

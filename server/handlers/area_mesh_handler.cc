@@ -35,10 +35,10 @@ std::string FormatOrigin(const dem::GeoPosition& centre) {
 }
 
 // `response`: complete except for what depends on the mesh.
-asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset,
+asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestContext& context, std::uint32_t dataset,
                                     tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
                                     Response response) {
-  Work<tiler::EncodedTile> work = [catalog = handlers.catalog, dataset, area, plan, coding,
+  Work<tiler::EncodedTile> work = [catalog = state.catalog, dataset, area, plan, coding,
                                    requested_at =
                                        TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
     const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
@@ -50,9 +50,9 @@ asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestConte
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
-  const auto deadline = handlers.Deadline();
+  const auto deadline = state.Deadline();
   Result<tiler::EncodedTile> mesh =
-      co_await handlers.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+      co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
   if (!mesh) co_return co_await BackendFailure(mesh.error(), context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {
@@ -65,16 +65,16 @@ asio::awaitable<Response> BuildArea(const Handlers& handlers, const RequestConte
 
 }  // namespace
 
-Answer AnswerArea(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerArea(const HandlerState& state, const RequestContext& context) {
   const Request& request = *context.request;
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   const Result<tiler::AreaRequest> area = ParseAreaRequest(context.route.query);
   if (!area) return ClientErrorResponse(area.error(), request.id);
-  const Result<tiler::AreaPlan> plan = handlers.catalog->pipeline->PlanArea(*dataset, *area, handlers.max_mesh_samples);
+  const Result<tiler::AreaPlan> plan = state.catalog->pipeline->PlanArea(*dataset, *area, state.max_mesh_samples);
   if (!plan) return ClientErrorResponse(plan.error(), request.id);
 
-  const DatasetView& view = handlers.catalog->datasets[*dataset];
+  const DatasetView& view = state.catalog->datasets[*dataset];
   const tiler::Coding coding = NegotiateCoding(request.fields->accept_encoding);
   Response response;
   response.content_type = ContentTypeOf(area->format);
@@ -82,13 +82,13 @@ Answer AnswerArea(const Handlers& handlers, const RequestContext& context) {
   // The version of a dataset does not cover max_mesh_samples.
   const std::string request_text = fmt::format("level {} {}", plan->level, context.route.query);
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, request_text, coding);
-  response.cache_control = handlers.cache_control;
+  response.cache_control = state.cache_control;
   if (!plan->depends_on_limit) {
-    response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
+    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
   }
   response.vary = "Accept-Encoding";
   if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
-  return BuildArea(handlers, context, *dataset, *area, *plan, coding, std::move(response));
+  return BuildArea(state, context, *dataset, *area, *plan, coding, std::move(response));
 }
 
 }  // namespace terrace::server

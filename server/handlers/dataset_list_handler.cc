@@ -17,8 +17,8 @@ using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen
                                       std::span<const PendingDataset>);
 
 // The pending datasets that the client may see.
-std::vector<PendingDataset> PendingOfSeen(const Handlers& handlers, const RequestContext& context) {
-  std::vector<PendingDataset> pending = handlers.process.PendingOf(*handlers.catalog);
+std::vector<PendingDataset> PendingOfSeen(const HandlerState& state, const RequestContext& context) {
+  std::vector<PendingDataset> pending = state.process.PendingOf(*state.catalog);
   std::erase_if(pending,
                 [&](const PendingDataset& one) { return !context.sees_all() && !context.grant->Sees(one.name); });
   return pending;
@@ -26,7 +26,7 @@ std::vector<PendingDataset> PendingOfSeen(const Handlers& handlers, const Reques
 
 // A plan to call `write` for the datasets that the client may see. `all`: the document of all datasets. `pending`: what
 // PendingOfSeen returns.
-DocumentPlan PlanOfSeen(const Handlers& handlers, const Document& all, const RequestContext& context,
+DocumentPlan PlanOfSeen(const HandlerState& state, const Document& all, const RequestContext& context,
                         WriteDatasets write, std::vector<PendingDataset> pending) {
   DocumentPlan plan;
   // Each token has one Grant as long as the server runs.
@@ -35,7 +35,7 @@ DocumentPlan PlanOfSeen(const Handlers& handlers, const Document& all, const Req
   plan.content_type = all.content_type;
   plan.cache_control = kRevalidate;
   const GrantPtr limited = context.sees_all() ? nullptr : context.grant;
-  plan.write = [datasets = std::span<const DatasetView>(handlers.catalog->datasets), limited, write,
+  plan.write = [datasets = std::span<const DatasetView>(state.catalog->datasets), limited, write,
                 pending = std::move(pending)](const std::stop_token& stop) {
     const auto is_seen = limited ? IsSeen([&](const DatasetView& view) { return limited->Sees(view.name); }) : IsSeen();
     return write(datasets, is_seen, stop, pending);
@@ -126,27 +126,26 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
       pending.empty() ? "" : "<meta http-equiv=\"refresh\" content=\"5\">", items);
 }
 
-DocumentAnswer DescribeDatasets(const Handlers& handlers, const RequestContext& context) {
+DocumentAnswer DescribeDatasets(const HandlerState& state, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  std::vector<PendingDataset> pending = PendingOfSeen(handlers, context);
-  if (context.sees_all() && pending.empty()) return Serve(handlers.list, *context.request, kRevalidate);
-  return PlanOfSeen(handlers, handlers.list, context, DatasetsJson, std::move(pending));
+  std::vector<PendingDataset> pending = PendingOfSeen(state, context);
+  if (context.sees_all() && pending.empty()) return Serve(state.list, *context.request, kRevalidate);
+  return PlanOfSeen(state, state.list, context, DatasetsJson, std::move(pending));
 }
 
 // Pages keep their state in the query, so any query is allowed.
-DocumentAnswer DescribeViewerFile(const Handlers& handlers, const RequestContext& context) {
-  if (const Document* file = handlers.viewer->Find(context.route.file))
-    return Serve(*file, *context.request, kRevalidate);
-  if (handlers.viewer->empty() && context.route.file == "index.html") {
-    std::vector<PendingDataset> pending = PendingOfSeen(handlers, context);
+DocumentAnswer DescribeViewerFile(const HandlerState& state, const RequestContext& context) {
+  if (const Document* file = state.viewer->Find(context.route.file)) return Serve(*file, *context.request, kRevalidate);
+  if (state.viewer->empty() && context.route.file == "index.html") {
+    std::vector<PendingDataset> pending = PendingOfSeen(state, context);
     if (context.sees_all() && pending.empty()) {
-      Response index = Serve(handlers.index, *context.request, kRevalidate);
+      Response index = Serve(state.index, *context.request, kRevalidate);
       index.depends_on_token = context.grant != nullptr;
       return index;
     }
-    DocumentPlan index = PlanOfSeen(handlers, handlers.index, context, IndexHtml, std::move(pending));
+    DocumentPlan index = PlanOfSeen(state, state.index, context, IndexHtml, std::move(pending));
     index.depends_on_token = context.grant != nullptr;
     return index;
   }

@@ -52,14 +52,14 @@ std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::
   return text + "]}";
 }
 
-DocumentAnswer DescribeEdits(const Handlers& handlers, const RequestContext& context) {
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
+DocumentAnswer DescribeEdits(const HandlerState& state, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), context.request->id);
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  const tiler::Dataset& dataset = handlers.catalog->pipeline->datasets()[*index];
-  if (!handlers.catalog->datasets[*index].edits_hash) {
+  const tiler::Dataset& dataset = state.catalog->pipeline->datasets()[*index];
+  if (!state.catalog->datasets[*index].edits_hash) {
     return ProblemResponse(404, "this dataset has no edits; /datasets lists the URLs of each dataset",
                            context.request->id);
   }

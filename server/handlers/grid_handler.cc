@@ -141,10 +141,10 @@ std::string_view ContentTypeOf(GridFormat format) {
   return "application/octet-stream";
 }
 
-asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset,
+asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestContext& context, std::uint32_t dataset,
                                    std::shared_ptr<const GridQuery> query, tiler::Coding coding, Response response) {
-  const DatasetView& view = handlers.catalog->datasets[dataset];
-  Work<MadeGrid> work = [catalog = handlers.catalog, dataset, query, coding, most = handlers.max_mesh_samples,
+  const DatasetView& view = state.catalog->datasets[dataset];
+  Work<MadeGrid> work = [catalog = state.catalog, dataset, query, coding, most = state.max_mesh_samples,
                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
     made.reply.times.queue = MicrosecondsSince(requested_at);
@@ -166,9 +166,9 @@ asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContex
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");
     return made;
   };
-  const auto deadline = handlers.Deadline();
+  const auto deadline = state.Deadline();
   Result<MadeGrid> made =
-      co_await handlers.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+      co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
   if (!made) co_return co_await RefusePoints(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
   Response reply = co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
@@ -177,13 +177,13 @@ asio::awaitable<Response> MakeGrid(const Handlers& handlers, const RequestContex
 
 }  // namespace
 
-Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerGrid(const HandlerState& state, const RequestContext& context) {
   const Request& request = *context.request;
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
   Result<GridQuery> query = ParseGrid(context.route.query);
   if (!query) return ClientErrorResponse(query.error(), request.id);
-  const DatasetView& view = handlers.catalog->datasets[*dataset];
+  const DatasetView& view = state.catalog->datasets[*dataset];
   if (const Result<void> datum = CheckDatum(query->datum, view); !datum) {
     return ClientErrorResponse(datum.error(), request.id);
   }
@@ -195,15 +195,15 @@ Answer AnswerGrid(const Handlers& handlers, const RequestContext& context) {
   response.content_type = ContentTypeOf(query->format);
   response.content_encoding = tiler::NameOf(coding);
   if (!is_image) response.vary = "Accept-Encoding";
-  response.cache_control = handlers.cache_control;
+  response.cache_control = state.cache_control;
   // The generation does not cover the files of PROJ: geoids, and grids of the shifts between reference systems.
   if (query->datum == dem::HeightDatum::kEllipsoid && query->grid.epsg == dem::kWgs84) {
-    response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
+    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
     response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
   }
   if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   auto shared = std::make_shared<const GridQuery>(*std::move(query));
-  return MakeGrid(handlers, context, *dataset, std::move(shared), coding, std::move(response));
+  return MakeGrid(state, context, *dataset, std::move(shared), coding, std::move(response));
 }
 
 }  // namespace terrace::server

@@ -11,8 +11,8 @@ std::string_view OriginHeaders(const config::Config& config) {
                                                                         : "X-Forwarded-Host, X-Forwarded-Proto";
 }
 
-std::vector<Handlers::OfDataset> MakeOfDatasets(const std::vector<DatasetView>& datasets) {
-  std::vector<Handlers::OfDataset> made(datasets.size());
+std::vector<HandlerState::OfDataset> MakeOfDatasets(const std::vector<DatasetView>& datasets) {
+  std::vector<HandlerState::OfDataset> made(datasets.size());
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     made[i].layer = PlainLayer(datasets[i]);
     AddTileset(datasets[i], made[i]);
@@ -22,8 +22,8 @@ std::vector<Handlers::OfDataset> MakeOfDatasets(const std::vector<DatasetView>& 
 
 }  // namespace
 
-Handlers::Handlers(CatalogPtr c, TileService& t, std::shared_ptr<const StaticFiles> v, const config::Config& config,
-                   const ProcessState& p)
+HandlerState::HandlerState(CatalogPtr c, TileService& t, std::shared_ptr<const StaticFiles> v,
+                           const config::Config& config, const ProcessState& p)
     : catalog(std::move(c)),
       tiles(t),
       process(p),

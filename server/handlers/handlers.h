@@ -1,4 +1,4 @@
-// The handlers, one function for each kind of URL (server/routes.cc), and the state that they share.
+// The handlers, one function for each kind of URL (server/routes.cc), and HandlerState, which they share.
 #pragma once
 
 #include <chrono>
@@ -55,11 +55,11 @@ class ProcessState {
   virtual asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const = 0;
 };
 
-// One for each catalog. Thread-safe. A request keeps it alive until it is answered.
-struct Handlers {
+// What handlers answer from: one for each catalog. Thread-safe. A request keeps it alive until it is answered.
+struct HandlerState {
   // `tiles`: its workers run long work. `tiles` and `process` must outlive this object.
-  Handlers(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
-           const config::Config& config, const ProcessState& process);
+  HandlerState(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
+               const config::Config& config, const ProcessState& process);
 
   // The deadline of a request that begins now.
   TileService::Clock::time_point Deadline() const { return TileService::Clock::now() + deadline; }
@@ -89,12 +89,12 @@ struct Handlers {
 
 // GET of all tiles: terrain, GLB, height images and tiles for maps (server/api/tile_formats.h). Replies that need no
 // build (refusals and cached tiles) are returned at once. Precondition: the route has a format.
-Answer AnswerTile(const Handlers& handlers, const RequestContext& context);
+Answer AnswerTile(const HandlerState& state, const RequestContext& context);
 // "cache;desc=miss, queue;dur=0.021, read;dur=1.234, ...": milliseconds of the stages of the build.
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times);
 
 // GET and POST /{dataset}/heights
-Answer AnswerHeights(const Handlers& handlers, const RequestContext& context);
+Answer AnswerHeights(const HandlerState& state, const RequestContext& context);
 
 struct CertifiedPoints {
   std::vector<geo::TileKey> tiles;              // without duplicates
@@ -120,16 +120,16 @@ std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& kn
 std::string HeightsBytes(const tiler::PointHeights& known);
 
 // GET /{dataset}/grid (server/query/grid_query.h). The Terrain-Grid header has the grid's size, place and scale.
-Answer AnswerGrid(const Handlers& handlers, const RequestContext& context);
+Answer AnswerGrid(const HandlerState& state, const RequestContext& context);
 
 // GET and POST /{dataset}/sight (server/query/sight_query.h)
-Answer AnswerSight(const Handlers& handlers, const RequestContext& context);
+Answer AnswerSight(const HandlerState& state, const RequestContext& context);
 
 // GET /{dataset}/mesh
-Answer AnswerArea(const Handlers& handlers, const RequestContext& context);
+Answer AnswerArea(const HandlerState& state, const RequestContext& context);
 
 // GET /{dataset}/layer.json. `?error=E` and `?fraction=F` go into the tile template.
-DocumentAnswer DescribeLayer(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeLayer(const HandlerState& state, const RequestContext& context);
 // The document for requests without parameters.
 Document PlainLayer(const DatasetView& dataset);
 // The query of the tile template for a requested error: "error=5&atleast=1", "fraction=0.25" or empty. Numbers are
@@ -145,32 +145,32 @@ std::string WithToken(std::string query, const RequestContext& context);
 const Grant* GrantInQuery(const RequestContext& context);
 
 // GET /{dataset}/edits.geojson: outlines of the dataset's edits. 404: it has none.
-DocumentAnswer DescribeEdits(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeEdits(const HandlerState& state, const RequestContext& context);
 // A FeatureCollection of MultiLineStrings, RFC 7946, in the order of the edits. Properties: `op`, `file` without its
 // folder, `feature`, its index in the file, `area`: lines are closed rings. Returns an empty string if a stop was
 // requested.
 std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::stop_token& stop = {});
 
 // GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
-DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.
-void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made);
+void AddTileset(const DatasetView& dataset, HandlerState::OfDataset& made);
 // The .subtree files of the tileset. Any available tile may be the root, so that an older tileset.json that a client
 // has cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree
 // begins at this tile.
-DocumentAnswer DescribeSubtree(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeSubtree(const HandlerState& state, const RequestContext& context);
 
 // GET /{dataset}/tiles.json. `?encoding` and `?size` go into the tile template.
-Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context);
+Answer AnswerTileJson(const HandlerState& state, const RequestContext& context);
 
 // GET /{dataset}/hillshade/tiles.json and those of slopes, contours and imagery. The parameters of the tiles go into
 // the tile template; `?format` names the suffix of pictures. Precondition: the route has a format.
-Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context);
+Answer AnswerMapTileJson(const HandlerState& state, const RequestContext& context);
 
 // GET /datasets: the datasets that the client may see.
-DocumentAnswer DescribeDatasets(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeDatasets(const HandlerState& state, const RequestContext& context);
 // GET / and /viewer/{file}. Without a viewer, `/` is a plain list of datasets.
-DocumentAnswer DescribeViewerFile(const Handlers& handlers, const RequestContext& context);
+DocumentAnswer DescribeViewerFile(const HandlerState& state, const RequestContext& context);
 // Whether the client may see a dataset. Empty: it may see all.
 using IsSeen = std::function<bool(const DatasetView&)>;
 
@@ -198,12 +198,12 @@ Response StateResponse(int status, std::string_view content_type, Body text);
 inline constexpr std::string_view kMetricsType = "text/plain; version=0.0.4; charset=utf-8";
 
 // GET /livez, /readyz and /metrics: for operators of the server.
-Answer AnswerLive(const Handlers& handlers, const RequestContext& context);
-Answer AnswerReady(const Handlers& handlers, const RequestContext& context);
-Answer AnswerMetrics(const Handlers& handlers, const RequestContext& context);
+Answer AnswerLive(const HandlerState& state, const RequestContext& context);
+Answer AnswerReady(const HandlerState& state, const RequestContext& context);
+Answer AnswerMetrics(const HandlerState& state, const RequestContext& context);
 
 // GET /version: which program answers, and what it serves, so that operators can compare the nodes of a fleet.
-Answer AnswerVersion(const Handlers& handlers, const RequestContext& context);
+Answer AnswerVersion(const HandlerState& state, const RequestContext& context);
 // {"product","version","build","encoder","libraries":{"GDAL":"3.6.2",...},"datasets":[{"name","version"}]}
 std::string VersionJson(const Catalog& catalog);
 

@@ -37,30 +37,30 @@ constexpr std::size_t kShortList = 1000;
 // Points written between two checks of the stop token.
 constexpr std::size_t kStopPeriod = 1024;
 
-asio::awaitable<Result<ServedTile>> TileOf(const Handlers& handlers, tiler::TileRequest tile,
+asio::awaitable<Result<ServedTile>> TileOf(const HandlerState& state, tiler::TileRequest tile,
                                            TileService::Clock::time_point deadline, std::uint64_t client) {
-  if (std::optional<ServedTile> found = handlers.tiles.Find(*handlers.catalog, tile)) co_return *std::move(found);
-  co_return co_await handlers.tiles.Build(handlers.catalog, tile, deadline, client);
+  if (std::optional<ServedTile> found = state.tiles.Find(*state.catalog, tile)) co_return *std::move(found);
+  co_return co_await state.tiles.Build(state.catalog, tile, deadline, client);
 }
 
 // Gets the certified errors of the points' tiles one after the other, from the cache or by building the tiles.
-asio::awaitable<Result<CertifiedPoints>> Certify(const Handlers& handlers, std::uint32_t dataset,
+asio::awaitable<Result<CertifiedPoints>> Certify(const HandlerState& state, std::uint32_t dataset,
                                                  const HeightsQuery& query, TileService::Clock::time_point deadline,
                                                  std::uint64_t client) {
   // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
-  Work<CertifiedPoints> find = [catalog = handlers.catalog, dataset, wanted = query.points,
+  Work<CertifiedPoints> find = [catalog = state.catalog, dataset, wanted = query.points,
                                 level = *query.certify_level](const std::stop_token& stop) {
     return CertifyingTilesOf(catalog->datasets[dataset], wanted, level, stop);
   };
   Result<CertifiedPoints> points =
-      co_await handlers.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
+      co_await state.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
   if (!points) co_return points;
   for (std::size_t i = 0; i < points->tiles.size(); ++i) {
     tiler::TileRequest tile;
     tile.dataset = dataset;
     tile.key = points->tiles[i];
     tile.coding = tiler::Coding::kGzip;  // the format that is most probably cached
-    const Result<ServedTile> served = co_await TileOf(handlers, tile, deadline, client);
+    const Result<ServedTile> served = co_await TileOf(state, tile, deadline, client);
     if (!served) co_return tl::unexpected(served.error());
     points->errors_m[i] = served->tile->certified_error_m;
   }
@@ -79,14 +79,14 @@ Result<tiler::PointHeights> ReadSurface(const tiler::TilePipeline& pipeline, std
   return heights;
 }
 
-asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset) {
+asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
-  const DatasetView& view = handlers.catalog->datasets[dataset];
-  const auto deadline = handlers.Deadline();
+  const DatasetView& view = state.catalog->datasets[dataset];
+  const auto deadline = state.Deadline();
   // A path of two corners may have thousands of points.
   const bool is_quick =
       context.route.query.size() <= kQuickQuery && context.route.query.find("path") == std::string::npos;
-  Result<HeightsQuery> parsed = co_await ParsePoints(handlers, context, ParseHeights, is_quick, deadline);
+  Result<HeightsQuery> parsed = co_await ParsePoints(state, context, ParseHeights, is_quick, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
   if (const Result<void> datum = CheckDatum(parsed->datum, view); !datum) {
     co_return ClientErrorResponse(datum.error(), request.id);
@@ -99,9 +99,9 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
     // The generation covers neither the geoid grid that orthometric heights depend on, nor the program that certified
     // errors depend on.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
-    response.cache_control = handlers.cache_control;
+    response.cache_control = state.cache_control;
     if (is_versioned) {
-      response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
+      response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
       response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
     }
     if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
@@ -109,14 +109,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
 
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
-    Result<CertifiedPoints> known = co_await Certify(handlers, dataset, *parsed, deadline, request.client);
+    Result<CertifiedPoints> known = co_await Certify(state, dataset, *parsed, deadline, request.client);
     if (!known) co_return co_await RefusePoints(known.error(), view, request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
-  Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query, certified,
+  Work<MadeReply> work = [catalog = state.catalog, dataset, coding, query, certified,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = MicrosecondsSince(requested_at);
@@ -131,14 +131,14 @@ asio::awaitable<Response> ReadHeights(const Handlers& handlers, const RequestCon
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
-  Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeReply> made = co_await state.tiles.Run(std::move(work), length, deadline, request.client);
   co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 
 }  // namespace
 
-Answer AnswerHeights(const Handlers& handlers, const RequestContext& context) {
-  return AnswerPoints(handlers, context, ReadHeights);
+Answer AnswerHeights(const HandlerState& state, const RequestContext& context) {
+  return AnswerPoints(state, context, ReadHeights);
 }
 
 std::string HeightsBytes(const tiler::PointHeights& known) {

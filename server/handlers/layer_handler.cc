@@ -52,21 +52,21 @@ std::string WithToken(std::string query, const RequestContext& context) {
 
 Document PlainLayer(const DatasetView& dataset) { return Document::Make(WriteLayer(dataset, ""), "application/json"); }
 
-DocumentAnswer DescribeLayer(const Handlers& handlers, const RequestContext& context) {
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
+DocumentAnswer DescribeLayer(const HandlerState& state, const RequestContext& context) {
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
-  if (const auto has = CheckHasFormat(handlers.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh); !has) {
+  if (const auto has = CheckHasFormat(state.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
   const Result<TileParameters> parameters = ParseTileParameters(context.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), context);
-  if (tile_query.empty()) return Serve(handlers.of_datasets[*dataset].layer, *context.request, kRevalidate);
+  if (tile_query.empty()) return Serve(state.of_datasets[*dataset].layer, *context.request, kRevalidate);
   DocumentPlan plan;
   plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = handlers.catalog->datasets[*dataset], tile_query = std::move(tile_query)](
+  plan.write = [&view = state.catalog->datasets[*dataset], tile_query = std::move(tile_query)](
                    const std::stop_token& stop) { return WriteLayer(view, tile_query, stop); };
   return plan;
 }

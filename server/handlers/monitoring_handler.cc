@@ -33,7 +33,7 @@ asio::awaitable<Response> WriteMetrics(const ProcessState& process) {
 
 }  // namespace
 
-Answer AnswerLive(const Handlers&, const RequestContext& context) {
+Answer AnswerLive(const HandlerState&, const RequestContext& context) {
   const Result<void> none = RefuseParameters(context.route.query);
   return none ? PlainState(200, "ok\n") : ClientErrorResponse(none.error(), context.request->id);
 }
@@ -51,18 +51,18 @@ Response PendingResponse(const PendingDataset& dataset, std::string_view request
 // The first word is the state. Without a dataset there is nothing to answer from. A degraded server still answers, so
 // it should stay in service. Reasons contain file names and go only to the log. Datasets are named only to clients that
 // may see all of them.
-Answer AnswerReady(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerReady(const HandlerState& state, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  if (handlers.process.draining() || handlers.process.opening()) {
-    Response response = PlainState(503, handlers.process.draining() ? "draining\n" : "opening\n");
+  if (state.process.draining() || state.process.opening()) {
+    Response response = PlainState(503, state.process.draining() ? "draining\n" : "opening\n");
     response.headers.emplace_back("Retry-After", "5");
     return response;
   }
-  const std::map<std::string, std::string> problems = handlers.process.problems();
-  const std::vector<PendingDataset> pending = handlers.process.PendingOf(*handlers.catalog);
-  const bool is_opening = handlers.catalog->datasets.empty() && !pending.empty();
+  const std::map<std::string, std::string> problems = state.process.problems();
+  const std::vector<PendingDataset> pending = state.process.PendingOf(*state.catalog);
+  const bool is_opening = state.catalog->datasets.empty() && !pending.empty();
   std::string text = is_opening ? "opening\n" : problems.empty() && pending.empty() ? "ready\n" : "degraded\n";
   for (const auto& [dataset, reason] : problems) {
     if (dataset == kCacheProblem) {
@@ -86,11 +86,11 @@ Answer AnswerReady(const Handlers& handlers, const RequestContext& context) {
   return response;
 }
 
-Answer AnswerMetrics(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerMetrics(const HandlerState& state, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  return WriteMetrics(handlers.process);
+  return WriteMetrics(state.process);
 }
 
 }  // namespace terrace::server

@@ -9,7 +9,7 @@
 
 namespace terrace::server {
 
-Answer AnswerPoints(const Handlers& handlers, const RequestContext& context, PointHandler handler) {
+Answer AnswerPoints(const HandlerState& state, const RequestContext& context, PointHandler handler) {
   const Request& request = *context.request;
   if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
     return ProblemResponse(415,
@@ -17,9 +17,9 @@ Answer AnswerPoints(const Handlers& handlers, const RequestContext& context, Poi
                            "application/octet-stream",
                            request.id);
   }
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), request.id);
-  return handler(handlers, context, *dataset);
+  return handler(state, context, *dataset);
 }
 
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view) {

@@ -22,17 +22,17 @@ struct MadeReply {
   tiler::StageTimes times;
 };
 
-using PointHandler = asio::awaitable<Response> (*)(const Handlers& handlers, const RequestContext& context,
+using PointHandler = asio::awaitable<Response> (*)(const HandlerState& state, const RequestContext& context,
                                                    std::uint32_t dataset);
 // Calls `handler` with the index of the dataset. 415: the body's type is not supported. 404: no such dataset.
-Answer AnswerPoints(const Handlers& handlers, const RequestContext& context, PointHandler handler);
+Answer AnswerPoints(const HandlerState& state, const RequestContext& context, PointHandler handler);
 
 // kInvalidArgument: orthometric heights of a dataset whose datum is unknown.
 Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
 
 // Parses query and body with ParseHeights or ParseSight, on a worker unless it is a query alone and `is_quick`.
 template <typename Query>
-asio::awaitable<Result<Query>> ParsePoints(const Handlers& handlers, const RequestContext& context,
+asio::awaitable<Result<Query>> ParsePoints(const HandlerState& state, const RequestContext& context,
                                            Result<Query> (*parse)(const HeightsInput& input, std::size_t max_points,
                                                                   const std::stop_token& stop),
                                            bool is_quick, TileService::Clock::time_point deadline) {
@@ -41,14 +41,14 @@ asio::awaitable<Result<Query>> ParsePoints(const Handlers& handlers, const Reque
   const bool is_post = request.method == Method::kPost;
   if (!is_post && is_quick) {
     const HeightsInput input{query, {}, {}};
-    co_return parse(input, handlers.max_locations, {});
+    co_return parse(input, state.max_locations, {});
   }
   const std::string_view type = is_post ? request.fields->content_type : std::string_view();
   Work<Query> work = [parse, query, type = std::string(type), body = request.body,
-                      max_points = handlers.max_locations](const std::stop_token& stop) {
+                      max_points = state.max_locations](const std::stop_token& stop) {
     return parse({query, type, body}, max_points, stop);
   };
-  co_return co_await handlers.tiles.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
+  co_return co_await state.tiles.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
 }
 
 // Starts a reply with JSON, in a coding that the client accepts, or with binary values, uncompressed: they hardly

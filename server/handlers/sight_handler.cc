@@ -111,25 +111,25 @@ std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswe
   return json + "],\"status\":\"OK\"}";
 }
 
-asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestContext& context, std::uint32_t dataset) {
+asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
-  const DatasetView& view = handlers.catalog->datasets[dataset];
-  const auto deadline = handlers.Deadline();
+  const DatasetView& view = state.catalog->datasets[dataset];
+  const auto deadline = state.Deadline();
   const bool is_quick = context.route.query.size() <= kQuickQuery;
-  Result<SightQuery> parsed = co_await ParsePoints(handlers, context, ParseSight, is_quick, deadline);
+  Result<SightQuery> parsed = co_await ParsePoints(state, context, ParseSight, is_quick, deadline);
   if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
   if (view.baked_alone && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;
   if (request.method != Method::kPost) {
-    response.cache_control = CacheControlOf(context.route.query, view, handlers.cache_control);
+    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
     response.etag = tiler::RequestETag("sight", view.name, view.generation, context.route.query, coding);
     if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);
   }
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
-  Work<MadeReply> work = [catalog = handlers.catalog, dataset, coding, query,
+  Work<MadeReply> work = [catalog = state.catalog, dataset, coding, query,
                           requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = MicrosecondsSince(requested_at);
@@ -148,14 +148,14 @@ asio::awaitable<Response> LookAlong(const Handlers& handlers, const RequestConte
     return made;
   };
   const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
-  Result<MadeReply> made = co_await handlers.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeReply> made = co_await state.tiles.Run(std::move(work), length, deadline, request.client);
   co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 
 }  // namespace
 
-Answer AnswerSight(const Handlers& handlers, const RequestContext& context) {
-  return AnswerPoints(handlers, context, LookAlong);
+Answer AnswerSight(const HandlerState& state, const RequestContext& context) {
+  return AnswerPoints(state, context, LookAlong);
 }
 
 }  // namespace terrace::server

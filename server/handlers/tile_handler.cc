@@ -27,13 +27,13 @@ std::string_view Name(const ServedTile& served) {
   return "join";
 }
 
-Response Reply(const Handlers& handlers, const tiler::TileRequest& tile, const ServedTile& served,
+Response Reply(const HandlerState& state, const tiler::TileRequest& tile, const ServedTile& served,
                const RequestContext& context) {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
   response.body_line_bytes = served.tile->head.body_bytes;
   response.cache_control =
-      CacheControlOf(context.route.query, handlers.catalog->datasets[tile.dataset], handlers.cache_control);
+      CacheControlOf(context.route.query, state.catalog->datasets[tile.dataset], state.cache_control);
   response.vary = context.route.format->vary(tile);
   if (served.cache == CacheStatus::kHit) {
     response.more_lines = "Server-Timing: cache;desc=hit\r\n";
@@ -49,24 +49,24 @@ Response Reply(const Handlers& handlers, const tiler::TileRequest& tile, const S
   return response;
 }
 
-asio::awaitable<Response> BuildTile(const Handlers& handlers, const RequestContext& context, tiler::TileRequest tile) {
+asio::awaitable<Response> BuildTile(const HandlerState& state, const RequestContext& context, tiler::TileRequest tile) {
   const Result<ServedTile> served =
-      co_await handlers.tiles.Build(handlers.catalog, tile, handlers.Deadline(), context.request->client);
-  if (served) co_return Reply(handlers, tile, *served, context);
+      co_await state.tiles.Build(state.catalog, tile, state.Deadline(), context.request->client);
+  if (served) co_return Reply(state, tile, *served, context);
   const bool is_absent =
-      served.error().code == ErrorCode::kNotFound && handlers.catalog->datasets[tile.dataset].baked_alone;
+      served.error().code == ErrorCode::kNotFound && state.catalog->datasets[tile.dataset].baked_alone;
   if (is_absent) co_return ClientErrorResponse(served.error(), context.request->id);
   co_return co_await BackendFailure(served.error(), context.request->id);
 }
 
 }  // namespace
 
-Answer AnswerTile(const Handlers& handlers, const RequestContext& context) {
-  const Result<tiler::TileRequest> tile = NegotiateTile(context, handlers.catalog->datasets);
+Answer AnswerTile(const HandlerState& state, const RequestContext& context) {
+  const Result<tiler::TileRequest> tile = NegotiateTile(context, state.catalog->datasets);
   if (!tile) return ClientErrorResponse(tile.error(), context.request->id);
-  if (const std::optional<ServedTile> found = handlers.tiles.Find(*handlers.catalog, *tile))
-    return Reply(handlers, *tile, *found, context);
-  return BuildTile(handlers, context, *tile);
+  if (const std::optional<ServedTile> found = state.tiles.Find(*state.catalog, *tile))
+    return Reply(state, *tile, *found, context);
+  return BuildTile(state, context, *tile);
 }
 
 std::string FormatServerTiming(std::string_view cache, const tiler::StageTimes& times) {

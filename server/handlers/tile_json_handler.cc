@@ -33,22 +33,22 @@ std::string OriginOf(const Request& request) {
   return fmt::format("{}://{}", request.is_https ? "https" : "http", request.fields->host);
 }
 
-Response ServeTileJson(const Handlers& handlers, const RequestContext& context,
+Response ServeTileJson(const HandlerState& state, const RequestContext& context,
                        const proto::TileJsonDescription& tiles) {
   Response response =
       Serve(Document::Make(proto::EncodeTileJson(tiles), "application/json"), *context.request, kRevalidate);
-  response.vary_more = handlers.origin_headers;
+  response.vary_more = state.origin_headers;
   return response;
 }
 
 }  // namespace
 
-Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
+Answer AnswerTileJson(const HandlerState& state, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), context.request->id);
   const Result<HeightTileParameters> parameters = ParseHeightTileParameters(context.route.query);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
-  const DatasetView& dataset = handlers.catalog->datasets[*index];
+  const DatasetView& dataset = state.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
@@ -63,14 +63,14 @@ Answer AnswerTileJson(const Handlers& handlers, const RequestContext& context) {
   tiles.tile_size = parameters->size;
   tiles.encoding = parameters->encoding;
   tiles.bounds = dataset.height_tile_bounds.value_or(dataset.bounds);
-  return ServeTileJson(handlers, context, tiles);
+  return ServeTileJson(state, context, tiles);
 }
 
-Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerMapTileJson(const HandlerState& state, const RequestContext& context) {
   const auto refuse = [&](const Error& error) { return ClientErrorResponse(error, context.request->id); };
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!index) return refuse(index.error());
-  const DatasetView& dataset = handlers.catalog->datasets[*index];
+  const DatasetView& dataset = state.catalog->datasets[*index];
   const TileFormatRow* row = context.route.format;
   if (const auto has = CheckHasFormat(dataset, row->format); !has) return refuse(has.error());
   if (const auto has = CheckHasImagery(dataset, row->format); !has) return refuse(has.error());
@@ -99,7 +99,7 @@ Answer AnswerMapTileJson(const Handlers& handlers, const RequestContext& context
   }
   tiles.tile_size = parameters->size;
   tiles.bounds = MapBounds(dataset, row->format);
-  return ServeTileJson(handlers, context, tiles);
+  return ServeTileJson(state, context, tiles);
 }
 
 }  // namespace terrace::server

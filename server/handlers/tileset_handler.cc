@@ -38,10 +38,10 @@ tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested) {
           dataset.attribution,
           dataset.available,
           dataset.bounds,
-          dataset.error_fraction,
-          dataset.max_source_level(),
+          dataset.error_scale.fraction,
+          dataset.error_scale.max_source_level,
           [&dataset](const geo::TileKey& key) { return RangeOf(dataset, key); },
-          [&dataset, requested](int level) { return ErrorStepOf(requested, level, dataset); }};
+          [&dataset, requested](int level) { return ErrorStep(requested, level, dataset.error_scale); }};
 }
 
 std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots,
@@ -52,16 +52,16 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
 
 }  // namespace
 
-void AddTileset(const DatasetView& dataset, Handlers::OfDataset& made) {
+void AddTileset(const DatasetView& dataset, HandlerState::OfDataset& made) {
   if (!CheckHasFormat(dataset, tiler::TileFormat::kGlb)) return;
   made.roots = std::make_shared<const std::vector<proto::TreeRoot>>(tiler::TreesOf(TreeOf(dataset, {})));
   made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
 }
 
-DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& context) {
-  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, handlers.catalog->datasets);
+DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& context) {
+  const Result<std::uint32_t> dataset = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!dataset) return ClientErrorResponse(dataset.error(), context.request->id);
-  if (const auto has = CheckHasFormat(handlers.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
+  if (const auto has = CheckHasFormat(state.catalog->datasets[*dataset], tiler::TileFormat::kGlb); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
   const Result<TileParameters> parameters =
@@ -69,13 +69,13 @@ DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& c
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, context.route.query);
   std::string content_query = WithToken(content_parameters, context);
-  if (content_query.empty()) return Serve(handlers.of_datasets[*dataset].tileset, *context.request, kRevalidate);
+  if (content_query.empty()) return Serve(state.of_datasets[*dataset].tileset, *context.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), context);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = handlers.catalog->datasets[*dataset], roots = handlers.of_datasets[*dataset].roots,
+  plan.write = [&view = state.catalog->datasets[*dataset], roots = state.of_datasets[*dataset].roots,
                 requested = parameters->requested, content_query = std::move(content_query),
                 subtree_query = std::move(subtree_query)](const std::stop_token&) {
     return WriteTileset(view, *roots, requested, content_query, subtree_query);
@@ -83,13 +83,13 @@ DocumentAnswer DescribeTileset(const Handlers& handlers, const RequestContext& c
   return plan;
 }
 
-DocumentAnswer DescribeSubtree(const Handlers& handlers, const RequestContext& context) {
-  const Result<std::uint32_t> index = FindDataset(context.route.dataset, handlers.catalog->datasets);
+DocumentAnswer DescribeSubtree(const HandlerState& state, const RequestContext& context) {
+  const Result<std::uint32_t> index = FindDataset(context.route.dataset, state.catalog->datasets);
   if (!index) return ClientErrorResponse(index.error(), context.request->id);
   const Result<TileParameters> parameters =
       ParseTileParameters(context.route.query, /*allow_at_least=*/true, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
-  const DatasetView& dataset = handlers.catalog->datasets[*index];
+  const DatasetView& dataset = state.catalog->datasets[*index];
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kGlb); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
@@ -103,7 +103,7 @@ DocumentAnswer DescribeSubtree(const Handlers& handlers, const RequestContext& c
   plan.key = fmt::format("subtree {} {} {} {}{}", *index, geo::ToString(context.route.key),
                          context.route.subtree_levels, TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
-  plan.cache_control = CacheControlOf(context.route.query, dataset, handlers.cache_control);
+  plan.cache_control = CacheControlOf(context.route.query, dataset, state.cache_control);
   plan.write = [&dataset, requested, top = context.route.key, levels = context.route.subtree_levels](
                    const std::stop_token&) { return tiler::SubtreeOf(TreeOf(dataset, requested), top, levels); };
   return plan;

@@ -49,11 +49,11 @@ std::string VersionJson(const Catalog& catalog) {
   return document.dump(2) + "\n";
 }
 
-Answer AnswerVersion(const Handlers& handlers, const RequestContext& context) {
+Answer AnswerVersion(const HandlerState& state, const RequestContext& context) {
   if (const Result<void> none = RefuseParameters(context.route.query); !none) {
     return ClientErrorResponse(none.error(), context.request->id);
   }
-  return StateResponse(200, "application/json", std::make_shared<const std::string>(VersionJson(*handlers.catalog)));
+  return StateResponse(200, "application/json", std::make_shared<const std::string>(VersionJson(*state.catalog)));
 }
 
 }  // namespace terrace::server

@@ -8,7 +8,7 @@
 
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
-#include "tiler/surface/drawn_points.h"
+#include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {
 

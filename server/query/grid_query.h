@@ -8,7 +8,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "engine/export/output_grid.h"
-#include "tiler/surface/drawn_points.h"
+#include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {
 

@@ -10,7 +10,7 @@
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
 #include "server/query/heights_query.h"
-#include "tiler/surface/drawn_points.h"
+#include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {
 

@@ -57,7 +57,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   DatasetView view;
   view.name = dataset.name;
   view.attribution = dataset.attribution;
-  view.error_fraction = dataset.error_fraction;
+  view.error_scale = dataset.error_scale();
   view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
   view.unedited_generation = dataset.unedited_generation;
@@ -84,7 +84,6 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
     view.imagery = dataset.imagery.image->extent();
     view.imagery_attribution = dataset.imagery.attribution;
   }
-  view.source_max_level = info.max_source_level;
   view.metadata_levels = dataset.metadata_levels;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;
@@ -104,7 +103,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const dem::GeoBounds& all = dataset.bounds;
   // Levels that edits add have no finer data.
-  const int level = std::min(dataset.max_source_level(), dataset.max_level());
+  const int level = std::min(dataset.error_scale.max_source_level, dataset.max_level());
   if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
   const std::vector<geo::TileRange>& ranges = dataset.available[static_cast<std::size_t>(level)];
   const auto size = [](const geo::TileRange& range) {

@@ -13,12 +13,12 @@
 #include <vector>
 
 #include "engine/dem/dem_source.h"
-#include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "engine/image/imagery.h"
 #include "proto/gltf/glb_tile.h"
 #include "proto/gltf/texture.h"
 #include "tiler/encoder_version.h"
+#include "tiler/tile/requested_error.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::server {
@@ -28,7 +28,7 @@ namespace terrace::server {
 struct DatasetView {
   std::string name;
   std::string attribution;
-  double error_fraction = geo::kDefaultErrorFraction;
+  tiler::ErrorScale error_scale = {};
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   std::uint64_t generation = 0;           // changes whenever the bytes of its tiles may change
   std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
@@ -47,7 +47,6 @@ struct DatasetView {
   std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};
-  std::optional<int> source_max_level;                 // DemSource::max_source_level; nothing: the deepest level
   int metadata_levels = 0;                             // tiles at multiples of this level have metadata; 0: none
   int min_mercator_depth = 0, max_mercator_depth = 1;  // of the geo::MercatorGrids of height tiles
   // Of height tiles; nothing: `bounds`.
@@ -61,10 +60,6 @@ struct DatasetView {
   // The dataset's part of cache keys.
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
-  // The deepest level of the sources, without edits, as of dem::DemSource. An archive may end above it.
-  int max_source_level() const {
-    return baked_alone ? baked_alone->extent().max_source_level : source_max_level.value_or(max_level());
-  }
 };
 
 struct Catalog {

@@ -116,9 +116,9 @@ class SlowRedis {
 TEST(RedisQueue, RenewsWhatItHoldsWhileAnotherCallIsNotAnswered) {
   SlowRedis redis;
   RedisQueueOptions options;
-  options.place.address.host = "127.0.0.1";
-  options.place.address.port = redis.port();
-  options.place.name = "job";
+  options.job.address.host = "127.0.0.1";
+  options.job.address.port = redis.port();
+  options.job.name = "job";
   options.worker = "worker";
   options.units = {"a", "b"};
   options.find_missing = [] { return std::vector<std::size_t>{0, 1}; };

@@ -53,8 +53,8 @@ void ExpectInLadder(const RequestedError& requested) {
   TERRACE_CHECK(!requested.error_m || (std::isfinite(*requested.error_m) && *requested.error_m > 0));
   TERRACE_CHECK(!requested.fraction || (std::isfinite(*requested.fraction) && *requested.fraction > 0));
   for (const int level : {0, 7, geo::kMaxLevel}) {
-    for (const bool is_deepest : {false, true}) {
-      const int step = ErrorStep(requested, level, is_deepest, geo::kDefaultErrorFraction);
+    for (const int max_source_level : {0, geo::kMaxLevel}) {
+      const int step = ErrorStep(requested, level, {.max_source_level = max_source_level});
       TERRACE_CHECK(step >= geo::kCoarsestStep && step <= geo::kFinestStep);
     }
   }

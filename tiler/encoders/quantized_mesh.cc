@@ -10,7 +10,7 @@
 #include "tiler/encoders.h"
 #include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/tile_mesher.h"
-#include "tiler/surface/drawn_triangles.h"
+#include "tiler/surface/quantized_mesh_triangles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "engine/geo/error_ladder.h"
-
 namespace terrace::tiler {
 namespace {
 
@@ -21,17 +19,6 @@ std::array<float, 3> EastNorthUp(const geo::Vec3& normal, const dem::GeoPosition
 }
 
 }  // namespace
-
-Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction) {
-  if (surface.level && *surface.level > max_level) {
-    return MakeError(ErrorCode::kInvalidArgument, "level: the dataset has levels from 0 to {}", max_level);
-  }
-  if (surface.level) return *surface.level;
-  if (!surface.requested.error_m) return max_level;
-  int level = 0;
-  while (level < max_level && geo::DefaultError(level, error_fraction) > *surface.requested.error_m) ++level;
-  return level;
-}
 
 Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
                                      bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop) {

@@ -5,37 +5,31 @@
 #include <cmath>
 #include <limits>
 
+#include "engine/sight/quadratic.h"
+#include "engine/sight/ray_course.h"
+
 namespace terrace::tiler {
 namespace {
 
 // Metres: within a part of this length a ray is a parabola above the ellipsoid to a micrometre.
 constexpr double kPartLength = 500;
 
-// A value along a part of a ray, by its values at 0, 0.5 and 1: a polynomial of the second degree.
-struct Along {
-  double first, middle, last;
-
-  double At(double s) const {
-    const double a = 2 * (first + last) - 4 * middle;
-    return (a * s + last - first - a) * s + first;
+// The place between `low` and `high` with this value, for At(low) < value <= At(high); `low` may be larger than `high`.
+double Solve(const dem::Quadratic& along, double value, double low, double high) {
+  for (int step = 0; step < 50 && low != high; ++step) {
+    const double half = (low + high) / 2;
+    (along.At(half) < value ? low : high) = half;
   }
-  // The s with At(s) = value, for At(low) < value <= At(high); `low` may be larger than `high`.
-  double Solve(double value, double low, double high) const {
-    for (int step = 0; step < 50 && low != high; ++step) {
-      const double half = (low + high) / 2;
-      (At(half) < value ? low : high) = half;
-    }
-    return high;
-  }
-};
+  return high;
+}
 
 // The clearances of one ray.
 class Clearances {
  public:
-  void Add(const Along& over, double from, double to, double start, double length) {
+  void Add(const dem::Quadratic& over, double from, double to, double start, double length) {
     const auto share = [&](double s) { return start + s * length; };
-    const double a = 2 * (over.first + over.last) - 4 * over.middle, b = over.last - over.first - a;
-    const double vertex = a > 0 ? std::clamp(-b / (2 * a), from, to) : from;
+    const double a = over.curvature();
+    const double vertex = a > 0 ? std::clamp(-over.Slope(0) / (2 * a), from, to) : from;
     for (const double s : {from, vertex, to}) {
       const double clearance_m = over.At(s);
       if (clearance_m < min_) min_ = clearance_m, at_ = share(s);
@@ -46,7 +40,7 @@ class Clearances {
     }
     for (const double s : {vertex, to}) {
       if (over.At(s) >= -dem::kSightTolerance) continue;
-      blocked_at_ = std::min(blocked_at_, share(over.Solve(-dem::kSightTolerance, s, from)));
+      blocked_at_ = std::min(blocked_at_, share(Solve(over, -dem::kSightTolerance, s, from)));
       return;
     }
   }
@@ -89,13 +83,10 @@ Region RegionAt(const DrawnMesh& mesh, const DrawnMesh::Bucket& bucket, const de
           std::min(bucket.north, south + side)};
 }
 
-// Where a ray crosses the borders of regions. The ray is a straight line in space, because its degrees are not smooth
-// at poles.
+// Where the chord of a ray crosses the borders of regions: in space, because degrees along it are not smooth at poles.
 class BorderCrossings {
  public:
-  explicit BorderCrossings(const dem::SightRay& ray)
-      : start_(geo::ToEcef(ray.from.longitude, ray.from.latitude, ray.from.height_m)),
-        way_(geo::ToEcef(ray.to.longitude, ray.to.latitude, ray.to.height_m) - start_) {}
+  explicit BorderCrossings(const dem::RayCourse& ray) : start_(ray.start()), way_(ray.way()) {}
 
   // The first place after `share` where the ray may leave a region, as a share of its length; infinity if there is
   // none. The ray may also stay in the region there: the opposite meridian and the mirror image of a parallel count
@@ -131,7 +122,7 @@ class BorderCrossings {
     add(c / q);
   }
 
-  geo::Vec3 start_, way_;
+  const geo::Vec3 start_, way_;
 };
 
 // Follows rays over the meshes of tiles.
@@ -144,14 +135,15 @@ class MeshWalk {
   // Divides a ray where it leaves a region.
   Result<dem::SightAnswer> Look(const dem::SightRay& ray) {
     Clearances clearances;
-    const BorderCrossings borders(ray);
-    const double length_m = dem::LengthOf(ray);
+    const dem::RayCourse course(ray, options_);
+    const BorderCrossings borders(course);
+    const double length_m = course.length_m();
     const double min_step = length_m > 0 ? std::min(1.0, kMinStep / length_m) : 1;
     for (double share = 0; share < 1;) {
       // Near a pole a ray crosses many regions.
       if (stop_.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
       const double just_after = std::min(1.0, share + min_step / 2);  // not on the border where the part begins
-      const dem::GeoPosition here = PlaceAt(ray, just_after);
+      const dem::GeoPosition here = PlaceAt(course, just_after);
       const Result<std::uint32_t> tile = tiles_.numbers().NumberAt(here);
       if (!tile) return tl::unexpected(tile.error());
       const Result<const DrawnMesh*> mesh = tiles_.MeshOf(*tile);
@@ -159,9 +151,10 @@ class MeshWalk {
       const DrawnMesh::Bucket bucket = (*mesh)->BucketAt(here);
       const Region region = RegionAt(**mesh, bucket, here, tiles_.numbers().level());
       double next = std::min({1.0, share + kPartLength / length_m, borders.Next(region, just_after)});
-      while (next - share > min_step && !region.Contains(PlaceAt(ray, (share + next) / 2))) next = (share + next) / 2;
+      while (next - share > min_step && !region.Contains(PlaceAt(course, (share + next) / 2)))
+        next = (share + next) / 2;
       next = std::min(1.0, std::max(next, share + min_step));
-      const Result<void> added = AddPart(ray, {share, next}, *tile, **mesh, bucket.triangles, clearances);
+      const Result<void> added = AddPart(course, {share, next}, *tile, **mesh, bucket.triangles, clearances);
       if (!added) return tl::unexpected(added.error());
       share = next;
     }
@@ -176,17 +169,17 @@ class MeshWalk {
     double At(double s) const { return from + s * (to - from); }
   };
 
-  dem::GeoPosition PlaceAt(const dem::SightRay& ray, double share) const {
-    const dem::SightPoint point = dem::PointAt(ray, share, options_);
+  static dem::GeoPosition PlaceAt(const dem::RayCourse& ray, double share) {
+    const dem::SightPoint point = ray.At(share);
     return {point.longitude, point.latitude};
   }
 
   // `triangles` lie over the part, which is short enough that heights and barycentric coordinates along it are
   // polynomials of the second degree.
-  Result<void> AddPart(const dem::SightRay& ray, const Interval& part, std::uint32_t tile, const DrawnMesh& mesh,
+  Result<void> AddPart(const dem::RayCourse& ray, const Interval& part, std::uint32_t tile, const DrawnMesh& mesh,
                        std::span<const std::uint32_t> triangles, Clearances& clearances) {
     std::array<dem::SightPoint, 3> points;
-    for (std::size_t i = 0; i < 3; ++i) points[i] = dem::PointAt(ray, part.At(static_cast<double>(i) / 2), options_);
+    for (std::size_t i = 0; i < 3; ++i) points[i] = ray.At(part.At(static_cast<double>(i) / 2));
     const auto place = [&](std::size_t i) { return dem::GeoPosition{points[i].longitude, points[i].latitude}; };
     covered_.clear();
     constexpr double kSlack = DrawnMesh::kSlack;
@@ -196,13 +189,13 @@ class MeshWalk {
       if (!first || !middle || !last) continue;
       Interval over{0, 1};
       for (std::size_t k = 0; k < 3 && over.from <= over.to; ++k) {
-        const Along inside{first->inside[k] + kSlack, middle->inside[k] + kSlack, last->inside[k] + kSlack};
+        const dem::Quadratic inside{first->inside[k] + kSlack, middle->inside[k] + kSlack, last->inside[k] + kSlack};
         if (inside.At(over.from) < 0 && inside.At(over.to) < 0) over.from = 2;
         if (over.from > over.to) break;
         if (inside.At(over.from) < 0) {
-          over.from = inside.Solve(0, over.from, over.to);
+          over.from = Solve(inside, 0, over.from, over.to);
         } else if (inside.At(over.to) < 0) {
-          over.to = inside.Solve(0, over.to, over.from);
+          over.to = Solve(inside, 0, over.to, over.from);
         }
       }
       if (over.from > over.to) continue;
@@ -211,8 +204,8 @@ class MeshWalk {
         clearances.AddGap();
         continue;
       }
-      const Along clearance{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
-                            points[2].height_m - last->height_m};
+      const dem::Quadratic clearance{points[0].height_m - first->height_m, points[1].height_m - middle->height_m,
+                                     points[2].height_m - last->height_m};
       clearances.Add(clearance, over.from, over.to, part.from, part.to - part.from);
     }
     std::ranges::sort(covered_, {}, &Interval::from);
@@ -230,10 +223,10 @@ class MeshWalk {
 
   // A part above none of the triangles: beside the tile's edge, within the distance of a chord from its parallel, in a
   // hole, or where the list lacks a triangle.
-  Result<void> AddBare(const dem::SightRay& ray, const Interval& part, std::uint32_t tile, Clearances& clearances) {
+  Result<void> AddBare(const dem::RayCourse& ray, const Interval& part, std::uint32_t tile, Clearances& clearances) {
     std::array<double, 3> over{};
     for (std::size_t i = 0; i < 3; ++i) {
-      const dem::SightPoint point = dem::PointAt(ray, part.At(static_cast<double>(i) / 2), options_);
+      const dem::SightPoint point = ray.At(part.At(static_cast<double>(i) / 2));
       const Result<DrawnTiles::Reading> read = tiles_.ReadAt({point.longitude, point.latitude}, tile, stop_);
       if (!read) return tl::unexpected(read.error());
       over[i] = point.height_m - read->point.height_m;

@@ -7,7 +7,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "tiler/surface/drawn_points.h"
+#include "tiler/surface/drawn_tiles.h"
 
 namespace terrace::tiler {
 

@@ -4,6 +4,9 @@
 #include <optional>
 #include <span>
 
+#include "engine/geo/error_ladder.h"
+#include "engine/geo/tile_key.h"
+
 namespace terrace::tiler {
 
 // All members are optional.
@@ -13,11 +16,16 @@ struct RequestedError {
   bool at_least = false;           // the larger of error_m and the level's default error is used
 };
 
-// The step on the level's ladder for a requested error. `is_deepest`: the level is the deepest of the
-// sources, or one that edits added below it. Finer levels add no detail of the sources, so `atleast` does not limit its
-// tiles to their default error. `default_steps`: by level, the steps
-// if no error is requested; 0 beyond (BakedExtent::error_steps).
-int ErrorStep(const RequestedError& requested, int level, bool is_deepest, double error_fraction,
-              std::span<const int> default_steps = {});
+// What a dataset's steps depend on besides the request.
+struct ErrorScale {
+  double fraction = geo::kDefaultErrorFraction;  // the default error of a level over the level's error
+  // The deepest level of the sources; edits may add deeper ones. From it on tiles have all detail of the sources, so
+  // RequestedError::at_least does not keep their error at the default one.
+  int max_source_level = geo::kMaxLevel;
+  std::span<const int> default_steps = {};  // by level, of requests without an error; 0 beyond
+};
+
+// Returns the step of the level's ladder for a requested error.
+int ErrorStep(const RequestedError& requested, int level, const ErrorScale& scale);
 
 }  // namespace terrace::tiler

@@ -56,15 +56,15 @@ std::string NameInQueue(const bake::UnitPlan::Entry& entry, const std::vector<ba
 void PrintMessage(const std::string& message) { std::fprintf(stderr, "terrace: %s\n", message.c_str()); }
 
 Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
-  auto place = JobConnectionOf(bake.arguments);
-  if (!place) return tl::unexpected(place.error());
+  auto job = JobAddressOf(bake.arguments);
+  if (!job) return tl::unexpected(job.error());
   const auto place_id = bake::PlaceId(bake.place);
   if (!place_id) return tl::unexpected(place_id.error());
   const tiler::Dataset& dataset = bake.pipeline.datasets().front();
   const archive::Manifest& manifest = bake.targets.front().manifest;
   bake::RedisQueueOptions options;
-  options.place = *std::move(place);
-  options.place.stop = bake.options.stop;
+  options.job = *std::move(job);
+  options.job.stop = bake.options.stop;
   for (const auto& [what, value] : bake.identity.fields) options.identity.emplace_back(what, value);
   options.identity.emplace_back("program", manifest.product);
   options.identity.emplace_back("encoders and libraries", manifest.encoder);
@@ -124,19 +124,19 @@ int ListDead(const QueuedBake& bake, bake::RedisQueue& queue) {
 
 }  // namespace
 
-Result<bake::JobConnection> JobConnectionOf(const BakeArguments& arguments) {
-  bake::JobConnection place;
+Result<bake::JobAddress> JobAddressOf(const BakeArguments& arguments) {
+  bake::JobAddress job;
   if (auto checked = bake::CheckJobName(arguments.job); !checked) return tl::unexpected(checked.error());
   auto address = redis::ParseAddress(arguments.queue);
   if (!address) return MakeError(ErrorCode::kInvalidArgument, "--queue: {}", address.error().message);
   auto password = PasswordOf(arguments);
   if (!password) return tl::unexpected(password.error());
-  place.address = *std::move(address);
-  if (!password->empty()) place.address.password = *std::move(password);
-  place.ca_file = arguments.queue_ca;
-  place.name = arguments.job;
-  place.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(arguments.queue_timeout * 1000));
-  return place;
+  job.address = *std::move(address);
+  if (!password->empty()) job.address.password = *std::move(password);
+  job.ca_file = arguments.queue_ca;
+  job.name = arguments.job;
+  job.timeout = std::chrono::milliseconds(static_cast<std::int64_t>(arguments.queue_timeout * 1000));
+  return job;
 }
 
 std::string Shown(const std::string& text) {

@@ -14,7 +14,7 @@
 namespace terrace::cli {
 
 // How to reach the job, with its credentials. kInvalidArgument: the flags are wrong; the message has no secret.
-Result<bake::JobConnection> JobConnectionOf(const BakeArguments& arguments);
+Result<bake::JobAddress> JobAddressOf(const BakeArguments& arguments);
 
 // What Redis says of a unit or a worker, for people: anybody may have written it. At most 200 bytes, without control
 // characters.

@@ -76,21 +76,21 @@ std::string StatusText(const bake::JobStatus& status, const std::string& job) {
 
 int ShowStatus(const BakeArguments& arguments, const StatusView& view) {
   std::signal(SIGPIPE, SIG_IGN);
-  const auto place = JobConnectionOf(arguments);
-  if (!place) return Fail(place.error());
+  const auto job = JobAddressOf(arguments);
+  if (!job) return Fail(job.error());
   std::unique_ptr<redis::Connection> connection;
   const bool is_screen = view.watch && !view.json && ::isatty(STDOUT_FILENO) != 0;
   while (true) {
     if (!connection) {
-      auto connected = bake::ConnectToJob(*place);
+      auto connected = bake::ConnectToJob(*job);
       if (!connected) return Fail(connected.error());
       connection = *std::move(connected);
     }
     if (view.remove) {
-      const auto removed = bake::RemoveJob(*connection, *place);
+      const auto removed = bake::RemoveJob(*connection, *job);
       return removed ? kExitOk : Fail(removed.error());
     }
-    const auto status = bake::ReadJobStatus(*connection, *place);
+    const auto status = bake::ReadJobStatus(*connection, *job);
     if (!status) return Fail(status.error());
     if (is_screen) fmt::print("\033[H\033[2J");
     fmt::print("{}", view.json ? StatusJson(*status, arguments.job) + "\n" : StatusText(*status, arguments.job));

@@ -76,7 +76,8 @@ TEST(FillVoids, IsTheMeanOfPairsByDefinition) {
       for (const int gap : {2, 5, 16, 64, 4096}) {
         std::vector<float> heights(static_cast<std::size_t>(columns * rows), kVoid);
         for (float& height : heights) {
-          if (random() > share_of_voids * random.max()) height = static_cast<float>(random() % 1000) / 7;
+          if (static_cast<double>(random()) > share_of_voids * static_cast<double>(random.max()))
+            height = static_cast<float>(random() % 1000) / 7;
         }
         const std::vector<float> filled = FillVoids(heights, whole, whole, gap);
         for (int i = 0; i < columns * rows; ++i) {

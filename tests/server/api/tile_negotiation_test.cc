@@ -94,6 +94,7 @@ TEST(NegotiateTile, GivesNoExtensionThatTheTileHasNot) {
   datasets[1].name = "wet";
   datasets[1].has_water = true;
   datasets[1].metadata_levels = 2;
+  datasets[1].error_scale.max_source_level = 2;
   for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
   Request request;
   request.fields.Set(&RequestFields::accept, "a/b;extensions=octvertexnormals-watermask-metadata");
@@ -119,19 +120,19 @@ RequestedError Requested(std::optional<double> error_m, bool at_least = false, s
 
 TEST(NegotiateTile, PutsErrorsOnTheLadder) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Requested({}), 10, false, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Requested(d), 10, false, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Requested(d * 0.99), 10, false, 0.5), 1) << "down, never up";
-  EXPECT_EQ(ErrorStep(Requested(d / 2), 10, false, 0.5), 4);
-  EXPECT_EQ(ErrorStep(Requested(d * 4), 10, false, 0.5), -8);
-  EXPECT_EQ(ErrorStep(Requested(1e308), 24, false, 0.5), geo::kCoarsestStep);
-  EXPECT_EQ(ErrorStep(Requested(5e-324), 0, false, 0.5), geo::kFinestStep);
+  EXPECT_EQ(ErrorStep(Requested({}), 10, {}), 0);
+  EXPECT_EQ(ErrorStep(Requested(d), 10, {}), 0);
+  EXPECT_EQ(ErrorStep(Requested(d * 0.99), 10, {}), 1) << "down, never up";
+  EXPECT_EQ(ErrorStep(Requested(d / 2), 10, {}), 4);
+  EXPECT_EQ(ErrorStep(Requested(d * 4), 10, {}), -8);
+  EXPECT_EQ(ErrorStep(Requested(1e308), 24, {}), geo::kCoarsestStep);
+  EXPECT_EQ(ErrorStep(Requested(5e-324), 0, {}), geo::kFinestStep);
 }
 
 TEST(NegotiateTile, AtLeastNeverGoesBelowTheDefault) {
   const double d = geo::DefaultError(10);
-  EXPECT_EQ(ErrorStep(Requested(d / 8, true), 10, false, 0.5), 0);
-  EXPECT_EQ(ErrorStep(Requested(d * 2, true), 10, false, 0.5), -4);
+  EXPECT_EQ(ErrorStep(Requested(d / 8, true), 10, {}), 0);
+  EXPECT_EQ(ErrorStep(Requested(d * 2, true), 10, {}), -4);
 }
 
 // No finer level follows the deepest one, so without this rule layer.json?error=E would never show E. A tile of another
@@ -141,6 +142,7 @@ TEST(NegotiateTile, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
   std::array<DatasetView, 1> datasets;
   datasets[0].name = "maui";
   datasets[0].available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 1, 1}}};
+  datasets[0].error_scale.max_source_level = 2;
   const auto error = [&](const std::string& target) {
     const Result<tiler::TileRequest> tile = NegotiateTile(TestContext(target).context, datasets);
     EXPECT_TRUE(tile) << target;
@@ -158,21 +160,20 @@ TEST(NegotiateTile, AtLeastGivesTheErrorAskedForAtTheDeepestLevel) {
 
 TEST(NegotiateTile, AFractionScalesEveryLevelAlike) {
   for (int level = 0; level <= 20; ++level) {
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.5), level, false, 0.5), 0);
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, false, 0.5), 4);
-    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, false, 0.25), 0);
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.5), level, {}), 0);
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, {}), 4);
+    EXPECT_EQ(ErrorStep(Requested({}, false, 0.25), level, {.fraction = 0.25}), 0);
   }
-  EXPECT_EQ(ErrorStep(Requested({}, false, 1e308), 0, false, 0.5), geo::kCoarsestStep) << "the product overflows";
-  EXPECT_EQ(ErrorStep(Requested({}, false, 5e-324), 24, false, 0.5), geo::kFinestStep) << "the product underflows";
+  EXPECT_EQ(ErrorStep(Requested({}, false, 1e308), 0, {}), geo::kCoarsestStep) << "the product overflows";
+  EXPECT_EQ(ErrorStep(Requested({}, false, 5e-324), 24, {}), geo::kFinestStep) << "the product underflows";
 }
 
 // A million requested errors must not make a million cache entries.
 TEST(NegotiateTile, ComesToFortyOneErrorsAtMost) {
   constexpr int kErrors = 1'000'000;
   std::set<int> steps;
-  for (int i = 0; i < kErrors; ++i)
-    steps.insert(ErrorStep(Requested(std::exp2(-400 + 800.0 * i / kErrors)), 7, false, 0.5));
-  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(i * 0.01 + 0.003), 7, false, 0.5));
+  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(std::exp2(-400 + 800.0 * i / kErrors)), 7, {}));
+  for (int i = 0; i < kErrors; ++i) steps.insert(ErrorStep(Requested(i * 0.01 + 0.003), 7, {}));
   EXPECT_EQ(*steps.begin(), geo::kCoarsestStep);
   EXPECT_EQ(*steps.rbegin(), geo::kFinestStep);
   RecordProperty("errors", 2 * kErrors);
@@ -324,9 +325,10 @@ TEST(NegotiateTile, AParentIsAtMostTwiceAsCoarse) {
     for (double error_m = 1e-5; error_m < 1e8; error_m *= 1.31) {
       for (const RequestedError& requested : {RequestedError{error_m, {}, false}, RequestedError{error_m, {}, true},
                                               RequestedError{{}, error_m / 1000, false}, RequestedError{}}) {
-        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(requested, at, false, 0.5), 0.5); };
+        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(requested, at, {}), 0.5); };
         EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << error_m;
-        const double skirt = proto::SkirtError(level, ErrorStep(requested, level, true, 0.5), true, 0.5);
+        const double skirt =
+            proto::SkirtError(level, ErrorStep(requested, level, {.max_source_level = level}), true, 0.5);
         EXPECT_LE(error(level - 1), 2 * skirt * (1 + 1e-12)) << "deepest: " << level << ", " << error_m;
       }
     }

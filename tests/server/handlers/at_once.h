@@ -38,7 +38,7 @@ class TestHandlers : private ProcessState {
   TileService tiles_;
 
  public:
-  const Handlers all;
+  const HandlerState all;
 };
 
 inline Response AtOnce(DocumentAnswer described, const Request& request) {

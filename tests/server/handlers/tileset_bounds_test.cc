@@ -67,7 +67,7 @@ class TilesetBoundsTest : public testing::Test {
   std::string Get(const std::string& target) {
     const TestContext sent("/earth/" + target);
     const bool is_subtree = sent.context.route.row->label == "subtree";
-    const Handlers& from = handlers_->all;
+    const HandlerState& from = handlers_->all;
     const Response response =
         AtOnce(is_subtree ? DescribeSubtree(from, sent.context) : DescribeTileset(from, sent.context), sent.request);
     EXPECT_EQ(response.status, 200) << target;

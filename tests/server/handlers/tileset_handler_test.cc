@@ -173,7 +173,7 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
     RequestedError requested;
     if (query.starts_with("?e")) requested = {.error_m = 600, .fraction = {}, .at_least = true};
     if (query.starts_with("?f")) requested.fraction = 0.02;
-    const int step = ErrorStep(requested, 12, true, 0.5);
+    const int step = ErrorStep(requested, 12, {.max_source_level = 12});
     const double error_m = geo::LadderError(12, step);
     const double lowest = -120 - proto::SkirtDepth(12, proto::SkirtError(12, step, true, 0.5));
     EXPECT_LE(read->min_heights[341], lowest) << query;

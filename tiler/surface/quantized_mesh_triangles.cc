@@ -1,4 +1,4 @@
-#include "tiler/surface/drawn_triangles.h"
+#include "tiler/surface/quantized_mesh_triangles.h"
 
 #include <array>
 #include <cstdint>

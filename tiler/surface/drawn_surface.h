@@ -1,0 +1,25 @@
+// Which drawn surface a request names: the meshes that clients decode at some level and error.
+#pragma once
+
+#include <optional>
+
+#include "engine/core/result.h"
+#include "proto/gltf/glb_tile.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
+
+namespace terrace::tiler {
+
+// The surface to read. The error and the rest are those of a tile's URL.
+struct DrawnSurface {
+  std::optional<int> level;  // nothing: LevelOf chooses the first level whose default error is at most the requested
+                             // one, or the deepest
+  RequestedError requested;
+  TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb
+  proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
+};
+
+// Level of the surface. kInvalidArgument: the dataset has no such level.
+Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction);
+
+}  // namespace terrace::tiler
