@@ -95,7 +95,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
     return writer->Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile.tile, tile.range);
   });
   if (!copied) return copied;
-  const Result<UnitFile> written = writer->Finish(SingleMetadata(manifest));
+  const Result<FileSummary> written = writer->Finish(SingleMetadata(manifest));
   if (!written) return tl::unexpected(written.error());
   return {};
 }

@@ -33,7 +33,7 @@ class PmtilesUnitWriter final : public UnitWriter {
     return writer_.Add(TileIdOf(PmtilesKeyOf(key, is_mercator)), tile, range);
   }
 
-  Result<UnitFile> Finish() override { return writer_.Finish(UnitMetadata(options_.kind, options_.key)); }
+  Result<FileSummary> Finish() override { return writer_.Finish(UnitMetadata(options_.kind, options_.key)); }
 
  private:
   const std::string name_;
@@ -78,7 +78,7 @@ Result<std::unique_ptr<UnitWriter>> CreateUnit(const std::string& place, const s
   return std::make_unique<PmtilesUnitWriter>(name, options, *std::move(writer));
 }
 
-Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {
+Result<FileSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options) {
   const std::string path = place + "/" + UnitPath(name);
   const auto as_damaged = [](Error error) {
     if (error.code == ErrorCode::kUnavailable) error.code = ErrorCode::kInvalidArgument;
@@ -94,7 +94,7 @@ Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, c
     return MakeError(ErrorCode::kInvalidArgument, "{} was baked from other sources or with other options", path);
   }
   const bool is_mercator = tiler::IsMercator(options.kind.format);
-  UnitFile unit_file;
+  FileSummary unit_file;
   const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const ArchivedTile&) -> Result<void> {
     const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
     if (!key || UnitNameOf(*key) != name) {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "archive/manifest.h"
-#include "archive/pmtiles/unit_file.h"
+#include "archive/pmtiles/file_summary.h"
 #include "archive/unit_name.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
@@ -31,7 +31,7 @@ class UnitWriter {
   // Writes the file and renames it. Call it once, last; the file is complete and on the disk afterwards. Without tiles
   // no file is written, and an old one is removed. kUnavailable: as Add.
   // kInvalidArgument: a tile was added twice.
-  virtual Result<UnitFile> Finish() = 0;
+  virtual Result<FileSummary> Finish() = 0;
 };
 
 struct UnitOptions {
@@ -47,6 +47,6 @@ Result<std::unique_ptr<UnitWriter>> CreateUnit(const std::string& place, const s
 // Reads a finished file in full: every checksum, whether its tiles belong to the unit, and whether header and metadata
 // are those that a writer with these options writes. A bake that continues uses it. kNotFound: no file.
 // kInvalidArgument: the file is of another bake, or damaged: bake the unit again.
-Result<UnitFile> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
+Result<FileSummary> VerifyUnit(const std::string& place, const std::string& name, const UnitOptions& options);
 
 }  // namespace terrace::archive

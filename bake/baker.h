@@ -27,8 +27,9 @@ struct Target {
   // The older archive whose units with equal keys are copied: its folder, and its units by name.
   std::string old_place = {};
   std::map<std::string, archive::UnitEntry> old_units = {};
-  // Where the tiles go instead of to files in `place`. `create` makes the writer of a unit; one thread at a time
-  // calls it. Tiles for which `has` returns true exist already and are not built. Both empty: files in `place`.
+  // Where the tiles go instead of to files in `place`. `create` makes the writer of a unit; several threads
+  // may call it at once, and one at a time uses the writer. Tiles for which `has` returns true exist already and are
+  // not built. Both empty: files in `place`.
   std::function<Result<std::unique_ptr<archive::UnitWriter>>()> create = {};
   std::function<bool(const tiler::TileRequest&)> has = {};
 };

@@ -10,7 +10,7 @@
 
 namespace terrace::bake {
 
-Result<archive::UnitFile> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry) {
+Result<archive::FileSummary> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry) {
   const std::string source = from + "/" + archive::UnitPath(entry.name);
   const Result<std::unique_ptr<const archive::InputFile>> in = archive::InputFile::Open(source);
   if (!in) return tl::unexpected(in.error());
@@ -26,7 +26,7 @@ Result<archive::UnitFile> CopyUnit(const std::string& from, const std::string& t
     return MakeError(ErrorCode::kInvalidArgument, "{}: is not the file that its manifest describes", source);
   }
   if (auto finished = out->Finish(); !finished) return tl::unexpected(finished.error());
-  return archive::UnitFile{entry.tiles, entry.bytes, entry.xxh3};
+  return archive::FileSummary{entry.tiles, entry.bytes, entry.xxh3};
 }
 
 }  // namespace terrace::bake

@@ -13,6 +13,6 @@ namespace terrace::bake {
 // manifest, describes. The new file appears when it is complete. kNotFound: the old file is missing. kInvalidArgument:
 // it is another file. In both cases bake the unit. kUnavailable: the old file cannot be read, or the new place cannot
 // be written.
-Result<archive::UnitFile> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry);
+Result<archive::FileSummary> CopyUnit(const std::string& from, const std::string& to, const archive::UnitEntry& entry);
 
 }  // namespace terrace::bake

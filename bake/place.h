@@ -1,4 +1,4 @@
-// The place of a bake: a folder that holds this bake, finished or not, or nothing.
+// The place of a bake: a folder or a bucket that is empty, or has this bake, finished or not.
 #pragma once
 
 #include <cstdint>

@@ -5,20 +5,31 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
+#include "proto/lattice_view.h"
+#include "tiler/dataset.h"
+#include "tiler/store/refined_tile.h"
 #include "tiler/surface/drawn_mesh.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 
-struct EncodedTile;   // tile/encoded_tile.h
-struct EncoderInput;  // tile_pipeline.h
+struct EncodedTile;  // tile/encoded_tile.h
+
+// What an encoder makes a tile from.
+struct EncoderInput {
+  proto::LatticeView lattice() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
+
+  const Dataset& dataset;
+  const TileRequest& request;
+  const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
+  double error_m = 0;                    // the bound that the mesh keeps
+};
 
 struct Encoder {
   TileFormat format;
   bool needs_refinement;
-  // Sets the bytes and times.encode. Meshes and height PNGs also set the errors; meshes set counts, and add to
-  // times.refine. Formats without a
-  // refinement also set `refinement` to kNone, and times.read.
+  // Sets the bytes and times.encode. Meshes also set both errors and the counts, and add to times.refine. Height PNGs
+  // set max_error_m. Formats without a refinement set refinement_use to kNone, and times.read.
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 

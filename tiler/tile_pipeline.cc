@@ -4,17 +4,15 @@
 #include <iterator>
 #include <utility>
 
-#include "engine/common/content_hash.h"
 #include "engine/core/check.h"
 #include "engine/core/elapsed_time.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
-#include "tiler/map/contour_tile.h"
-#include "tiler/map/map_heights.h"
-#include "tiler/map/relief.h"
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/node_error_bound.h"
+#include "tiler/mesh/refine_options.h"
+#include "tiler/mesh/tile_mesher.h"
 #include "tiler/surface/drawn_points.h"
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/quantized_mesh_triangles.h"
@@ -62,47 +60,7 @@ HasTile TilesOf(const Dataset& dataset) {
   return [&available = AvailableIn(dataset)](const geo::TileKey& key) { return geo::IsAvailable(available, key); };
 }
 
-// Combines two hashes; 0 if both are 0.
-std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
-  if (edits == 0 || deeper == 0) return edits | deeper;
-  dem::ContentHasher hasher;
-  hasher.Add(edits);
-  hasher.Add(deeper);
-  return hasher.Hash().low | 1;
-}
-
 }  // namespace
-
-ErrorScale Dataset::error_scale() const {
-  if (source) return {error_fraction, source->max_source_level()};
-  return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
-}
-
-std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request) {
-  int size = request.side_px, margin = 0;
-  switch (request.format) {
-    case TileFormat::kQuantizedMesh:
-    case TileFormat::kGlb:
-      return request.extensions.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
-                                         : source.EditsHash(request.key);
-    case TileFormat::kImagery:
-    case TileFormat::kGeodeticImagery:
-      return 0;
-    case TileFormat::kHeightPng:
-      break;
-    case TileFormat::kHillshade:
-    case TileFormat::kSlope:
-      margin = kReliefMargin;
-      break;
-    case TileFormat::kContours:
-      size = kSidesPx[0];
-      margin = kContourMargin;
-      break;
-  }
-  const MapWindow window(request.key, size, margin);
-  if (window.depth > source.info().max_mercator_depth) return 0;
-  return source.MercatorEditsHash(window.depth, window.nodes);
-}
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
     : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
@@ -117,9 +75,9 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
                                             EncodedTile& encoded, const std::stop_token& stop) const {
   const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.source->EditsHash(key)};
   const RefinedTilePtr known = refinements_->Find(cache_key);
-  if (known) encoded.refinement = RefinementUse::kContinued;
+  if (known) encoded.refinement_use = RefinementUse::kContinued;
   if (known && known->error_m <= error_m) {
-    encoded.refinement = RefinementUse::kReplayed;
+    encoded.refinement_use = RefinementUse::kReplayed;
     return known;
   }
 

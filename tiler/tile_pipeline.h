@@ -1,4 +1,4 @@
-// Builds a tile: from a request to bytes, in one blocking function.
+// Makes what is served of datasets: tiles, heights and normals at points, lines of sight, meshes of areas. Blocking.
 #pragma once
 
 #include <array>
@@ -12,14 +12,8 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "engine/image/imagery.h"
-#include "engine/image/water_raster.h"
-#include "proto/gltf/glb_tile.h"
-#include "proto/gltf/texture.h"
-#include "proto/lattice_view.h"
 #include "tiler/area/area_mesh.h"
-#include "tiler/mesh/tile_mesher.h"
-#include "tiler/store/baked_tiles.h"
+#include "tiler/dataset.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/surface/drawn_mesh_cache.h"
@@ -27,69 +21,9 @@
 #include "tiler/surface/drawn_tiles.h"
 #include "tiler/surface/point_heights.h"
 #include "tiler/tile/encoded_tile.h"
-#include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
-
-// The source of a dataset's water: a mask, a sea level, or none. At most one is set.
-struct WaterOptions {
-  std::shared_ptr<const dem::WaterRaster> mask;
-  std::optional<double> sea_level_m;  // in the source's vertical datum
-
-  bool any() const { return mask != nullptr || sea_level_m.has_value(); }
-};
-
-// The source and encoding of textures of GLB tiles.
-struct ImageryOptions {
-  std::shared_ptr<const dem::Imagery> image;                   // null: none
-  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
-  int side = 512;                                              // pixels along a tile's edge, at most
-  int quality = 80;                                            // of EncodePicture
-  std::string attribution;
-};
-
-// A file that a dataset was opened from, and its stamp from before it was opened.
-struct WatchedFile {
-  std::string path;
-  std::optional<dem::FileStamp> stamp;  // nullopt: there was none
-};
-
-// One served dataset. Copies share the source, water and imagery, which are immutable: a reload keeps a dataset that
-// has not changed.
-struct Dataset {
-  std::string name;
-  std::string attribution;
-  double error_fraction = 0.5;
-  MeshOptions mesh_options;
-  proto::GlbOptions glb;                         // compression: for GLB requests that name none
-  std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
-  std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
-  std::vector<WatchedFile> baked_files;          // a change of one of them means that there is another archive
-  WaterOptions water;
-  ImageryOptions imagery;
-  int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
-  std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
-  // The same without edits; 0: there are none. Caches are keyed by it and by TileEditsHash: tiles that no edit touches
-  // stay.
-  std::uint64_t unedited_generation = 0;
-  std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
-  ErrorScale error_scale() const;
-  std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
-};
-
-// A hash of the edits that the tile of a request depends on; 0: none.
-std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request);
-
-// What an encoder (encoders.h) makes a tile from.
-struct EncoderInput {
-  proto::LatticeView lattice() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
-
-  const Dataset& dataset;
-  const TileRequest& request;
-  const RefinedTile* refined = nullptr;  // null: the format needs none, and reads what it needs
-  double error_m = 0;                    // the bound that the mesh keeps
-};
 
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
 // that compute results are virtual, so that tests can replace them.
@@ -111,7 +45,8 @@ class TilePipeline {
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
   // kNotFound: no such dataset, a tile outside availability, or, in a dataset without sources, a tile that its archive
-  // lacks. kUnavailable: the source cannot be read now. kCancelled: `stop` was requested.
+  // lacks. kUnavailable: the source cannot be read now. kChanged: a file of the source was replaced, so the dataset has
+  // to be opened again. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // DemSource::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.

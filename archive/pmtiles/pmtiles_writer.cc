@@ -151,10 +151,10 @@ Result<void> PmtilesWriter::WriteTiles(OutputFile& out, const std::vector<std::u
   return {};
 }
 
-Result<UnitFile> PmtilesWriter::Finish(std::string_view metadata) {
+Result<FileSummary> PmtilesWriter::Finish(std::string_view metadata) {
   if (waiting_.empty()) {
     ::unlink(path_.c_str());
-    return UnitFile{};
+    return FileSummary{};
   }
   std::ranges::sort(waiting_, {}, &Waiting::tile_id);
   if (const auto twice = std::ranges::adjacent_find(waiting_, {}, &Waiting::tile_id); twice != waiting_.end()) {
@@ -189,7 +189,7 @@ Result<UnitFile> PmtilesWriter::Finish(std::string_view metadata) {
   }
   if (Result<void> written = WriteTiles(*out, offsets); !written) return tl::unexpected(std::move(written.error()));
   if (Result<void> done = out->Finish(); !done) return tl::unexpected(std::move(done.error()));
-  return UnitFile{waiting_.size(), out->size(), out->xxh3()};
+  return FileSummary{waiting_.size(), out->size(), out->xxh3()};
 }
 
 }  // namespace terrace::archive

@@ -8,7 +8,7 @@
 
 #include "archive/files/output_file.h"
 #include "archive/pmtiles/directory.h"
-#include "archive/pmtiles/unit_file.h"
+#include "archive/pmtiles/file_summary.h"
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "tiler/tile/encoded_tile.h"
@@ -30,7 +30,7 @@ class PmtilesWriter {
   Result<void> Add(std::uint64_t tile_id, const tiler::EncodedTile& tile, const dem::HeightRange& range);
 
   // `metadata`: JSON. Without tiles removes the file. kInvalidArgument: a tile was added twice.
-  Result<UnitFile> Finish(std::string_view metadata);
+  Result<FileSummary> Finish(std::string_view metadata);
 
  private:
   struct Waiting {

@@ -19,7 +19,7 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::AddHeights for a window. If `part` is set, the trace covers that part only and has no
+// The trace of RasterGrid::SetHeights for a window. If `part` is set, the trace covers that part only and has no
 // positions.
 struct PartTrace {
   std::optional<NodeWindow> part = {};

@@ -1,4 +1,5 @@
-// Reads heights of a dataset: each node takes its height from the first raster grid that has one, else the floor.
+// Reads heights of a dataset: each node takes its height from the first raster grid that has one, blended with those
+// below where grids have a feather, else the floor.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -72,14 +73,14 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// RasterGrid::AddHeights. If there are many raster grids, only for the part of the window that this one reaches: a
+// RasterGrid::SetHeights. If there are many raster grids, only for the part of the window that this one reaches: a
 // shallow tile may have thousands of small ones, and their traces are kept until all heights are known.
 template <typename NodeGrid>
-Result<void> AddHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window,
+Result<void> SetHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window,
                           std::size_t grids, HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop,
                           PartTrace* traced) {
   GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return grid.AddHeights(node_grid, window, datum, nodes, stop, trace);
+  if (grids <= kFewGrids) return grid.SetHeights(node_grid, window, datum, nodes, stop, trace);
   const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0 : Area(part.columns, part.rows));
@@ -92,7 +93,7 @@ Result<void> AddHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, con
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth;
   if (nodes.smooth != nullptr) smooth = copy(*nodes.smooth);
   const auto filled =
-      grid.AddHeights(node_grid, part, datum,
+      grid.SetHeights(node_grid, part, datum,
                       {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, trace);
   if (!filled) return filled;
   copy_back(heights, nodes.heights);
@@ -197,7 +198,7 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
       weights.assign(nodes, 1);
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
-    const auto filled = AddHeightsOf(grids[i], node_grid, window, order.size(), datum,
+    const auto filled = SetHeightsOf(grids[i], node_grid, window, order.size(), datum,
                                      {heights, weights, &smooth, are_void}, stop, trace);
     if (!filled) {
       return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
@@ -293,7 +294,7 @@ Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWi
     if (none_wanted.empty()) none_wanted = tile.heights;
     PartTrace traced;
     const auto filled =
-        AddHeightsOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
+        SetHeightsOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
     if (!filled) return tl::unexpected(filled.error());
     const GridTrace trace = Widened(std::move(traced), grid, tile.lattice, window);
     if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
@@ -382,7 +383,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
     std::ranges::fill(marks, std::uint8_t{0});
-    const auto read = grids.front().AddPointHeights(points, datum, {heights, {}, &smooth}, marks, stop);
+    const auto read = grids.front().SetPointHeights(points, datum, {heights, {}, &smooth}, marks, stop);
     if (!read) return tl::unexpected(read.error());
     take_smooth();
     return heights;
@@ -402,7 +403,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = grids[grid].AddPointHeights(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
+    const auto read = grids[grid].SetPointHeights(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];

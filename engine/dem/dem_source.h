@@ -1,7 +1,8 @@
 // A digital elevation model: heights at lattice nodes, anywhere on the globe, at any level.
 //
 // A model has one or more rasters. Sources are ordered by rank and resolution; a node takes its height from the first
-// source with a height there. Nodes without a source take the floor (docs/decisions/0010-mosaics.md).
+// source with a height there; with a feather it is blended with those of the sources below. Nodes without a source take
+// the floor (docs/decisions/0010-mosaics.md).
 //
 // Immutable after Open. Thread-safe: each thread uses its own GDAL handle. No GDAL type appears in this header.
 #pragma once
@@ -79,9 +80,9 @@ class DemSource {
                                                std::stop_token stop = {}) const;
 
   // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
-  // sources, in collars, and in holes that are not filled. Voids are filled as in tiles. `filled` has one element for
-  // each point, or none; an element becomes 1 where the point lies in the pixel of a void sample. A height does not
-  // depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has no effect.
+  // `filled` has one element for each point, or none; an element becomes 1 where the point lies in the pixel of a void
+  // sample. A height does not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

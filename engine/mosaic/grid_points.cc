@@ -1,5 +1,5 @@
 // Reads heights at single points, at full resolution, with voids filled as in tiles. Points are read in the order of
-// the source's blocks: neighbours share a read, and no block is decoded twice. Blocks that are wanted again are kept.
+// point blocks (point_blocks.h): those of one block share a read. Blocks that are wanted again are kept.
 #include <algorithm>
 #include <atomic>
 #include <cmath>
@@ -135,7 +135,7 @@ Result<PointBlockPtr> RasterGrid::BlockOfCells(std::vector<GridCell>& cells, con
   return std::make_shared<const PointBlock>(*std::move(read));
 }
 
-Result<void> RasterGrid::AddPointHeights(std::span<const GeoPosition> points, HeightDatum datum,
+Result<void> RasterGrid::SetPointHeights(std::span<const GeoPosition> points, HeightDatum datum,
                                          const NodeHeights& nodes, std::span<std::uint8_t> filled,
                                          const std::stop_token& stop) const {
   const std::span<float> heights = nodes.heights;

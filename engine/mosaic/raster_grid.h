@@ -37,13 +37,13 @@ struct GridRange {
   bool shows_others = true;  // part of the tile may lie outside the raster grid or in its voids
 };
 
-// What AddHeights read for a window. The error bounds compare served heights with these samples. Heights in metres.
+// What SetHeights read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
   // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
   // raster grid may have no position.
   NodeCells cells;
-  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending also for
-  // nodes that other raster grids filled, if their cell lies in `window` and has a sample.
+  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending also at nodes
+  // that have a height of another raster grid, if their cell lies in `window` and has a sample.
   std::vector<float> heights;
   std::vector<double> undulations;  // per node, metres, included in `heights`; empty: no geoid was applied
   GridWindow window;
@@ -62,10 +62,10 @@ struct GridOptions {
   double feather_m = 0;
 };
 
-// Heights of a window's nodes in metres, one per node. Raster grids add theirs in turn.
+// Heights of a window's nodes in metres, one per node. Raster grids set them in turn.
 struct NodeHeights {
   std::span<float> heights;  // NaN: none yet
-  // Blend weights of the heights added, greater than 0, up to 1; the raster grids below have the rest. Empty: all 1.
+  // Blend weights of the heights set, greater than 0, up to 1; the raster grids below have the rest. Empty: all 1.
   std::span<float> weights = {};
   // Smooth surface for holes where no raster grid has a height. NaN: none yet. Null: not wanted. Empty: no node has one
   // yet.
@@ -111,29 +111,29 @@ class RasterGrid {
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
   // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
   template <typename NodeGrid>
-  Result<void> AddHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+  Result<void> SetHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                           const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells of the window's nodes that AddHeights uses, with columns moved near those of a trace's window.
+  // Returns the cells of the window's nodes that SetHeights uses, with columns moved near those of a trace's window.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
-  // AddHeights for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
+  // SetHeights for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
   // void, for points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of
-  // AddHeights and of the geoid for `datum`.
-  Result<void> AddPointHeights(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+  // SetHeights and of the geoid for `datum`.
+  Result<void> SetPointHeights(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
                                std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
-  // Whether a position lies in a member, the condition for a height from AddPointHeights. With wrapping: columns 0 ..
+  // Whether a position lies in a member, the condition for a height from SetPointHeights. With wrapping: columns 0 ..
   // columns().
   bool Covers(const Position& pixel) const { return cover_.Inside(std::span(&pixel, 1))[0] != 0; }
 
   // Returns the block of cells with these numbers (PointBlockKey), and keeps it. Does not check whether the files are
-  // unchanged if the block was kept. Errors: those of AddHeights.
+  // unchanged if the block was kept. Errors: those of SetHeights.
   Result<PointBlockPtr> FindPointBlock(std::int64_t block_column, std::int64_t block_row,
                                        const std::stop_token& stop) const;
 
   // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
-  // that wraps, columns are taken modulo columns(). Errors: those of AddHeights.
+  // that wraps, columns are taken modulo columns(). Errors: those of SetHeights.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
     return ReadAverages(1, window, stop);
   }
@@ -158,7 +158,7 @@ class RasterGrid {
   // Which voids of a member are holes, by region.
   std::span<const std::uint8_t> HoleRegions(std::size_t member) const { return voids_.HoleRegions(member); }
 
-  // Returns bounds on the ellipsoidal heights that AddHeights gives to the tile's nodes, edges included, in metres.
+  // Returns bounds on the ellipsoidal heights that SetHeights gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
 
  private:
@@ -208,9 +208,9 @@ class RasterGrid {
   // Returns the pixel positions of the window's nodes for averages by `factor`.
   template <typename NodeGrid>
   NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
-  // `inside`: one entry per node, 0 where it is not to be filled. `undulations`: one per node, added to heights; empty:
+  // `inside`: one entry per node, 0 where it gets no height. `undulations`: one per node, added to heights; empty:
   // none are.
-  Result<void> AddHeightsAt(NodePositions positions, std::span<const std::uint8_t> inside,
+  Result<void> SetHeightsAt(NodePositions positions, std::span<const std::uint8_t> inside,
                             std::span<const double> undulations, int factor, const NodeHeights& nodes,
                             const std::stop_token& stop, GridTrace* trace = nullptr) const;
   void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,

@@ -36,11 +36,11 @@ enum class Side : std::uint8_t {
 // or y, and k a sample between them. Its distance from the chord is
 //   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
 // evaluated in double in exactly this form. Its error is
-//   scale min(max((m + padding_m) weight, m + padding_m + step_m), kMaxBorderWeight m).
-// `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts.
-// For samples with a limit (sample_limits.h) the rounding on their own chord replaces padding_m, and kMaxBorderWeight
-// does not apply. With p = rounding |h_b - h_a| / (b - a) the error is
-//   scale max((m + p) weight, m + p + step_m).
+//   scale * min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
+// For samples with a limit (sample_limits.h) it is
+//   scale * max((m + p) * weight, m + p + step_m)  with p = rounding * |h_b - h_a| / (b - a).
+// `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts,
+// and p for rounding of positions along the sample's own chord.
 // The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples
 // of this border alone: two fields that share a border with equal heights and options insert the same border vertices,
 // whatever their interiors are.

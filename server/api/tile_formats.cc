@@ -43,7 +43,7 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   tile.error_step = ErrorStep(parameters->requested, tile.key.level, dataset.error_scale);
   tile.coding = NegotiateCoding(fields.accept_encoding, CodingsOf(dataset));
   const proto::TileExtensions wanted = WantedExtensions(fields.accept, parameters->extensions);
-  tile.extensions.normals = wanted.normals && (!dataset.baked_alone || dataset.baked_alone->extent().normals);
+  tile.extensions.normals = wanted.normals && (!dataset.only_archive || dataset.only_archive->extent().normals);
   tile.extensions.water_mask = wanted.water_mask && dataset.has_water;
   tile.extensions.metadata =
       wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.error_scale.max_source_level,
@@ -183,8 +183,8 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
-  if (!dataset.baked_alone) return {};
-  const std::vector<tiler::TileFormat>& formats = dataset.baked_alone->extent().formats;
+  if (!dataset.only_archive) return {};
+  const std::vector<tiler::TileFormat>& formats = dataset.only_archive->extent().formats;
   if (std::ranges::find(formats, format) != formats.end()) return {};
   const auto* const row = std::ranges::find(kFormats, format, &TileFormatRow::format);
   TERRACE_CHECK(row != std::end(kFormats));

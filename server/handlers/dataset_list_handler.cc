@@ -76,7 +76,7 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["urls"]["sight"] = base + "/sight";
     entry["urls"]["mesh"] = base + "/mesh";
     if (dataset.edits_hash) entry["urls"]["edits"] = base + "/edits.geojson";
-    if (!dataset.baked_alone) {
+    if (!dataset.only_archive) {
       for (const char* const layer : {"hillshade", "slope", "contours"}) {
         entry["urls"][layer] = fmt::format("{}/{}/tiles.json", base, layer);
       }

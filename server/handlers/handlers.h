@@ -57,7 +57,7 @@ class ProcessState {
 
 // What handlers answer from: one for each catalog. Thread-safe. A request keeps it alive until it is answered.
 struct HandlerState {
-  // `tiles`: its workers run long work. `tiles` and `process` must outlive this object.
+  // `tiles`: its workers run all work that may block. `tiles` and `process` must outlive this object.
   HandlerState(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
                const config::Config& config, const ProcessState& process);
 
@@ -108,10 +108,10 @@ Result<CertifiedPoints> CertifyingTilesOf(const DatasetView& dataset, std::span<
                                           int deepest, const std::stop_token& stop = {});
 
 // {"results":[{"elevation","location":{"lat","lng"},"dataset"}],"status":"OK"}, the format of Open Topo Data. Points of
-// a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. Orthometric
-// heights have "datum". With normals: "normal" [east, north, up] and "slope" in degrees. Points of a drawn
-// surface have its "tile". `certified`: adds "certified_error" and "tile" to each point with a height; null: nothing is
-// added. Returns an empty string if a stop was requested.
+// a path also have "distance". Metres; null if there is no height; "filled": true if a void was filled. The
+// document of orthometric heights has "datum". With normals: "normal" [east, north, up] and "slope" in degrees. Points
+// of a drawn surface have its "tile". `certified`: adds "certified_error" and "tile" to each point with a height; null:
+// nothing is added. Returns an empty string if a stop was requested.
 std::string HeightsJson(const HeightsQuery& query, const tiler::PointHeights& known, std::string_view dataset,
                         const CertifiedPoints* certified = nullptr, const std::stop_token& stop = {});
 

@@ -30,7 +30,7 @@ namespace {
 // of at most this many bytes has a few points and is parsed in microseconds.
 constexpr std::size_t kQuickQuery = 256;
 
-// From this number of points on, reading is long work, which never occupies all workers: each point may lie in another
+// Above this number of points, reading is long work, which never occupies all workers: each point may lie in another
 // block.
 constexpr std::size_t kShortList = 1000;
 

@@ -27,7 +27,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
   layer.bounds = dataset.bounds;
   layer.water_mask = dataset.has_water;
   layer.metadata_levels = dataset.metadata_levels;
-  if (dataset.baked_alone) layer.normals = dataset.baked_alone->extent().normals;
+  if (dataset.only_archive) layer.normals = dataset.only_archive->extent().normals;
   layer.tile_query = std::move(tile_query);
   return proto::EncodeLayerJson(layer, stop);
 }

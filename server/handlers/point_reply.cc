@@ -11,7 +11,7 @@ namespace terrace::server {
 
 Answer AnswerPoints(const HandlerState& state, const RequestContext& context, PointHandler handler) {
   const Request& request = *context.request;
-  if (request.method == Method::kPost && !IsHeightsBody(request.fields->content_type)) {
+  if (request.method == Method::kPost && !IsPointsBody(request.fields->content_type)) {
     return ProblemResponse(415,
                            "the body's Content-Type must be application/json, application/x-www-form-urlencoded or "
                            "application/octet-stream",
@@ -41,7 +41,7 @@ PointReply StartPointReply(const Request& request, bool is_binary) {
 }
 
 asio::awaitable<Response> RefusePoints(Error error, const DatasetView& view, RequestId request_id) {
-  const bool is_absent = error.code == ErrorCode::kNotFound && view.baked_alone;
+  const bool is_absent = error.code == ErrorCode::kNotFound && view.only_archive;
   if (is_absent || error.code == ErrorCode::kInvalidArgument) co_return ClientErrorResponse(error, request_id);
   co_return co_await BackendFailure(std::move(error), request_id);
 }

@@ -33,14 +33,14 @@ Result<void> CheckDatum(dem::HeightDatum datum, const DatasetView& view);
 // Parses query and body with ParseHeights or ParseSight, on a worker unless it is a query alone and `is_quick`.
 template <typename Query>
 asio::awaitable<Result<Query>> ParsePoints(const HandlerState& state, const RequestContext& context,
-                                           Result<Query> (*parse)(const HeightsInput& input, std::size_t max_points,
+                                           Result<Query> (*parse)(const PointsInput& input, std::size_t max_points,
                                                                   const std::stop_token& stop),
                                            bool is_quick, TileService::Clock::time_point deadline) {
   const Request& request = *context.request;
   const std::string& query = context.route.query;
   const bool is_post = request.method == Method::kPost;
   if (!is_post && is_quick) {
-    const HeightsInput input{query, {}, {}};
+    const PointsInput input{query, {}, {}};
     co_return parse(input, state.max_locations, {});
   }
   const std::string_view type = is_post ? request.fields->content_type : std::string_view();

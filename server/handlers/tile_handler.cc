@@ -54,7 +54,7 @@ asio::awaitable<Response> BuildTile(const HandlerState& state, const RequestCont
       co_await state.tiles.Build(state.catalog, tile, state.Deadline(), context.request->client);
   if (served) co_return Reply(state, tile, *served, context);
   const bool is_absent =
-      served.error().code == ErrorCode::kNotFound && state.catalog->datasets[tile.dataset].baked_alone;
+      served.error().code == ErrorCode::kNotFound && state.catalog->datasets[tile.dataset].only_archive;
   if (is_absent) co_return ClientErrorResponse(served.error(), context.request->id);
   co_return co_await BackendFailure(served.error(), context.request->id);
 }

@@ -32,7 +32,7 @@ struct Admission {
 using Answer = std::variant<Response, asio::awaitable<Response>>;
 
 // A reply that was sent, or one with status 499 if the client left before there was a reply. Its references are valid
-// until CountReply returns.
+// during ConnectionHandler::Report.
 struct SentReply {
   const Request& request;
   const Response& response;

@@ -2,9 +2,9 @@
 //
 // A session runs on one thread. The memory that a client can use is bounded: one read buffer of kMaxHeadBytes, one
 // request with a body of at most the size that its admission allows, and one reply. Bodies count against a budget that
-// all sessions share. If the budget is used up, or if requests come faster than the client's rate, the session waits.
-// At the request's deadline it refuses the request. A request whose turn by the rate would come later than its deadline
-// is refused earlier.
+// all sessions share. A body or reply without memory in the budget waits until the request's deadline, and is then
+// refused. A request over its client's rate waits for its turn; if the turn would come after its deadline, it is
+// refused earlier.
 #pragma once
 
 #include <atomic>

@@ -138,7 +138,7 @@ Result<int> ParseCertifyLevel(std::string_view text) {
 
 }  // namespace
 
-Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters) {
+Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, ParameterSink& parameters) {
   std::size_t at = 0;
   Result<void> read = ReadForm(PartsOf(input.query, stop), PlusSign::kIsPlus, parameters, at);
   if (!read || input.content_type.empty() || IsBinaryBody(input.content_type)) return read;
@@ -156,11 +156,11 @@ Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, P
 }
 
 bool IsBinaryBody(std::string_view content_type) { return HasMediaType(content_type, "application/octet-stream"); }
-bool IsHeightsBody(std::string_view content_type) {
+bool IsPointsBody(std::string_view content_type) {
   return IsForm(content_type) || IsJson(content_type) || IsBinaryBody(content_type);
 }
 
-Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations, const std::stop_token& stop) {
+Result<HeightsQuery> ParseHeights(const PointsInput& input, std::size_t max_locations, const std::stop_token& stop) {
   HeightsParameters parameters(max_locations, input.query.size() + input.body.size());
   if (const Result<void> read = ReadInput(input, stop, parameters); !read) return tl::unexpected(read.error());
   const bool is_binary = IsBinaryBody(input.content_type);

@@ -26,20 +26,20 @@ struct HeightsQuery {
 };
 
 // The parts of a request that contain parameters.
-struct HeightsInput {
+struct PointsInput {
   std::string_view query;         // of the URL
-  std::string_view content_type;  // of the body; IsHeightsBody is true for it; empty: no body
+  std::string_view content_type;  // of the body; IsPointsBody is true for it; empty: no body
   std::string_view body;
 };
 
 // Whether bodies of this Content-Type are supported: a JSON object of texts and numbers, a form, or points as numbers:
 // application/octet-stream, longitude and latitude of each point as little-endian 64-bit floats.
-bool IsHeightsBody(std::string_view content_type);
+bool IsPointsBody(std::string_view content_type);
 bool IsBinaryBody(std::string_view content_type);
 
 // Passes the parameters of the query and of the body, unless it is binary, to a sink. Errors: those of the readers
 // (parameters.h) and of the sink; those of the body name its byte.
-Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, ParameterSink& parameters);
+Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, ParameterSink& parameters);
 
 // `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`. Optional:
 // `datum=ellipsoid|orthometric`, `certify=LEVEL|deepest`, `normals=1`, `surface=source|served`. With `surface=served`
@@ -47,7 +47,7 @@ Result<void> ReadInput(const HeightsInput& input, const std::stop_token& stop, P
 // occur once in query and body together. kInvalidArgument: anything else, numbers that are not finite or not a position
 // on Earth, or more than `max_locations` points; the message is for the client, and names the item and the byte of the
 // body where parsing ended. kCancelled: a stop was requested; it is checked every kPartBytes of the text.
-Result<HeightsQuery> ParseHeights(const HeightsInput& input, std::size_t max_locations,
+Result<HeightsQuery> ParseHeights(const PointsInput& input, std::size_t max_locations,
                                   const std::stop_token& stop = {});
 
 }  // namespace terrace::server

@@ -195,7 +195,7 @@ Result<std::vector<dem::SightRay>> ParseEnds(const SightParameters& parameters) 
   return std::vector<dem::SightRay>{ray};
 }
 
-Result<std::vector<dem::SightRay>> ParseRays(SightParameters& parameters, const HeightsInput& input,
+Result<std::vector<dem::SightRay>> ParseRays(SightParameters& parameters, const PointsInput& input,
                                              std::size_t max_rays, const std::stop_token& stop) {
   const bool has_ends = parameters.text(kFrom) || parameters.text(kTo), has_list = parameters.text(kRays).has_value();
   if (IsBinaryBody(input.content_type)) {
@@ -211,7 +211,7 @@ Result<std::vector<dem::SightRay>> ParseRays(SightParameters& parameters, const 
 
 }  // namespace
 
-Result<SightQuery> ParseSight(const HeightsInput& input, std::size_t max_rays, const std::stop_token& stop) {
+Result<SightQuery> ParseSight(const PointsInput& input, std::size_t max_rays, const std::stop_token& stop) {
   SightParameters parameters(max_rays);
   if (const Result<void> read = ReadInput(input, stop, parameters); !read) return tl::unexpected(read.error());
   SightQuery query;

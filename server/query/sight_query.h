@@ -27,6 +27,6 @@ struct SightQuery {
 // longitude, latitude and height of both ends of each ray as little-endian 64-bit floats. kInvalidArgument: anything
 // else, a position not on Earth, a height out of range, a ray longer than kMaxSightLength, or more than `max_rays`;
 // the message is for the client. kCancelled: a stop was requested.
-Result<SightQuery> ParseSight(const HeightsInput& input, std::size_t max_rays, const std::stop_token& stop = {});
+Result<SightQuery> ParseSight(const PointsInput& input, std::size_t max_rays, const std::stop_token& stop = {});
 
 }  // namespace terrace::server

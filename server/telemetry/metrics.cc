@@ -264,7 +264,7 @@ void Metrics::CountBuild(const DatasetView& dataset, const Result<tiler::TilePtr
     if (tile.error().code == ErrorCode::kUnavailable) families_->source_errors.Increment();
     return;
   }
-  switch ((*tile)->refinement) {
+  switch ((*tile)->refinement_use) {
     case tiler::RefinementUse::kMade:
       families_->made.Increment();
       break;

@@ -37,7 +37,7 @@ double WrappedLongitude(double degrees) {
 // A dataset without sources.
 void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   const tiler::BakedExtent& extent = dataset.baked->extent();
-  view.baked_alone = dataset.baked;
+  view.only_archive = dataset.baked;
   view.available = extent.available;
   view.bounds = extent.bounds;
   view.heights = extent.heights;
@@ -102,7 +102,7 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 
 dem::GeoBounds FinestBounds(const DatasetView& dataset) {
   const dem::GeoBounds& all = dataset.bounds;
-  // Levels that edits add have no finer data.
+  // Levels that edits add have no finer data, and an archive may end above the deepest level of its sources.
   const int level = std::min(dataset.error_scale.max_source_level, dataset.max_level());
   if (level < 0 || dataset.available[static_cast<std::size_t>(level)].empty()) return all;
   const std::vector<geo::TileRange>& ranges = dataset.available[static_cast<std::size_t>(level)];

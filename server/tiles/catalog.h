@@ -53,7 +53,7 @@ struct DatasetView {
   std::optional<dem::GeoBounds> height_tile_bounds;
   std::optional<tiler::Coding> baked_coding;  // of the tiles of its archive; nothing: it has no archive
   // Set if the dataset has no sources. Parameters that a request omits are then those of the archive.
-  std::shared_ptr<const tiler::BakedTiles> baked_alone = nullptr;
+  std::shared_ptr<const tiler::BakedTiles> only_archive = nullptr;
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }

@@ -113,11 +113,11 @@ TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {
 TEST_F(ArchiveTest, VerifiedUnitEqualsItsFile) {
   Bake();
   for (const UnitEntry& unit : manifest_.units) {
-    const Result<UnitFile> unit_file = VerifyUnit(Place(), unit.name, {manifest_.kind, unit.key});
+    const Result<FileSummary> unit_file = VerifyUnit(Place(), unit.name, {manifest_.kind, unit.key});
     ASSERT_TRUE(unit_file) << unit_file.error().message;
-    EXPECT_EQ(*unit_file, (UnitFile{unit.tiles, unit.bytes, unit.xxh3}));
+    EXPECT_EQ(*unit_file, (FileSummary{unit.tiles, unit.bytes, unit.xxh3}));
     const auto refused = [&](const UnitOptions& options) {
-      const Result<UnitFile> other = VerifyUnit(Place(), unit.name, options);
+      const Result<FileSummary> other = VerifyUnit(Place(), unit.name, options);
       return !other && other.error().code == ErrorCode::kInvalidArgument;
     };
     EXPECT_TRUE(refused({manifest_.kind, unit.key + 1}));

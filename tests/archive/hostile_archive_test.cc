@@ -88,7 +88,7 @@ TEST_F(HostileArchiveTest, FlippedBytesAreFoundByVerifying) {
     std::string bad = good_;
     bad[at] = static_cast<char>(bad[at] ^ 0x10);
     WriteText(unit_, bad);
-    const Result<UnitFile> good = VerifyUnit(place_, "top", {manifest.kind, 7});
+    const Result<FileSummary> good = VerifyUnit(place_, "top", {manifest.kind, 7});
     if (!good) continue;
     EXPECT_NE(good->xxh3, manifest.units.front().xxh3);
   }

@@ -92,7 +92,7 @@ TEST_F(PmtilesTest, EveryTileIsFoundAndNoOther) {
   PmtilesWriter writer = NewWriter(Path());
   constexpr std::uint64_t kTiles = 20'000;  // several leaf directories
   for (std::uint64_t id = 0; id < kTiles; ++id) ASSERT_TRUE(writer.Add(id * 2, TileOf(id), {1.5, 2.25}));
-  const Result<UnitFile> unit_file = writer.Finish(R"({"a":1})");
+  const Result<FileSummary> unit_file = writer.Finish(R"({"a":1})");
   ASSERT_TRUE(unit_file) << unit_file.error().message;
   EXPECT_EQ(unit_file->tiles, kTiles);
   EXPECT_EQ(unit_file->bytes, std::filesystem::file_size(Path()));
@@ -147,7 +147,7 @@ TEST_F(PmtilesTest, UnfinishedWriterLeavesNothing) {
 TEST_F(PmtilesTest, NoTilesNoFile) {
   WriteText(Path(), "old");
   PmtilesWriter writer = NewWriter(Path());
-  const Result<UnitFile> unit_file = writer.Finish("{}");
+  const Result<FileSummary> unit_file = writer.Finish("{}");
   ASSERT_TRUE(unit_file);
   EXPECT_EQ(unit_file->tiles, 0U);
   EXPECT_FALSE(std::filesystem::exists(Path()));

@@ -68,7 +68,7 @@ Manifest WriteUnits(const std::string& place, const std::vector<geo::TileKey>& k
     EXPECT_TRUE(added) << added.error().message;
   }
   for (auto& [name, writer] : writers) {
-    const Result<UnitFile> unit_file = writer->Finish();
+    const Result<FileSummary> unit_file = writer->Finish();
     EXPECT_TRUE(unit_file) << unit_file.error().message;
     manifest.units.push_back({name, unit_key, unit_file->tiles, unit_file->bytes, unit_file->xxh3});
   }

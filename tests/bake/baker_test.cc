@@ -27,9 +27,9 @@ class ThrowingWriter final : public archive::UnitWriter {
     if (has_tile_ && throws_ == Throws::kInAdd) throw std::runtime_error("statistics cannot be read");
     return {};
   }
-  Result<archive::UnitFile> Finish() override {
+  Result<archive::FileSummary> Finish() override {
     if (has_tile_ && throws_ == Throws::kInFinish) throw std::bad_alloc();
-    return archive::UnitFile();
+    return archive::FileSummary();
   }
 
  private:

@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kMaxPoints = 100;
 
 void Try(std::string_view content_type, std::string_view body) {
-  TERRACE_CHECK(server::IsHeightsBody(content_type));
+  TERRACE_CHECK(server::IsPointsBody(content_type));
   const auto query = server::ParseHeights({{}, content_type, body}, kMaxPoints);
   if (!query) {
     TERRACE_CHECK(query.error().code == ErrorCode::kInvalidArgument);

@@ -35,6 +35,7 @@ const std::vector<DatasetView>& Datasets() {
     view.name = "earth";
     view.has_water = true;
     view.texture = proto::TextureFormat::kJpeg;
+    view.error_scale.max_source_level = kDeepest;
     view.max_mercator_depth = kDeepest;
     view.imagery = dem::ImageExtent{{-180, -90, 180, 90}, kDeepest, kDeepest};
     for (int level = 0; level <= kDeepest; ++level) {

@@ -207,10 +207,10 @@ TEST(GlbPipeline, FormatsShareOneRefinement) {
   const TilePipeline pipeline(std::move(datasets));
   TileRequest request;
   request.key = MiddleTile(1, 10);
-  EXPECT_EQ(pipeline.Build(request, {})->refinement, RefinementUse::kMade);
+  EXPECT_EQ(pipeline.Build(request, {})->refinement_use, RefinementUse::kMade);
   request.format = TileFormat::kGlb;
   const Result<EncodedTile> glb = pipeline.Build(request, {});
-  EXPECT_EQ(glb->refinement, RefinementUse::kReplayed);
+  EXPECT_EQ(glb->refinement_use, RefinementUse::kReplayed);
   EXPECT_EQ(glb->times.read.count(), 0);
 }
 

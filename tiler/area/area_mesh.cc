@@ -17,7 +17,7 @@
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh_error.h"
 #include "tiler/area/area_surface.h"
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/edit_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/tile/strong_etag.h"
 
@@ -233,7 +233,7 @@ Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& 
                                   std::stop_token stop) {
   const auto cancelled = [] { return MakeError(ErrorCode::kCancelled, "nobody waits for this mesh any more"); };
   EncodedTile encoded;
-  encoded.refinement = RefinementUse::kNone;
+  encoded.refinement_use = RefinementUse::kNone;
   Clock::time_point start = Clock::now();
   Result<std::vector<float>> heights = source.ReadNodes(plan.level, plan.window, stop);
   if (!heights) return tl::unexpected(std::move(heights).error());

@@ -3,13 +3,13 @@
 #include "tiler/encoders.h"
 #include "tiler/map/contour_tile.h"
 #include "tiler/map/map_heights.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 
 // Heights are in the sources' datum, because a map's lines tell heights above the sea.
 Result<void> MakeContoursTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
-  encoded.refinement = RefinementUse::kNone;
+  encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, kSidesPx[0], kContourMargin);
   const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kSource, stop);

@@ -14,10 +14,10 @@
 #include "proto/mesh/skirt.h"
 #include "proto/mesh/tile_normals.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/edit_limits.h"
 #include "tiler/mesh/restore_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 namespace {

@@ -7,7 +7,7 @@
 #include "engine/core/elapsed_time.h"
 #include "tiler/encoders.h"
 #include "tiler/map/map_heights.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 namespace {
@@ -33,7 +33,7 @@ Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, 
   if (window.depth > dataset.source->info().max_mercator_depth) {
     return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));
   }
-  encoded.refinement = RefinementUse::kNone;
+  encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const Result<std::vector<float>> heights = dataset.source->ReadMercator(window.depth, window.nodes, stop);
   if (!heights) return tl::unexpected(heights.error());

@@ -3,7 +3,7 @@
 #include "engine/core/elapsed_time.h"
 #include "proto/documents/map_picture.h"
 #include "tiler/encoders.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 Result<void> EncodeMapPicture(Result<dem::MapPicture> read, std::chrono::steady_clock::time_point start,
                               const EncoderInput& input, EncodedTile& encoded) {
   if (!read) return tl::unexpected(std::move(read.error()));
-  encoded.refinement = RefinementUse::kNone;
+  encoded.refinement_use = RefinementUse::kNone;
   encoded.times.read = MicrosecondsSince(start);
   start = std::chrono::steady_clock::now();
   auto bytes = proto::EncodePhoto({read->side, read->side, proto::PixelKind::kRgba, read->rgba},

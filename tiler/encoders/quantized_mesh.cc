@@ -8,10 +8,10 @@
 #include "proto/mesh/tile_normals.h"
 #include "proto/mesh/water_mask.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/edit_limits.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/surface/quantized_mesh_triangles.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 namespace {

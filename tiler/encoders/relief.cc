@@ -9,14 +9,14 @@
 #include "proto/documents/map_picture.h"
 #include "tiler/encoders.h"
 #include "tiler/map/map_heights.h"
-#include "tiler/tile_pipeline.h"
+#include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
 namespace {
 
 Result<std::vector<Gradient>> ReadGradients(const EncoderInput& input, EncodedTile& encoded,
                                             const std::stop_token& stop) {
-  encoded.refinement = RefinementUse::kNone;
+  encoded.refinement_use = RefinementUse::kNone;
   const auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, input.request.side_px, kReliefMargin);
   const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kEllipsoid, stop);

@@ -1,7 +1,10 @@
 #include "tiler/mesh/refine_options.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <numeric>
 #include <vector>
@@ -9,6 +12,7 @@
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/sines.h"
 #include "proto/mesh/quantized_mesh.h"
+#include "tiler/mesh/edit_limits.h"
 
 namespace terrace::tiler {
 namespace {
@@ -96,6 +100,33 @@ tin::GreedyOptions BaseRefineOptions(const proto::LatticeView& lattice, const pr
     border.sagitta_m = BorderSagitta(lattice, side);
   }
   return options;
+}
+
+proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, const proto::EdgeErrors& errors) {
+  const std::int64_t rows = geo::TileRows(key.level);
+  std::array<std::array<double, 3>, 3> needed{};
+  for (int dy = -1; dy <= 1; ++dy) {
+    for (int dx = -1; dx <= 1; ++dx) {
+      const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
+      if (neighbour.y < 0 || neighbour.y >= rows) continue;
+      const dem::HeightRange range = source.RangeBound(neighbour);
+      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
+          proto::NeededStep(range.min, range.max);
+    }
+  }
+  const dem::DemInfo& info = source.info();
+  const double pole_step =
+      proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
+  return proto::MakeEdgeSteps(errors, needed, pole_step, key.y == 0, key.y == rows - 1);
+}
+
+tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
+                                   tin::Criterion criterion) {
+  const proto::EdgeErrors none(proto::kHeightResolution);
+  tin::GreedyOptions plan = BaseRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
+  plan.criterion = criterion;
+  plan.limits = LimitsOf(source, lattice.key);
+  return plan;
 }
 
 }  // namespace terrace::tiler

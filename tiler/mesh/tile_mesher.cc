@@ -14,8 +14,8 @@
 #include "proto/error/tile_error.h"
 #include "proto/mesh/edge_steps.h"
 #include "proto/mesh/quantize_tile.h"
+#include "tiler/mesh/edit_limits.h"
 #include "tiler/mesh/inner_vertices.h"
-#include "tiler/mesh/mesh_limits.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/restore_error_bound.h"
 
@@ -23,24 +23,6 @@ namespace terrace::tiler {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, const proto::EdgeErrors& errors) {
-  const std::int64_t rows = geo::TileRows(key.level);
-  std::array<std::array<double, 3>, 3> needed{};
-  for (int dy = -1; dy <= 1; ++dy) {
-    for (int dx = -1; dx <= 1; ++dx) {
-      const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
-      if (neighbour.y < 0 || neighbour.y >= rows) continue;
-      const dem::HeightRange range = source.RangeBound(neighbour);
-      needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
-          proto::NeededStep(range.min, range.max);
-    }
-  }
-  const dem::DemInfo& info = source.info();
-  const double pole_step =
-      proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
-  return proto::MakeEdgeSteps(errors, needed, pole_step, key.y == 0, key.y == rows - 1);
-}
 
 // Quantizes, and inserts the samples that quantization pushed over the bound.
 Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
@@ -115,15 +97,6 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   auto field = tin::HeightField::Make(side, side, std::move(heights));
   TERRACE_CHECK(field.has_value());  // every lattice height is finite
   return *std::move(field);
-}
-
-tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
-                                   tin::Criterion criterion) {
-  const proto::EdgeErrors none(proto::kHeightResolution);
-  tin::GreedyOptions plan = BaseRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
-  plan.criterion = criterion;
-  plan.limits = LimitsOf(source, lattice.key);
-  return plan;
 }
 
 Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,

@@ -29,7 +29,7 @@ struct MeshedTile {
   std::vector<geo::Vec3> positions;      // of its vertices, ECEF
   double max_error_m = 0;                // measured on the encoded integers
   double surface_error_m = 0;            // also between the lattice's samples
-  std::chrono::microseconds replayed{};  // time until the mesh was replayed, before quantizing and measuring
+  std::chrono::microseconds replayed{};  // duration of ReplayMesh
 };
 
 struct ReplayedMesh {
@@ -43,10 +43,6 @@ tl::unexpected<Error> Cancelled();
 
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::LatticeView& lattice);
-
-// Options of the tile's refinement, which serves every error (refine_options.h).
-tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
-                                   tin::Criterion criterion);
 
 // Makes the mesh for the error: replays the refinement, or, if that has more vertices than the format allows, inserts
 // anew at a larger error inside. Then the drop pass, if the options ask for it, and WithInnerVertices. The mesh is not

@@ -15,7 +15,7 @@ namespace {
 constexpr double kPartLength = 500;
 
 // The place between `low` and `high` with this value, for At(low) < value <= At(high); `low` may be larger than `high`.
-double Solve(const dem::Quadratic& along, double value, double low, double high) {
+double Bisect(const dem::Quadratic& along, double value, double low, double high) {
   for (int step = 0; step < 50 && low != high; ++step) {
     const double half = (low + high) / 2;
     (along.At(half) < value ? low : high) = half;
@@ -40,7 +40,7 @@ class Clearances {
     }
     for (const double s : {vertex, to}) {
       if (over.At(s) >= -dem::kSightTolerance) continue;
-      blocked_at_ = std::min(blocked_at_, share(Solve(over, -dem::kSightTolerance, s, from)));
+      blocked_at_ = std::min(blocked_at_, share(Bisect(over, -dem::kSightTolerance, s, from)));
       return;
     }
   }
@@ -193,9 +193,9 @@ class MeshWalk {
         if (inside.At(over.from) < 0 && inside.At(over.to) < 0) over.from = 2;
         if (over.from > over.to) break;
         if (inside.At(over.from) < 0) {
-          over.from = Solve(inside, 0, over.from, over.to);
+          over.from = Bisect(inside, 0, over.from, over.to);
         } else if (inside.At(over.to) < 0) {
-          over.to = Solve(inside, 0, over.to, over.from);
+          over.to = Bisect(inside, 0, over.to, over.from);
         }
       }
       if (over.from > over.to) continue;

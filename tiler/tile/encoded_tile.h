@@ -38,7 +38,7 @@ struct EncodedTile {
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
-  RefinementUse refinement = RefinementUse::kMade;
+  RefinementUse refinement_use = RefinementUse::kMade;
   const char* store = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
   HeaderLines head;             // MakeTileHeaders of server/api/tile_formats.h
 };

@@ -22,7 +22,7 @@ struct ErrorScale {
   // The deepest level of the sources; edits may add deeper ones. From it on tiles have all detail of the sources, so
   // RequestedError::at_least does not keep their error at the default one.
   int max_source_level = geo::kMaxLevel;
-  std::span<const int> default_steps = {};  // by level, of requests without an error; 0 beyond
+  std::span<const int> default_steps = {};  // by level, of requests without an error; 0 beyond; of Dataset::baked
 };
 
 // Returns the step of the level's ladder for a requested error.

@@ -70,7 +70,7 @@ class SeedWriter final : public archive::UnitWriter {
     return {};
   }
 
-  Result<archive::UnitFile> Finish() override {
+  Result<archive::FileSummary> Finish() override {
     seed_.store->Flush();
     const tiler::StoreStats stats = seed_.store->stats();
     if (!stats.on || stats.dropped != dropped_before_) {
@@ -84,7 +84,7 @@ class SeedWriter final : public archive::UnitWriter {
   Seed& seed_;
   const archive::Manifest manifest_;
   const std::uint64_t dropped_before_;
-  archive::UnitFile unit_file_;
+  archive::FileSummary unit_file_;
 };
 
 std::uint64_t BytesOfRecords(const std::filesystem::path& folder) {

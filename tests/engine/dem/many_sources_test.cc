@@ -45,7 +45,7 @@ GridTrace TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo
   std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                              SampleRules::kVoid);
   GridTrace trace;
-  EXPECT_TRUE(grid.AddHeights(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
+  EXPECT_TRUE(grid.SetHeights(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
   return trace;
 }
 

@@ -75,7 +75,7 @@ TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
     std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                SampleRules::kVoid);
     GridTrace trace;
-    auto filled = grid->AddHeights(lattice, window, HeightDatum::kEllipsoid,
+    auto filled = grid->SetHeights(lattice, window, HeightDatum::kEllipsoid,
                                    {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
     EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
     return filled ? Result<GridTrace>(std::move(trace)) : tl::unexpected(filled.error());

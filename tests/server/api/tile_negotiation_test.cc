@@ -325,7 +325,9 @@ TEST(NegotiateTile, AParentIsAtMostTwiceAsCoarse) {
     for (double error_m = 1e-5; error_m < 1e8; error_m *= 1.31) {
       for (const RequestedError& requested : {RequestedError{error_m, {}, false}, RequestedError{error_m, {}, true},
                                               RequestedError{{}, error_m / 1000, false}, RequestedError{}}) {
-        const auto error = [&](int at) { return geo::LadderError(at, ErrorStep(requested, at, {}), 0.5); };
+        const auto error = [&](int at) {
+          return geo::LadderError(at, ErrorStep(requested, at, {.max_source_level = geo::kMaxLevel + 1}), 0.5);
+        };
         EXPECT_LE(error(level - 1), 2 * error(level) * (1 + 1e-12)) << level << ", " << error_m;
         const double skirt =
             proto::SkirtError(level, ErrorStep(requested, level, {.max_source_level = level}), true, 0.5);

@@ -1,4 +1,4 @@
-// Handlers for fake datasets, and the replies of document handlers, with documents made in the calling thread.
+// HandlerState of fake datasets, and the replies of document handlers, with documents made in the calling thread.
 #pragma once
 
 #include <map>
@@ -13,13 +13,13 @@
 
 namespace terrace::server {
 
-class TestHandlers : private ProcessState {
+class TestHandlerState : private ProcessState {
  public:
-  explicit TestHandlers(CatalogPtr catalog)
+  explicit TestHandlerState(CatalogPtr catalog)
       : tiles_({.worker_threads = 1}),
         all(std::move(catalog), tiles_, std::make_shared<const StaticFiles>(), Configured(), *this) {}
-  explicit TestHandlers(std::vector<DatasetView> datasets)
-      : TestHandlers(std::make_shared<const Catalog>(Catalog{std::move(datasets), nullptr})) {}
+  explicit TestHandlerState(std::vector<DatasetView> datasets)
+      : TestHandlerState(std::make_shared<const Catalog>(Catalog{std::move(datasets), nullptr})) {}
 
  private:
   static config::Config Configured() {

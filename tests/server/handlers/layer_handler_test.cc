@@ -18,16 +18,16 @@ class LayerHandlerTest : public testing::Test {
     datasets_[0].available = {{{0, 0, 1, 0}}, {{0, 1, 0, 1}}};
     datasets_[0].bounds.west = 170;
     datasets_[0].bounds.east = -170;
-    handlers_.emplace(datasets_);
+    state_.emplace(datasets_);
   }
   Response Get(const char* target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
-    return AtOnce(DescribeLayer(handlers_->all, TestContext(target, request).context), request);
+    return AtOnce(DescribeLayer(state_->all, TestContext(target, request).context), request);
   }
 
   std::vector<DatasetView> datasets_{1};
-  std::optional<TestHandlers> handlers_;
+  std::optional<TestHandlerState> state_;
 };
 
 TEST_F(LayerHandlerTest, DescribesTheDataset) {

@@ -22,14 +22,14 @@ class TileJsonHandlerTest : public testing::Test {
     Request request;
     request.fields.Set(&RequestFields::host, host);
     request.is_https = is_https;
-    const TestHandlers handlers(datasets_);
-    return std::get<Response>(AnswerTileJson(handlers.all, TestContext(target, request).context));
+    const TestHandlerState state(datasets_);
+    return std::get<Response>(AnswerTileJson(state.all, TestContext(target, request).context));
   }
   Response GetMap(const char* target) {
     Request request;
     request.fields.Set(&RequestFields::host, "h");
-    const TestHandlers handlers(datasets_);
-    return std::get<Response>(AnswerMapTileJson(handlers.all, TestContext(target, request).context));
+    const TestHandlerState state(datasets_);
+    return std::get<Response>(AnswerMapTileJson(state.all, TestContext(target, request).context));
   }
   static nlohmann::json Parse(const Response& response) { return nlohmann::json::parse(*response.body); }
 

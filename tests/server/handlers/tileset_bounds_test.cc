@@ -61,13 +61,13 @@ class TilesetBoundsTest : public testing::Test {
     static const CatalogPtr mosaic = Mosaic();
     catalog_ = mosaic;
     ASSERT_NE(catalog_, nullptr);
-    handlers_.emplace(catalog_);
+    state_.emplace(catalog_);
   }
 
   std::string Get(const std::string& target) {
     const TestContext sent("/earth/" + target);
     const bool is_subtree = sent.context.route.row->label == "subtree";
-    const HandlerState& from = handlers_->all;
+    const HandlerState& from = state_->all;
     const Response response =
         AtOnce(is_subtree ? DescribeSubtree(from, sent.context) : DescribeTileset(from, sent.context), sent.request);
     EXPECT_EQ(response.status, 200) << target;
@@ -106,7 +106,7 @@ class TilesetBoundsTest : public testing::Test {
   HeightSpan CheckTile(const Json& tile, bool builds);
 
   CatalogPtr catalog_;
-  std::optional<TestHandlers> handlers_;
+  std::optional<TestHandlerState> state_;
   int checked_ = 0, named_ = 0, trees_ = 0;
   double flattest_tree_m = 1e9;
 };

@@ -25,27 +25,27 @@ class TilesetHandlerTest : public testing::Test {
     maui.generation = 0x0a1b2c3d4e5f6789;
     maui.heights = {100, 3000};
     maui.floor_m = -20;
+    maui.error_scale.max_source_level = 12;
     maui.available.resize(13);
     for (int level = 1; level <= 12; ++level) {
       const int up = 12 - level;
       maui.available[static_cast<std::size_t>(level)] = {{512 >> up, 1024 >> up, 551 >> up, 1047 >> up}};
     }
     maui.available[0] = {{0, 0, 1, 0}};
-    handlers_.emplace(datasets_);
+    state_.emplace(datasets_);
   }
   Response Get(const std::string& target, const char* accept_encoding = "") {
     Request request;
     request.fields.Set(&RequestFields::accept_encoding, accept_encoding);
     const TestContext sent(target, request);
     const bool is_subtree = sent.context.route.row->label == "subtree";
-    return AtOnce(
-        is_subtree ? DescribeSubtree(handlers_->all, sent.context) : DescribeTileset(handlers_->all, sent.context),
-        request);
+    return AtOnce(is_subtree ? DescribeSubtree(state_->all, sent.context) : DescribeTileset(state_->all, sent.context),
+                  request);
   }
   Json Tileset(const std::string& query = "") { return Json::parse(*Get("/maui/tileset.json" + query).body); }
 
   std::vector<DatasetView> datasets_{1};
-  std::optional<TestHandlers> handlers_;
+  std::optional<TestHandlerState> state_;
 };
 
 TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIs) {
@@ -70,7 +70,7 @@ TEST_F(TilesetHandlerTest, RootsTheTreesWhereTheDataIsAmongTilesThatAreThereToMa
     range = {range.start_x & ~1, range.start_y & ~1, range.end_x | 1, range.end_y | 1};
   }
   const auto roots = [&] {
-    handlers_.emplace(datasets_);
+    state_.emplace(datasets_);
     const Json root = Tileset().at("root");
     std::vector<std::string> uris;
     for (const Json& tree : root.at("children")) uris.push_back(tree.at("content").at("uri"));
@@ -143,7 +143,7 @@ TEST_F(TilesetHandlerTest, EveryRootHasTheHeightsOfItsOwnTile) {
   datasets_[0].range_bound = [](const geo::TileKey& key) {
     return dem::HeightRange{static_cast<double>(-key.x), 1000.0 * static_cast<double>(key.x - 15)};
   };
-  handlers_.emplace(datasets_);
+  state_.emplace(datasets_);
   const Json root = Tileset("?fraction=0.05").at("root");
   const auto region = [](const Json& tile) { return tile.at("boundingVolume").at("region"); };
   const double error_m = geo::LadderError(7, geo::SnapToLadder(7, 0.05 * geo::LevelError(7)));
@@ -164,7 +164,7 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
   datasets_[0].range_bound = [](const geo::TileKey& key) {
     return dem::HeightRange{-10.0 * key.level, static_cast<double>(key.x % 4)};
   };
-  handlers_.emplace(datasets_);
+  state_.emplace(datasets_);
   for (const std::string_view query : {"", "?error=600&atleast=1", "?fraction=0.02"}) {
     const Result<proto::ReadSubtree> read =
         proto::ParseSubtree(*Get(std::string("/maui/3dtiles/7-16-32/0/0/0.6.subtree").append(query)).body, 6);

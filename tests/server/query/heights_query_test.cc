@@ -227,9 +227,9 @@ TEST(HeightsQuery, NamesTheByteWhereABodyIsWrong) {
 TEST(HeightsQuery, KnowsTheTypesOfBodies) {
   for (const char* type :
        {"", "text/plain", "application/xml", "multipart/form-data; boundary=x", "application/jsonx"}) {
-    EXPECT_FALSE(IsHeightsBody(type)) << type;
+    EXPECT_FALSE(IsPointsBody(type)) << type;
   }
-  EXPECT_TRUE(IsHeightsBody("Application/JSON ; charset=utf-8"));
+  EXPECT_TRUE(IsPointsBody("Application/JSON ; charset=utf-8"));
 }
 
 TEST(HeightsQuery, IsCancelledWhileItReadsAndWalks) {

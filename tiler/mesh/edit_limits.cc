@@ -1,4 +1,4 @@
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/edit_limits.h"
 
 #include <algorithm>
 #include <array>
@@ -7,13 +7,9 @@
 #include <utility>
 
 #include "engine/tin/scan/triangle_rows.h"
+#include "tiler/mesh/node_error_bound.h"
 
 namespace terrace::tiler {
-
-double NodeErrorBound(double error_m) {
-  constexpr double kRounding = 0x1p-11 + 0x1p-14;
-  return std::max(error_m - kRounding, error_m / 2);
-}
 
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key) {
   return LimitsOf(source.DemandsOf(key));

@@ -1,5 +1,5 @@
 // Errors of sides and corners that follow from edits.
-#include "tiler/mesh/mesh_limits.h"
+#include "tiler/mesh/edit_limits.h"
 
 #include <gtest/gtest.h>
 

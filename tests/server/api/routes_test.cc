@@ -1,3 +1,5 @@
+#include "server/routes.h"
+
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -12,14 +14,13 @@
 #include "config/options/option_table.h"
 #include "server/api/tile_formats.h"
 #include "server/http/text.h"
-#include "server/routes.h"
 #include "server/telemetry/redact.h"
 #include "tests/support/source_dir.h"
 
 namespace terrace::server {
 namespace {
 
-TEST(Router, FindsEveryUrl) {
+TEST(Routes, FindsEveryUrl) {
   const struct {
     const char* target;
     const char* label;
@@ -58,7 +59,7 @@ TEST(Router, FindsEveryUrl) {
   }
 }
 
-TEST(Router, ReadsTheTileAndTheQuery) {
+TEST(Routes, ReadsTheTileAndTheQuery) {
   const Result<Route> route = Routes().Match("/ma%75i/9/533/388.terrain?error=5&v=1");
   ASSERT_TRUE(route);
   EXPECT_EQ(route->dataset, "maui");
@@ -83,7 +84,7 @@ TEST(Router, ReadsTheTileAndTheQuery) {
   EXPECT_EQ(Routes().Match("/viewer/")->file, "index.html");
 }
 
-TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
+TEST(Routes, CountsImplicitTilesFromTheGlobesRoots) {
   const Result<Route> content = Routes().Match("/maui/3dtiles/9-272-359/3/5/2.glb");
   ASSERT_TRUE(content);
   EXPECT_EQ(content->dataset, "maui");
@@ -96,7 +97,7 @@ TEST(Router, CountsImplicitTilesFromTheGlobesRoots) {
   EXPECT_EQ(subtree->subtree_levels, 6);
 }
 
-TEST(Router, RefusesWhatIsNoUrl) {
+TEST(Routes, RefusesWhatIsNoUrl) {
   const char* const not_found[] = {
       "/nope",
       "/maui",
@@ -190,9 +191,9 @@ TEST(Router, RefusesWhatIsNoUrl) {
   }
 }
 
-TEST(Router, TakesTheLastTileOfTheDeepestLevel) { EXPECT_TRUE(Routes().Match("/maui/24/33554431/16777215.terrain")); }
+TEST(Routes, TakesTheLastTileOfTheDeepestLevel) { EXPECT_TRUE(Routes().Match("/maui/24/33554431/16777215.terrain")); }
 
-TEST(Router, RefusesMalformedTargets) {
+TEST(Routes, RefusesMalformedTargets) {
   for (const char* target : {"", "maui", "*", "ftp://x/", "http://x?y", "/a#b", "/%", "/%4", "/%zz",
                              "/a%00b/layer.json", "/a%0d%0ab/layer.json"}) {
     const Result<Route> route = Routes().Match(target);
@@ -201,7 +202,7 @@ TEST(Router, RefusesMalformedTargets) {
   }
 }
 
-TEST(Router, ReservesTheNamesOfItsOwnUrls) {
+TEST(Routes, ReservesTheNamesOfItsOwnUrls) {
   std::set<std::string> own;
   for (const DocumentedUrl& url : DocumentedUrls()) {
     const std::string first = url.pattern.substr(1, url.pattern.find('/', 1) - 1);
@@ -213,7 +214,7 @@ TEST(Router, ReservesTheNamesOfItsOwnUrls) {
   for (const char* name : {"maui", "", "layer.json", "{dataset}"}) EXPECT_FALSE(Routes().IsReserved(name)) << name;
 }
 
-TEST(Router, DescribesEachUrl) {
+TEST(Routes, DescribesEachUrl) {
   std::set<std::string_view> ids;
   for (const DocumentedUrl& url : DocumentedUrls()) {
     ASSERT_NE(url.operation, nullptr) << url.pattern << ": name its Operation in server/routes.cc or tile_formats.cc";
@@ -257,7 +258,7 @@ std::string Encoded(std::string_view target) {
 }
 
 // Otherwise its reply is private even with a version, and the log leaves a part of it out.
-TEST(Router, KnowsThatNoExampleIsASecret) {
+TEST(Routes, KnowsThatNoExampleIsASecret) {
   const std::regex of_nginx = PlainInNginx();
   int count = 0;
   const auto expect_plain = [&](const std::string& target) {
@@ -286,14 +287,14 @@ TEST(Router, KnowsThatNoExampleIsASecret) {
   EXPECT_FALSE(std::regex_search("/maui/grid?width=a:1", of_nginx));
 }
 
-TEST(Router, TellsWhichUrlsTakeABodyAndHowLarge) {
+TEST(Routes, TellsWhichUrlsTakeABodyAndHowLarge) {
   EXPECT_EQ(Routes().Match("/maui/heights")->row->max_body_bytes(10), 4096U + 640U);
   for (const char* target : {"/", "/datasets", "/maui/mesh", "/maui/0/0/0.terrain", "/metrics"}) {
     EXPECT_FALSE(Routes().Match(target)->row->takes_post()) << target;
   }
 }
 
-TEST(Router, KeepsAnEncodedSlashInsideItsSegment) {
+TEST(Routes, KeepsAnEncodedSlashInsideItsSegment) {
   EXPECT_EQ(Routes().Match("/a%2Fb/layer.json")->dataset, "a/b");
   EXPECT_EQ(Routes().Match("/viewer/..%2f..%2fetc%2fpasswd")->file, "../../etc/passwd")
       << "a key of a map, never a path";

@@ -12,10 +12,6 @@
 
 namespace terrace::tiler {
 
-// The bound that a mesh must keep at its nodes so that it stays within `error_m` of the ground. It is smaller than
-// `error_m`, because the heights of nodes are rounded to 2^-10 m and their positions are inexact.
-double NodeErrorBound(double error_m);
-
 // The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);
 

@@ -1,0 +1,53 @@
+#include "tiler/dataset.h"
+
+#include "engine/common/content_hash.h"
+#include "tiler/map/contour_tile.h"
+#include "tiler/map/map_heights.h"
+#include "tiler/map/relief.h"
+
+namespace terrace::tiler {
+namespace {
+
+// Combines two hashes; 0 if both are 0.
+std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
+  if (edits == 0 || deeper == 0) return edits | deeper;
+  dem::ContentHasher hasher;
+  hasher.Add(edits);
+  hasher.Add(deeper);
+  return hasher.Hash().low | 1;
+}
+
+}  // namespace
+
+ErrorScale Dataset::error_scale() const {
+  if (source) return {error_fraction, source->max_source_level()};
+  return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
+}
+
+std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request) {
+  int size = request.side_px, margin = 0;
+  switch (request.format) {
+    case TileFormat::kQuantizedMesh:
+    case TileFormat::kGlb:
+      return request.extensions.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
+                                         : source.EditsHash(request.key);
+    case TileFormat::kImagery:
+    case TileFormat::kGeodeticImagery:
+      return 0;
+    case TileFormat::kHeightPng:
+      break;
+    case TileFormat::kHillshade:
+    case TileFormat::kSlope:
+      margin = kReliefMargin;
+      break;
+    case TileFormat::kContours:
+      size = kSidesPx[0];
+      margin = kContourMargin;
+      break;
+  }
+  const MapWindow window(request.key, size, margin);
+  if (window.depth > source.info().max_mercator_depth) return 0;
+  return source.MercatorEditsHash(window.depth, window.nodes);
+}
+
+}  // namespace terrace::tiler

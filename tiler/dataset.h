@@ -1,0 +1,71 @@
+// A dataset: its sources or its archive, and the options of its tiles.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "engine/dem/dem_source.h"
+#include "engine/image/imagery.h"
+#include "engine/image/water_raster.h"
+#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
+#include "tiler/mesh/tile_mesher.h"
+#include "tiler/store/baked_tiles.h"
+#include "tiler/tile/requested_error.h"
+#include "tiler/tile/tile_request.h"
+
+namespace terrace::tiler {
+
+// The source of a dataset's water: a mask, a sea level, or none. At most one is set.
+struct WaterOptions {
+  std::shared_ptr<const dem::WaterRaster> mask;
+  std::optional<double> sea_level_m;  // in the source's vertical datum
+
+  bool any() const { return mask != nullptr || sea_level_m.has_value(); }
+};
+
+// The source and encoding of textures of GLB tiles.
+struct ImageryOptions {
+  std::shared_ptr<const dem::Imagery> image;                   // null: none
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
+  int side = 512;                                              // pixels along a tile's edge, at most
+  int quality = 80;                                            // of EncodePicture
+  std::string attribution;
+};
+
+// A file that a dataset was opened from, and its stamp from before it was opened.
+struct WatchedFile {
+  std::string path;
+  std::optional<dem::FileStamp> stamp;  // nullopt: there was none
+};
+
+// One served dataset. Copies share the source, water and imagery, which are immutable: a reload keeps a dataset that
+// has not changed.
+struct Dataset {
+  std::string name;
+  std::string attribution;
+  double error_fraction = 0.5;
+  MeshOptions mesh_options;
+  proto::GlbOptions glb;                         // compression: for GLB requests that name none
+  std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
+  std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
+  std::vector<WatchedFile> baked_files;          // a change of one of them means that there is another archive
+  WaterOptions water;
+  ImageryOptions imagery;
+  int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
+  std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
+  // The same without edits; 0: there are none. Caches are keyed by it and by TileEditsHash: tiles that no edit touches
+  // stay.
+  std::uint64_t unedited_generation = 0;
+  std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
+  ErrorScale error_scale() const;  // valid as long as `baked`
+  std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
+};
+
+// A hash of the edits that the tile of a request depends on; 0: none.
+std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request);
+
+}  // namespace terrace::tiler
