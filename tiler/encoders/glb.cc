@@ -39,7 +39,7 @@ struct MeshedGlb {
   proto::GridMesh mesh;                  // with normals and skirts
   double max_error_m = 0;                // of the flat triangles, measured on the grid points
   double surface_error_m = 0;            // the same everywhere, not only at the lattice's samples
-  std::chrono::microseconds replayed{};  // time until the mesh was replayed
+  std::chrono::microseconds replayed{};  // duration of ReplayMesh
   tin::TinMesh tin;                      // without skirts
   std::vector<geo::Vec3> positions;      // of its vertices
 };
