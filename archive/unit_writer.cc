@@ -94,21 +94,21 @@ Result<FileSummary> VerifyUnit(const std::string& place, const std::string& name
     return MakeError(ErrorCode::kInvalidArgument, "{} was baked from other sources or with other options", path);
   }
   const bool is_mercator = tiler::IsMercator(options.kind.format);
-  FileSummary unit_file;
+  FileSummary summary;
   const Result<void> read = (*file)->ForEach([&](std::uint64_t tile_id, const ArchivedTile&) -> Result<void> {
     const std::optional<geo::TileKey> key = TileKeyOf(tile_id, is_mercator);
     if (!key || UnitNameOf(*key) != name) {
       return MakeError(ErrorCode::kInvalidArgument, "{} has a tile of another unit", path);
     }
-    ++unit_file.tiles;
+    ++summary.tiles;
     return {};
   });
   if (!read) return as_damaged(read.error());
-  unit_file.bytes = (*file)->bytes();
+  summary.bytes = (*file)->bytes();
   const Result<std::string> hash = HashOfFile(path);
   if (!hash) return as_damaged(hash.error());
-  unit_file.xxh3 = *hash;
-  return unit_file;
+  summary.xxh3 = *hash;
+  return summary;
 }
 
 }  // namespace terrace::archive

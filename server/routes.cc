@@ -151,11 +151,11 @@ std::size_t MaxRaysBytes(std::size_t max_rays) { return 4096 + 192 * max_rays; }
 
 // RouteRow::handle of documents.
 template <DocumentAnswer (*describe)(const HandlerState&, const RequestContext&)>
-Answer Write(const HandlerState& from, const RequestContext& context) {
-  return from.documents.Make(describe(from, context), context);
+Answer Write(const HandlerState& state, const RequestContext& context) {
+  return state.documents.Make(describe(state, context), context);
 }
 
-DocumentAnswer DescribeUrls(const HandlerState& from, const RequestContext& context);
+DocumentAnswer DescribeUrls(const HandlerState& state, const RequestContext& context);
 
 // Most frequent routes first.
 constexpr RouteRow kRows[] = {

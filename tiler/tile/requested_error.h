@@ -22,7 +22,7 @@ struct ErrorScale {
   // The deepest level of the sources; edits may add deeper ones. From it on tiles have all detail of the sources, so
   // RequestedError::at_least does not keep their error at the default one.
   int max_source_level = geo::kMaxLevel;
-  std::span<const int> default_steps = {};  // by level, of requests without an error; 0 beyond; of Dataset::baked
+  std::span<const int> default_steps = {};  // by level, if no error is requested; 0 beyond; Dataset::baked owns them
 };
 
 // Returns the step of the level's ladder for a requested error.

@@ -64,8 +64,8 @@ class SeedWriter final : public archive::UnitWriter {
     if (!seed_.Take(tile.bytes.size() + kRecordOverheadBytes)) {
       return MakeError(ErrorCode::kCancelled, "the cache is full");
     }
-    ++unit_file_.tiles;
-    unit_file_.bytes += tile.bytes.size();
+    ++summary_.tiles;
+    summary_.bytes += tile.bytes.size();
     seed_.store->Insert(seed_.KeyOf(bake::RequestOf(manifest_, key)), std::make_shared<const tiler::EncodedTile>(tile));
     return {};
   }
@@ -77,14 +77,14 @@ class SeedWriter final : public archive::UnitWriter {
       return MakeError(ErrorCode::kUnavailable,
                        "the cache cannot be written; look at its disk, and run the same command again");
     }
-    return unit_file_;
+    return summary_;
   }
 
  private:
   Seed& seed_;
   const archive::Manifest manifest_;
   const std::uint64_t dropped_before_;
-  archive::FileSummary unit_file_;
+  archive::FileSummary summary_;
 };
 
 std::uint64_t BytesOfRecords(const std::filesystem::path& folder) {
