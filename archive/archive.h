@@ -26,7 +26,8 @@ class Archive {
   // it. kNotFound: nothing is there, or the bake is unfinished. kInvalidArgument: it is something else, or of a newer
   // format. kUnavailable: it cannot be read now. Messages name the place and the remedy.
   static Result<std::shared_ptr<const Archive>> Open(const std::string& place);
-  // The archives of a place: one, or those of several formats in the folders FolderOf. Errors as Open.
+  // The archives of a place: one, or those of several formats, in the folders that FolderOf names. Errors: those of
+  // Open.
   static Result<std::vector<std::shared_ptr<const Archive>>> OpenAll(const std::string& place);
   // The files that a place is opened from, and that a bake replaces last. Most of them do not exist.
   static std::vector<std::string> FilesOf(const std::string& place);

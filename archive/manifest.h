@@ -1,8 +1,8 @@
 // The manifest of an archive: what was baked from what, and which files hold it. docs/formats/archive.md describes the
 // files. An archive without its manifest is an unfinished bake.
 //
-// An archive has tiles of one kind. A bake of several formats writes an archive for each, in the folders FolderOf of
-// its place.
+// An archive has tiles of one kind. A bake of several formats writes an archive for each, in the folders that
+// FolderOf names.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
 // The configuration of a server, with its defaults: plain values that file/parse.h or options/options.h have checked.
-// A Config does not change after the start; threads share it without locks.
+// A Config is not changed once threads share it, so they need no locks. A reload makes a new one.
 #pragma once
 
 #include <chrono>

@@ -21,8 +21,8 @@ class SourceErrorBound {
   static constexpr int kGroup = 16;
 
   // `window` and `heights`: the tile's samples with a halo of one, as served. `blends`: raster grids are blended at
-  // their edges. `counts_between`: the heights between samples count as well as the samples, as those of a replacement
-  // do, which are wanted at the samples of others.
+  // their edges. `counts_between`: the heights between samples count as well as the samples. True for the source of
+  // an edit `replace`, whose heights are compared at the samples of other sources.
   SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends,
                    bool counts_between = false);
 

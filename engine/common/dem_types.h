@@ -204,10 +204,10 @@ struct EditOutline {
 // empty if nothing is required of it. Depends on the nodes' positions and their level alone.
 struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
-  std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As long as `weights`
+  std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As many as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  // 1: in an edit `hole` (EditOp::kHole; not a void). A triangle is left out if each of its nodes is in such a hole or
-  // forced, and at least one is in the hole.
+  // 1: in an edit `hole` (EditOp::kHole; not a void). A triangle is left out if each node that it covers, corners
+  // included, is in such a hole or forced, and at least one is in the hole.
   std::vector<std::uint8_t> no_triangles;
 
   bool any() const { return !weights.empty() || !forced.empty() || !no_triangles.empty(); }

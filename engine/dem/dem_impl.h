@@ -107,7 +107,7 @@ class DemSource::Impl {
   std::vector<std::unique_ptr<DemSource>> replacements;  // by Edit::replacement
   StampedFiles edit_files;
   std::uint64_t unedited_fingerprint = 0;
-  HeightRange unedited_heights;  // of `info`
+  HeightRange unedited_heights;  // `info.heights` without edits
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
   // Level, column, row; then for Mercator windows their columns and rows, for edits 0, 0, for deeper tiles -1, -1.

@@ -218,7 +218,8 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
 }
 
 std::vector<std::size_t> DemSource::Impl::GridsAt(const Box& box) const {
-  // The files are checked in any case, so that a tile of floor does not outlive the dataset's only source.
+  // A single grid is read even where it has no heights. Reading checks its files, so that a tile of floor does not
+  // outlive the dataset's only source.
   return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 

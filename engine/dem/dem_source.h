@@ -98,7 +98,7 @@ class DemSource {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool converts() const;
 
-  // Edits (docs/edits.md). All of these are 0 or empty if there are no edits.
+  // Edits (docs/edits.md). Without edits all of these except AvailabilityBelow are 0 or empty.
   //
   // The requirements of edits for the mesh of a tile.
   MeshDemands DemandsOf(const geo::TileKey& key) const;

@@ -114,7 +114,8 @@ class RasterGrid {
   Result<void> SetHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                           const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells of the window's nodes that SetHeights uses, with columns moved near those of a trace's window.
+  // Returns the cells in which SetHeights locates the window's nodes. Where columns wrap, they are moved by whole turns
+  // to lie near `samples`, the window of a GridTrace.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // SetHeights for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
@@ -145,7 +146,8 @@ class RasterGrid {
   // Returns the range of the pixels in a box. Pixels that no member covers are voids.
   BlockRange Ranges(const Box& pixels) const;
 
-  // Returns a box around the pixels from which the holes that meet a box are filled; nothing without holes.
+  // The holes that meet `pixels` are filled from the heights around them. Returns a box that contains all of these
+  // heights; nothing if no hole meets `pixels`.
   std::optional<Box> BoxAroundHoles(const Box& pixels, int factor) const;
 
   // Adds to a hash what heights depend on besides the georeference, the vertical datum, and the members' samples and

@@ -117,7 +117,8 @@ class DataDependentCriterion {
   static constexpr std::size_t kLikelyEdges = 64;  // of an outline
   static constexpr std::size_t kSpareSlots = std::size_t{1} << 10;
   static constexpr std::size_t kMaxPairs = (Star::kMaxLeftOut + 1) / 3;  // in a scan without other triangles
-  // Star::left_out of such a scan: the triangle between two pairs, which are the triangles of p-w of two suspects.
+  // Star::left_out of such a scan. A pair is the two triangles beside the edge p-w of a suspect; the triangle between
+  // two pairs is left out.
   static constexpr std::uint32_t kBetweenPairs = 0b100'100'100'100'100'100'100'100'100'100;
 
   // The fit of a triangle that has p as a corner.

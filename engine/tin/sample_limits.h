@@ -25,7 +25,7 @@ namespace terrace::tin {
 // All members have a value for each sample, row by row, or are empty.
 struct SampleLimits {
   std::vector<float> weights;        // at least 1
-  std::vector<float> caps;           // metres, above 0; infinite: none. As long as `weights`
+  std::vector<float> caps;           // metres, above 0; infinite: none. As many as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
 
   bool empty() const { return weights.empty() && forced.empty(); }

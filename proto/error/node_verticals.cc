@@ -30,7 +30,7 @@ NodeVerticals::NodeVerticals(const LatticeView& lattice)
   const HeightExtent extent = ExtentOf(lattice.heights);
   lowest_ = extent.lowest;
   highest_ = extent.highest;
-  tilt_ = (highest_ - lowest_ + 1) / kMinRadius;  // vertices are rounded
+  relief_per_radius_ = (highest_ - lowest_ + 1) / kMinRadius;  // vertices are rounded
   narrowest_ = std::min(rows_.front().cos, rows_.back().cos);
   per_narrowest_ = 1 / std::max(narrowest_, 1e-12);
   per_step_ = 1 / step_;

@@ -83,9 +83,9 @@ class NodeVerticals {
     const double width2 = width * width, height2 = height * height;
     const double sagitta = 1.1 * geo::kSemiMajorAxis / 6 * (width2 + height2);
     if (narrowest_ < 1e-3 || width > 0.5 || height > 0.5) return {kUnknownShift, sagitta};
-    const double x =
-        width * (height * per_narrowest_ + 2 * tilt_ + width2 / 8) + beside_m / kMinRadius * per_narrowest_;
-    const double y = width2 / 8 + height * (tilt_ + 0.02 * height + height2) + beside_m / kMinRadius;
+    const double x = width * (height * per_narrowest_ + 2 * relief_per_radius_ + width2 / 8) +
+                     beside_m / kMinRadius * per_narrowest_;
+    const double y = width2 / 8 + height * (relief_per_radius_ + 0.02 * height + height2) + beside_m / kMinRadius;
     return {{x * per_step_ + 1e-9, y * per_step_ + 1e-9}, sagitta};
   }
 
@@ -127,7 +127,8 @@ class NodeVerticals {
   double per_step_ = 0;
   double narrowest_ = 0, per_narrowest_ = 0;  // the smallest cosine of a row's latitude
   double lowest_ = 0, highest_ = 0;
-  double tilt_ = 0;   // between the highest and the lowest vertex, over the radius of curvature, at most
+  // At least the height of the highest vertex above the lowest one, over the radius of curvature.
+  double relief_per_radius_ = 0;
   double south_ = 0;  // radians: the latitude of row 0
   std::vector<geo::SinCos> columns_;
   std::vector<Parallel> rows_;

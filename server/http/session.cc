@@ -231,7 +231,8 @@ asio::awaitable<bool> Session::ServeOne() {
   co_return co_await Reply(std::get<Response>(answer), /*can_respond_again=*/true);
 }
 
-// Returns false if nobody waits for the answer: the client is gone, or others get the request's memory.
+// For a request whose answer nobody waits for: the client is gone, or others get the request's memory. Returns false,
+// for the caller to return: the connection must be closed.
 asio::awaitable<bool> Session::GiveUp() {
   if (displaced_) {
     co_await RefuseUpload();
@@ -366,14 +367,14 @@ TransferBudget::HoldRequest Session::HoldRequestOf(const Response& response) con
 }
 
 // Releases the reply's body, waits for memory, and makes the reply again, usually from a cache: a waiting body must not
-// occupy the memory that it waits for. Returns no room if there was no memory before the deadline, and nothing as
-// WhileConnected.
+// occupy the memory that it waits for. The outer optional is empty where WhileConnected returns
+// nothing; the inner one if there was no memory before the deadline.
 asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& response) {
   for (;;) {
     TransferBudget::HoldRequest hold_request = HoldRequestOf(response);
     const std::size_t bytes = hold_request.bytes;
     hold_request.body = nullptr;
-    Response bare;  // its lines share ownership with the body
+    Response bare;  // the header lines of `response` would keep its body alive
     bare.labels = std::move(response.labels);
     response = std::move(bare);
     auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), Deadline()));

@@ -51,7 +51,8 @@ using PoolJobPtr = std::shared_ptr<PoolJob>;
 
 class FairQueue {
  public:
-  // `threads`: how many run the jobs, at least 1. At most `threads` - 1 of several run long jobs at a time.
+  // `threads`: how many run the jobs, at least 1. If there are several, all but one may run long jobs at a time; a
+  // single thread runs both kinds.
   explicit FairQueue(unsigned threads);
 
   void Push(PoolJobPtr job, JobClock::time_point now);

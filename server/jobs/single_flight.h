@@ -199,7 +199,7 @@ void SingleFlight<Key, Value, Hash>::RunFlight(const FlightPtr& flight, const Bu
     others.swap(flight->jobs);
   }
   for (const auto& job : others) pool_.Withdraw(job.lock());
-  Complete(flight, Outcome(flight->name, build, flight->stop.get_token()));
+  Complete(flight, RunWork(flight->name, build, flight->stop.get_token()));
 }
 
 template <typename Key, typename Value, typename Hash>

@@ -47,9 +47,9 @@ Error FailureOf(std::string_view name, const std::exception& thrown);
 // kOverloaded: the job of the work `name` was dropped for others. Never throws.
 Error DroppedJobError(std::string_view name);
 
-// The result of the work; an exception counts as kUnavailable. Never throws, which would end the program.
+// Runs the work and returns its result; an exception counts as kUnavailable. Never throws, which would end the program.
 template <typename T>
-Result<T> Outcome(std::string_view name, const Work<T>& work, std::stop_token stop) {
+Result<T> RunWork(std::string_view name, const Work<T>& work, std::stop_token stop) {
   try {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "{}: stopped before it began", name);
     return work(std::move(stop));
@@ -172,7 +172,7 @@ asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
   const auto state = std::make_shared<RunState<T>>(std::move(work), cancelled(), waiter);
   const auto job = std::make_shared<PoolJob>();
   job->order = order;
-  job->run = [state] { state->Finish(Outcome(RunState<T>::kName, state->work, state->stop.get_token())); };
+  job->run = [state] { state->Finish(RunWork(RunState<T>::kName, state->work, state->stop.get_token())); };
   job->on_dropped = [state] { state->Finish(tl::unexpected(DroppedJobError(RunState<T>::kName))); };
   const WaitGuard<T> guard(*this, state, job);
   if (Result<void> submitted = Submit(job); !submitted) co_return tl::unexpected(std::move(submitted.error()));

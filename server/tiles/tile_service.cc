@@ -61,7 +61,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
     Result<tiler::TilePtr> tile = tiers_.FindOrBuild(key, [&] {
       is_built = true;
       const Work<tiler::EncodedTile> build = std::bind_front(&tiler::TilePipeline::Build, catalog->pipeline, request);
-      Result<tiler::EncodedTile> built = Outcome(NameOf(request), build, stop);
+      Result<tiler::EncodedTile> built = RunWork(NameOf(request), build, stop);
       if (built) built->times.queue = queued;
       return built;
     });

@@ -68,8 +68,8 @@ class TileService {
     return pool_.Run<T>(std::move(work), OrderOf(length, deadline, client));
   }
 
-  // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed.
-  // Refuses such tiles from now on.
+  // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. Tiles
+  // of other datasets are not inserted any more; a build that has begun may still insert a tile with the old edits.
   void RetainTilesOf(const Catalog& catalog);
 
   // TileTiers::Erase.

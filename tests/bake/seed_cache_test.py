@@ -110,14 +110,16 @@ class SeedCache(unittest.TestCase):
         process = subprocess.Popen(self.command(config, cache, "--threads", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 60
         # Records are in the write-ahead log as soon as a batch of them is written.
-        while sum(file.stat().st_size for file in cache.rglob("*.log")) < 1 << 20 and time.monotonic() < deadline:
-            time.sleep(0.01)
+        while sum(file.stat().st_size for file in cache.rglob("*.log")) == 0 and time.monotonic() < deadline:
+            self.assertIsNone(process.poll(), "the seeding ended before it was killed")
+            time.sleep(0.001)
         process.kill()
         process.communicate()
         seeded = self.seed(config, cache)
         self.assertEqual(seeded.returncode, 0, seeded.stderr)
         summary = json.loads(seeded.stdout.splitlines()[-1])
         self.assertGreater(summary["kept_tiles"], 0)
+        self.assertGreater(summary["built_tiles"], 0)
         self.assertEqual(summary["kept_tiles"] + summary["built_tiles"], summary["tiles"])
         found, built = self.crawl(config)
         self.assertEqual((built, {tier for tier, _ in found.values()}), (0, {"disk"}))

@@ -97,7 +97,8 @@ describe('the viewer', () => {
   it('fetches finer meshes when the slider moves', async () => {
     const triangles = [];
     await page.locator('#fraction').focus();
-    for (const key of ['Home', 'End']) {
+    // The coarsest last: the tests below take half the time with it.
+    for (const key of ['End', 'Home']) {
       await page.keyboard.press(key);
       const fraction = key === 'Home' ? 4 : 1 / 32;
       await page.waitForFunction((value) => terrace.state.fraction === value, fraction);
@@ -106,7 +107,7 @@ describe('the viewer', () => {
       const asked = `/layer.json?fraction=${fraction}`;
       assert.ok(page.requested.some((url) => url.includes(asked)), asked);
     }
-    assert.ok(triangles[1] > 1.5 * triangles[0], `${triangles[0]} triangles, then ${triangles[1]}`);
+    assert.ok(triangles[0] > 1.5 * triangles[1], `${triangles[0]} triangles, then ${triangles[1]}`);
   });
 
   for (const [name, least] of [['contours', 0.02], ['wireframe', 0.2]]) {
@@ -294,7 +295,7 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
   after(() => end(browser, server));
 
   it('are asked for and shown', async () => {
-    const page = await openPage(browser, `${server.url}/#dataset=hills`);
+    const page = await openPage(browser, `${server.url}/#dataset=hills&fraction=4`);
     const unauthorized = [];
     page.on('request', (request) => {
       const needs = new URL(request.url()).pathname.startsWith('/hills/');
@@ -303,7 +304,7 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     await page.locator('#token-card').waitFor({ timeout: kSettleMs });
     assert.match(await page.locator('#token-reason').innerText(), /hills needs a token/);
     assert.ok(await page.locator('#token-cancel').isVisible(), 'there is something to see without');
-    assert.match(page.url(), /#dataset=hills$/, 'a reload asks again');
+    assert.match(page.url(), /#dataset=hills&fraction=4$/, 'a reload asks again');
     await assertAccessible(page, 'asking for a token');
 
     await page.locator('#token').fill('another-token-of-the-kind');
@@ -316,6 +317,7 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     assert.ok(drawn.deepest > 9 && await page.locator('#token-card').isHidden());
     await page.locator('#tiles3d').check();
     await page.waitForFunction(() => terrace.globe.tiles3d.drawn().tiles > 1, undefined, { timeout: kSettleMs });
+    await page.locator('#tiles3d').uncheck();
 
     await page.reload();
     await settle(page);

@@ -120,7 +120,7 @@ TEST(SurfaceError, HoldsBetweenSamplesOnNoiseThatSamplesCannotShow) {
 }
 
 TEST(SurfaceError, BoundsFlatTrianglesFromTheWholeEarthToAStreet) {
-  for (int level = 0; level <= 14; level += 2) {
+  for (const int level : {0, 5, 10, 14}) {
     for (const double latitude : {-90.0, -40.0, 0.0, 75.0}) {
       const std::int64_t row = std::clamp<std::int64_t>(
           static_cast<std::int64_t>((latitude + 90) / 180 * static_cast<double>(geo::TileRows(level))), 0,

@@ -12,7 +12,7 @@
 
 namespace terrace::tiler {
 
-// The limits that edits set for the samples of a tile; empty: none. Depends on edits, key and nodes alone.
+// The limits that edits set for the samples of a tile; empty: none. Depends on the edits and the key, not on heights.
 tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands);
@@ -26,8 +26,8 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
                                double error_m);
 
-// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each of its nodes is in
-// the hole or forced (MeshDemands), and at least one is in the hole.
+// Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each node that it
+// covers, corners included, is in the hole or forced (MeshDemands), and at least one is in the hole.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
 // The same for a field of `width` nodes a row.

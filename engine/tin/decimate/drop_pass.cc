@@ -12,8 +12,8 @@
 
 #include "engine/core/check.h"
 #include "engine/tin/decimate/vertex_rings.h"
-#include "engine/tin/mesh/hole.h"
 #include "engine/tin/mesh/predicates.h"
+#include "engine/tin/mesh/removal_polygon.h"
 #include "engine/tin/sagitta.h"
 #include "engine/tin/scan/triangle_spans.h"
 
@@ -59,7 +59,7 @@ class DropPass {
   }
   std::vector<std::uint32_t> InOrderOfVisits(std::vector<std::uint32_t> sweep) const;
   bool Drop(std::uint32_t vertex);
-  void LoadHole(std::uint32_t vertex);
+  void LoadPolygon(std::uint32_t vertex);
   bool Fits(std::size_t apex) const;
   bool TurnsOnWire(SamplePosition a, SamplePosition b, SamplePosition c) const;
 
@@ -68,7 +68,7 @@ class DropPass {
   Sagitta sagitta_;
   std::vector<Vertex> vertices_;
   VertexRings rings_;
-  Hole hole_;                         // of the current vertex
+  RemovalPolygon polygon_;            // of the current vertex
   std::vector<std::uint32_t> next_;   // vertices whose stars changed: the next sweep
   std::vector<std::uint8_t> awaits_;  // by vertex: in this sweep and not yet visited, or in next_
 };
@@ -117,9 +117,9 @@ std::vector<std::uint32_t> DropPass::InOrderOfVisits(std::vector<std::uint32_t> 
 
 bool DropPass::Drop(std::uint32_t vertex) {
   const std::span<const std::uint32_t> ring = rings_.Of(vertex);
-  if (ring.size() > Hole::kMaxSides || IsForced(vertices_[vertex].position)) return false;
-  LoadHole(vertex);
-  for (const std::size_t apex : hole_.Fans(options_.max_error)) {
+  if (ring.size() > RemovalPolygon::kMaxSides || IsForced(vertices_[vertex].position)) return false;
+  LoadPolygon(vertex);
+  for (const std::size_t apex : polygon_.Fans(options_.max_error)) {
     if (!Fits(apex)) continue;
     for (const std::uint32_t neighbour : ring) {
       if (awaits_[neighbour] || IsOnBorder(vertices_[neighbour].position)) continue;
@@ -132,21 +132,21 @@ bool DropPass::Drop(std::uint32_t vertex) {
   return false;
 }
 
-void DropPass::LoadHole(std::uint32_t vertex) {
+void DropPass::LoadPolygon(std::uint32_t vertex) {
   const auto [p, height] = vertices_[vertex];
   const bool is_void = field_.has_voids() && std::isnan(field_.At(p.x, p.y));
-  hole_.Begin(p, is_void ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(height));
+  polygon_.Begin(p, is_void ? std::numeric_limits<double>::quiet_NaN() : static_cast<double>(height));
   for (const std::uint32_t corner : rings_.Of(vertex)) {
-    hole_.AddCorner(vertices_[corner].position, static_cast<double>(vertices_[corner].height));
+    polygon_.AddCorner(vertices_[corner].position, static_cast<double>(vertices_[corner].height));
   }
 }
 
 bool DropPass::Fits(std::size_t apex) const {
-  for (std::size_t i = 0; i < hole_.triangle_count(); ++i) {
-    const auto [a, b, c] = hole_.Triangle(apex, i);
-    if (!TurnsOnWire(hole_.position(a), hole_.position(b), hole_.position(c))) return false;
-    const std::array<Corner, 3> corners = {hole_.corner(a), hole_.corner(b), hole_.corner(c)};
-    const double sagitta = sagitta_.Bound(hole_.position(a), hole_.position(b), hole_.position(c));
+  for (std::size_t i = 0; i < polygon_.triangle_count(); ++i) {
+    const auto [a, b, c] = polygon_.Triangle(apex, i);
+    if (!TurnsOnWire(polygon_.position(a), polygon_.position(b), polygon_.position(c))) return false;
+    const std::array<Corner, 3> corners = {polygon_.corner(a), polygon_.corner(b), polygon_.corner(c)};
+    const double sagitta = sagitta_.Bound(polygon_.position(a), polygon_.position(b), polygon_.position(c));
     const bool fits = options_.limits != nullptr
                           ? SamplesAreAllowed(field_, corners, sagitta, *options_.limits, options_.max_error)
                           : SamplesAreWithin(field_, corners, options_.max_error - sagitta);

@@ -3,10 +3,11 @@
 // Greedy insertion never removes a vertex, though later insertions often make an earlier one redundant. Garland and
 // Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5, propose a hybrid of
 // refinement and decimation; this is one. Inner vertices are visited from the last inserted to the first, one block of
-// 256 x 256 samples after the other. A vertex is dropped if its hole can be filled by a fan of triangles around one of
-// its neighbours that keeps every sample of the hole within the bound. Fans are tried in the order of their error at
-// the dropped vertex, smallest first, then of their position in the ring (vertex_rings.h); the first fan within the
-// bound is taken. Neighbours of a dropped vertex are visited again in the next sweep, until a sweep drops nothing.
+// 256 x 256 samples after the other. A vertex is dropped if the polygon that it leaves can be filled by a fan of
+// triangles around one of its neighbours that keeps every sample of the polygon within the bound. Fans are tried in the
+// order of their error at the dropped vertex, smallest first, then of their position in the ring (vertex_rings.h); the
+// first fan within the bound is taken. Neighbours of a dropped vertex are visited again in the next sweep, until a
+// sweep drops nothing.
 //
 // Border vertices stay: fields that share a border still match along it. The result is neither Delaunay nor a prefix of
 // a finer mesh: it holds for one error bound.

@@ -29,8 +29,8 @@ class VertexRings {
     return {pool_.data() + ring.begin, ring.size};
   }
 
-  // Removes a vertex with a closed ring and fills its hole with the fan of triangles from ring[apex]. Precondition:
-  // these triangles are counter-clockwise.
+  // Removes a vertex with a closed ring and fills the polygon that it leaves with the fan of triangles from ring[apex].
+  // Precondition: these triangles are counter-clockwise.
   void Remove(std::uint32_t vertex, std::size_t apex);
 
   // The triangles that are left, each from its smallest vertex, ordered by it: a function of the rings alone.

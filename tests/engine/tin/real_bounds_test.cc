@@ -30,7 +30,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::int64_t kMaxSamples = 1'500'000;
-constexpr int kWindow = 1201;
+constexpr int kWindow = 801;
 constexpr int kBlock = 256;
 
 struct Dem {

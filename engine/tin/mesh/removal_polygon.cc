@@ -1,4 +1,4 @@
-#include "engine/tin/mesh/hole.h"
+#include "engine/tin/mesh/removal_polygon.h"
 
 #include <cmath>
 
@@ -6,7 +6,7 @@
 
 namespace terrace::tin {
 
-std::span<const std::size_t> Hole::Fans(double max_error) {
+std::span<const std::size_t> RemovalPolygon::Fans(double max_error) {
   // All fans of a triangle are equal, and opposite apexes of a quadrilateral give equal fans.
   const std::size_t different = sides_ == 3 ? 1 : sides_ == 4 ? 2 : sides_;
   std::array<double, kMaxSides> errors;
@@ -26,7 +26,7 @@ std::span<const std::size_t> Hole::Fans(double max_error) {
   return {apexes_.data(), count};
 }
 
-bool Hole::IsCounterClockwise(std::size_t apex) const {
+bool RemovalPolygon::IsCounterClockwise(std::size_t apex) const {
   for (std::size_t i = 0; i < triangle_count(); ++i) {
     const auto [a, b, c] = Triangle(apex, i);
     if (Orientation(positions_[a], positions_[b], positions_[c]) <= 0) return false;
@@ -35,7 +35,7 @@ bool Hole::IsCounterClockwise(std::size_t apex) const {
 }
 
 // The vertex lies in one triangle, between the spokes to b and c or on one of them.
-double Hole::ErrorAtVertex(std::size_t apex) const {
+double RemovalPolygon::ErrorAtVertex(std::size_t apex) const {
   if (std::isnan(height_)) return 0;
   std::size_t i = 0;
   while (i + 1 < triangle_count() && Orientation(positions_[apex], positions_[Wrap(apex + i + 2)], vertex_) > 0) ++i;

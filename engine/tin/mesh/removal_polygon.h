@@ -1,9 +1,9 @@
-// The hole that the removal of an inner vertex leaves, and the fans of triangles that can fill it. The hole is a
-// polygon, star-shaped around the vertex.
+// The polygon that the removal of an inner vertex leaves, star-shaped around the vertex, and the fans of triangles that
+// can fill it.
 //
-// A fan has an apex among the corners of the hole and joins it to all others. Its triangle i is (apex, apex + i + 1,
-// apex + i + 2), cyclic. If all triangles are counter-clockwise, they cover the hole exactly once: their signed areas
-// add up to its winding number, which is 1 inside.
+// A fan has an apex among the corners of the polygon and joins it to all others. Its triangle i is (apex, apex + i + 1,
+// apex + i + 2), cyclic. If all triangles are counter-clockwise, they cover the polygon exactly once: their signed
+// areas add up to its winding number, which is 1 inside.
 //
 // Not thread-safe; different objects are independent.
 #pragma once
@@ -18,9 +18,9 @@
 
 namespace terrace::tin {
 
-class Hole {
+class RemovalPolygon {
  public:
-  // Larger holes are not filled: a hole usually has six sides, and trying all of its fans takes time quadratic in the
+  // Larger polygons are not filled: most have six sides, and trying all fans takes time quadratic in the
   // number of sides. The value is not critical: with 16 or 64, two of the paper's DEMs end within one vertex of the
   // same count at 1, 5 and 20 m.
   static constexpr std::size_t kMaxSides = 32;
