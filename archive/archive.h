@@ -29,7 +29,8 @@ class Archive {
   // The archives of a place: one, or those of several formats, in the folders that FolderOf names. Errors: those of
   // Open.
   static Result<std::vector<std::shared_ptr<const Archive>>> OpenAll(const std::string& place);
-  // The files that a place is opened from, and that a bake replaces last. Most of them do not exist.
+  // The names of all files from which Open may open a place, and which a bake replaces last: the single file and the
+  // manifest of each format. A place has only some of them.
   static std::vector<std::string> FilesOf(const std::string& place);
   virtual ~Archive() = default;
 

@@ -74,7 +74,7 @@ Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog) {
   if (!index) return tl::unexpected(index.error());
   const DatasetView& found = catalog.datasets[*index];
   Purge purge{found.name, found.version(), {}};
-  purge.selection.generation = found.cache_generation();
+  purge.selection.generation = found.cache_generation;
   if (box) {
     const Result<dem::GeoBounds> bounds = ParseBox(*box);
     if (!bounds) return tl::unexpected(bounds.error());

@@ -61,7 +61,7 @@ struct Dataset {
   // stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
-  ErrorScale error_scale() const;  // valid as long as `baked`
+  ErrorScale error_scale() const;  // its `default_steps` is a view into `baked`, if there is one
   std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
 };
 

@@ -1,5 +1,5 @@
-// The encoder of each tile format, one row each; server/api/tile_formats.cc has one row for the requests of each
-// format.
+// The encoder of each tile format, one row each. server/api/tile_formats.cc has one row for each suffix of a format's
+// URLs.
 #pragma once
 
 #include <stop_token>

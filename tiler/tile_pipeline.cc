@@ -187,7 +187,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   return std::shared_ptr<const DrawnMesh>(std::move(mesh));
 }
 
-MeshOfTile TilePipeline::MeshesOf(std::uint32_t dataset, const DrawnSurface& surface,
+FindMesh TilePipeline::MeshFinder(std::uint32_t dataset, const DrawnSurface& surface,
                                   const std::stop_token& stop) const {
   return [this, dataset, surface, stop](const geo::TileKey& key) {
     const Dataset& of = datasets_[dataset];
@@ -208,7 +208,7 @@ Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const 
   if (const Result<void> has = CheckHasSurface(of, surface); !has) return tl::unexpected(has.error());
   const Result<int> level = LevelOf(surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  return tiler::ReadDrawnPoints(TilesOf(of), *level, points, normals, MeshesOf(dataset, surface, stop), stop);
+  return tiler::ReadDrawnPoints(TilesOf(of), *level, points, normals, MeshFinder(dataset, surface, stop), stop);
 }
 
 Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
@@ -229,7 +229,7 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
   if (!of.source) {
     if (const Result<void> bounded = CheckSamplesAlong(*level, rays); !bounded) return tl::unexpected(bounded.error());
   }
-  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshesOf(dataset, *surface, stop), stop);
+  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshFinder(dataset, *surface, stop), stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {

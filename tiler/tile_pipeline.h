@@ -83,7 +83,8 @@ class TilePipeline {
   Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
 
-  MeshOfTile MeshesOf(std::uint32_t dataset, const DrawnSurface& surface, const std::stop_token& stop) const;
+  // Returns a function that calls MeshOf for tiles of this surface.
+  FindMesh MeshFinder(std::uint32_t dataset, const DrawnSurface& surface, const std::stop_token& stop) const;
   Result<std::shared_ptr<const DrawnMesh>> MeshOf(const Dataset& dataset, const TileRequest& request,
                                                   const std::stop_token& stop) const;
 

@@ -23,7 +23,7 @@ struct TileTree {
   std::function<int(int level)> error_step;                    // of a level's tiles on its ladder
 };
 
-// The implicit trees, and the named tiles above them. `available` has tiles on level 0.
+// The implicit trees, and the tiles above them, which tileset.json lists one by one. `available` has tiles on level 0.
 std::vector<proto::TreeRoot> TreesOf(const TileTree& tree);
 
 // tileset.json. The queries, which may be empty, are appended to the URLs of contents and subtrees. `has_versions`: the

@@ -81,8 +81,8 @@ struct DemFile {
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres. Where it is a range of heights and no datum is named: above the ellipsoid, or as the source has them if its
-// vertical datum is unknown.
+// Metres. Heights are above the ellipsoid unless a datum is named, or as the source has them if its vertical datum is
+// unknown. Also used for undulations.
 struct HeightRange {
   double min = 0;
   double max = 0;

@@ -339,7 +339,8 @@ Result<void> RasterGrid::SetHeightsAt(NodePositions positions, std::span<const s
     counts_->voids += static_cast<std::uint64_t>(window.columns * window.rows);
     return leave_unfilled(CheckMembersUnread(factor, window));
   }
-  // Samples between the outermost nodes and the rim are needed, too.
+  // At the rim of a raster, the certified error compares averages between the outermost nodes and the rim, too
+  // (CellErrorBound). Where they are missing, it is looser.
   constexpr int kRim = 3;
   if (trace != nullptr) window = Grown(window, kRim, factor);
   auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);

@@ -6,9 +6,9 @@
 //     u-----v
 //      \   /         With S the squared quality of a cut's shape (quadrilateral.h), E how badly it fits, q = qthresh:
 //        p               p-w is taken if S(u-v) < q^2 S(p-w),
-//                        u-v is kept if S(p-w) < q^(5/4) S(u-v); the factor is q^(1/4) if the edge came into the
-//                        outline by a cut that was decided by fit, or by a cut after such a cut,
+//                        u-v is kept if S(p-w) < q^(5/4) S(u-v), at edges further out if S(p-w) < q^(1/4) S(u-v),
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
+// An edge is further out if it came into the outline by a cut that was decided by fit, or by any cut after that one.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
 // that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
@@ -68,7 +68,8 @@ class FitErrors {
     return combined * combined;
   }
 
-  // The result of a StarScan, and the misfits if are_maxima(). Values of triangles that are left out are undefined.
+  // `misfits`: the result of a StarScan. `errors`: the triangles' misfits, only if are_maxima(). Values of triangles
+  // that are left out are undefined.
   void Scan(const Star& star, PlaneMisfit* misfits, double* errors) const {
     scan_star_(*field_, star, misfits);
     if (star.has_border || !sagitta_->is_flat()) [[unlikely]]

@@ -5,7 +5,7 @@
 
 #include "server/api/tile_formats.h"
 #include "server/http/http_error.h"
-#include "server/query/heights_query.h"
+#include "server/query/points_input.h"
 
 namespace terrace::server {
 

@@ -18,7 +18,7 @@ std::string_view Name(const ServedTile& served) {
     case CacheStatus::kHit:
       return "hit";
     case CacheStatus::kStore:
-      return served.tile->store;
+      return served.tile->found_in;
     case CacheStatus::kMiss:
       return "miss";
     case CacheStatus::kJoined:
@@ -30,8 +30,8 @@ std::string_view Name(const ServedTile& served) {
 Response Reply(const HandlerState& state, const tiler::TileRequest& tile, const ServedTile& served,
                const RequestContext& context) {
   Response response;
-  response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->head.text);
-  response.body_line_bytes = served.tile->head.body_bytes;
+  response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->header_lines.text);
+  response.body_line_bytes = served.tile->header_lines.body_bytes;
   response.cache_control =
       CacheControlOf(context.route.query, state.catalog->datasets[tile.dataset], state.cache_control);
   response.vary = context.route.format->vary(tile);

@@ -153,8 +153,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   std::unique_ptr<ConnectionHandler> handler_;
   std::string peer_text_ = "-";
   Exchange exchange_;
-  Clock::time_point
-      replied_;  // when the last reply was reported; about the current time when the next request is awaited
+  // When the last reply was reported. ReadHead takes it for the current time: little time has passed since.
+  Clock::time_point replied_;
   std::uint64_t served_ = 0;
   std::atomic<Phase> phase_ = Phase::kReceives;  // written on the session's own thread
   bool hurried_ = false;                         // another connection needs this one's place

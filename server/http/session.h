@@ -1,10 +1,10 @@
 // One connection: reads requests, passes them to the application one after the other, and writes the replies.
 //
 // A session runs on one thread. The memory that a client can use is bounded: one read buffer of kMaxHeadBytes, one
-// request with a body of at most the size that its admission allows, and one reply. Both count against a budget that
-// all sessions share. A body or reply without memory in the budget waits until the request's deadline, and is then
-// refused. A request over its client's rate waits for its turn; if the turn would come after its deadline, it is
-// refused earlier.
+// request with a body of at most the size that its admission allows, and one reply. The body and the reply count
+// against a budget that all sessions share. A body or reply without memory in the budget waits until the request's
+// deadline, and is then refused. A request over its client's rate waits for its turn; if the turn would come after its
+// deadline, it is refused earlier.
 #pragma once
 
 #include <atomic>

@@ -8,7 +8,7 @@ namespace {
 
 using Seconds = std::chrono::duration<double>;
 
-// A job goes before one of the next deeper level that has waited for this long.
+// A job goes before one of the next deeper level, unless that one has waited longer than this.
 constexpr std::chrono::milliseconds kAgeOfLevel{100};
 
 // A mean covers about this number of the last jobs of its kind.
@@ -156,7 +156,7 @@ void FairQueue::Erase(Client& client, const PoolJobPtr& job) {
 void FairQueue::Leave(Clients::iterator client) {
   if (client->second.used_s <= now_s_) clients_.erase(client);
   if (--active_ == 0) {
-    clients_.clear();  // no client has waited, so all start equal again
+    clients_.clear();  // no client has jobs, so all start equal again
     now_s_ = 0;
   } else if (clients_.size() - active_ > kMaxIdle) {
     std::erase_if(clients_, [](const auto& known) { return !known.second.active(); });

@@ -9,28 +9,12 @@
 #include "engine/core/plain_number.h"
 #include "engine/crs/geodesic_path.h"
 #include "engine/geo/tile_key.h"
-#include "server/http/text.h"
 #include "server/query/drawn_parameters.h"
 #include "server/query/heights_parameters.h"
 #include "server/query/parameters.h"
 
 namespace terrace::server {
 namespace {
-
-bool HasMediaType(std::string_view content_type, std::string_view type) {
-  return EqualsIgnoringCase(Trim(content_type.substr(0, content_type.find(';'))), type);
-}
-
-bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
-bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
-
-// Without control characters; forms may have bytes of UTF-8. Floats nearly always have some.
-bool IsText(std::string_view body) {
-  return std::none_of(body.begin(), body.end(), [](char c) {
-    const auto byte = static_cast<unsigned char>(c);
-    return (byte < ' ' && c != '\t' && c != '\r' && c != '\n') || byte == 0x7F;
-  });
-}
 
 // Longitude and latitude of each point as 64-bit floats.
 Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::string_view body, std::size_t max_locations,
@@ -137,28 +121,6 @@ Result<int> ParseCertifyLevel(std::string_view text) {
 }
 
 }  // namespace
-
-Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, ParameterSink& parameters) {
-  std::size_t at = 0;
-  Result<void> read = ReadForm(PartsOf(input.query, stop), PlusSign::kIsPlus, parameters, at);
-  if (!read || input.content_type.empty() || IsBinaryBody(input.content_type)) return read;
-  const TextParts parts = PartsOf(input.body, stop);
-  read = IsForm(input.content_type) ? ReadForm(parts, PlusSign::kIsBlank, parameters, at)
-                                    : ReadJsonObject(parts, parameters, at);
-  if (!read && read.error().code == ErrorCode::kInvalidArgument) {
-    const bool is_of_numbers = IsForm(input.content_type) && !IsText(input.body);
-    return MakeError(ErrorCode::kInvalidArgument, "the body, byte {}: {}{}", at, read.error().message,
-                     is_of_numbers ? "; the body was read as a form, as its Content-Type says, and is no text: send "
-                                     "numbers with Content-Type: application/octet-stream"
-                                   : "");
-  }
-  return read;
-}
-
-bool IsBinaryBody(std::string_view content_type) { return HasMediaType(content_type, "application/octet-stream"); }
-bool IsPointsBody(std::string_view content_type) {
-  return IsForm(content_type) || IsJson(content_type) || IsBinaryBody(content_type);
-}
 
 Result<HeightsQuery> ParseHeights(const PointsInput& input, std::size_t max_locations, const std::stop_token& stop) {
   HeightsParameters parameters(max_locations, input.query.size() + input.body.size());

@@ -4,12 +4,11 @@
 #include <cstddef>
 #include <optional>
 #include <stop_token>
-#include <string_view>
 #include <vector>
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "server/query/parameters.h"
+#include "server/query/points_input.h"
 #include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {
@@ -24,22 +23,6 @@ struct HeightsQuery {
   bool wants_normals = false;
   std::optional<tiler::DrawnSurface> drawn;  // nothing: heights of the sources
 };
-
-// The parts of a request that contain parameters.
-struct PointsInput {
-  std::string_view query;         // of the URL
-  std::string_view content_type;  // of the body; IsPointsBody is true for it; empty: no body
-  std::string_view body;
-};
-
-// Whether bodies of this Content-Type are supported: a JSON object of texts and numbers, a form, or points as numbers:
-// application/octet-stream, longitude and latitude of each point as little-endian 64-bit floats.
-bool IsPointsBody(std::string_view content_type);
-bool IsBinaryBody(std::string_view content_type);
-
-// Passes the parameters of the query and of the body, unless it is binary, to a sink. Errors: those of the readers
-// (parameters.h) and of the sink; those of the body name its byte.
-Result<void> ReadInput(const PointsInput& input, const std::stop_token& stop, ParameterSink& parameters);
 
 // `locations=lat,lon|lat,lon`, or `path=lat,lon|lat,lon` with either `step=METRES` or `samples=N`. Optional:
 // `datum=ellipsoid|orthometric`, `certify=LEVEL|deepest`, `normals=1`, `surface=source|served`. With `surface=served`

@@ -12,6 +12,7 @@
 #include "server/query/drawn_parameters.h"
 #include "server/query/heights_parameters.h"
 #include "server/query/parameters.h"
+#include "server/query/points_input.h"
 
 namespace terrace::server {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/dem_source.h"
-#include "server/query/heights_query.h"
+#include "server/query/points_input.h"
 #include "tiler/surface/drawn_surface.h"
 
 namespace terrace::server {

@@ -60,7 +60,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.error_scale = dataset.error_scale();
   view.glb_compression = dataset.glb.compression;
   view.generation = dataset.generation;
-  view.unedited_generation = dataset.unedited_generation;
+  view.cache_generation = dataset.cache_generation();
   if (dataset.baked) view.baked_coding = dataset.baked->coding();
   if (!dataset.source) {
     SetExtent(dataset, view);

@@ -30,8 +30,8 @@ struct DatasetView {
   std::string attribution;
   tiler::ErrorScale error_scale = {};
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
-  std::uint64_t generation = 0;           // changes whenever the bytes of its tiles may change
-  std::uint64_t unedited_generation = 0;  // as of tiler::Dataset
+  std::uint64_t generation = 0;        // changes whenever the bytes of its tiles may change
+  std::uint64_t cache_generation = 0;  // the dataset's part of cache keys: Dataset::cache_generation
   // tiler::TileEditsHash. Empty: there are no edits.
   std::function<std::uint64_t(const tiler::TileRequest&)> edits_hash = {};
   std::vector<std::vector<geo::TileRange>> available;  // by level, from 0; the deepest served level is the last
@@ -57,8 +57,6 @@ struct DatasetView {
 
   // The version in URLs; changes with the generation.
   std::string version() const { return tiler::VersionText(generation); }
-  // The dataset's part of cache keys.
-  std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   int max_level() const { return static_cast<int>(available.size()) - 1; }
 };
 

@@ -29,14 +29,14 @@ tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
   const DatasetView& dataset = catalog.datasets[request.dataset];
   const std::uint64_t edits = dataset.edits_hash ? dataset.edits_hash(request) : 0;
   request.dataset = 0;
-  return {request, dataset.cache_generation(), edits};
+  return {request, dataset.cache_generation, edits};
 }
 
 }  // namespace
 
 TileService::TileService(TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
-      tiers_(options.cache_bytes, std::move(options.stores), options.write_head),
+      tiers_(options.cache_bytes, std::move(options.stores), options.write_header_lines),
       pool_(options.worker_threads, options.queue_length),
       flights_(pool_) {}
 
@@ -79,7 +79,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
     co_return tl::unexpected(std::move(flight.value.error()));
   }
-  const CacheStatus found = (*flight.value)->store != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
+  const CacheStatus found = (*flight.value)->found_in != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
 
@@ -97,7 +97,7 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
   std::vector<std::uint64_t> generations;
   bool has_edits = false;
   for (const DatasetView& dataset : catalog.datasets) {
-    generations.push_back(dataset.cache_generation());
+    generations.push_back(dataset.cache_generation);
     has_edits |= static_cast<bool>(dataset.edits_hash) || had_edits_;
   }
   tiers_.memory().Retain(generations);
@@ -105,7 +105,7 @@ void TileService::RetainTilesOf(const Catalog& catalog) {
   if (has_edits) {
     tiers_.memory().EraseIf([&](const tiler::CacheKey& key) {
       return std::ranges::none_of(catalog.datasets, [&](const DatasetView& dataset) {
-        return dataset.cache_generation() == key.generation &&
+        return dataset.cache_generation == key.generation &&
                key.edits == (dataset.edits_hash ? dataset.edits_hash(key.request) : 0);
       });
     });

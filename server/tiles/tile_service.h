@@ -31,7 +31,7 @@ struct TileServiceOptions {
   std::size_t queue_length = 10'000;                           // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;            // 0: no cache
   std::vector<std::shared_ptr<tiler::TileStore>> stores = {};  // as of tiler::TileTiers
-  tiler::HeaderWriter write_head = nullptr;                    // as of tiler::TileTiers; called on a worker
+  tiler::HeaderWriter write_header_lines = nullptr;            // as of tiler::TileTiers; called on a worker
 };
 
 enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: EncodedTile::store

@@ -16,7 +16,7 @@ CatalogPtr CatalogOf(std::uint64_t generation, TileBuilder builder, const char* 
   auto catalog = std::make_shared<Catalog>();
   catalog->datasets.resize(1);
   catalog->datasets[0].name = name;
-  catalog->datasets[0].generation = generation;
+  catalog->datasets[0].generation = catalog->datasets[0].cache_generation = generation;
   catalog->datasets[0].available = {{{0, 0, 1, 0}}};
   catalog->pipeline = std::make_shared<FakePipeline>(std::move(builder));
   return catalog;

@@ -53,6 +53,7 @@ CatalogPtr ServerFixture::MakeCatalog() const {
   maui.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}, {{0, 0, 15, 7}}};
   std::vector<DatasetView> datasets = more_datasets_;
   datasets.insert(datasets.begin(), maui);
+  for (DatasetView& dataset : datasets) dataset.cache_generation = dataset.generation;
   return std::make_shared<const Catalog>(
       Catalog{std::move(datasets), std::make_shared<FakePipeline>(builder_, read_points_, area_mesher_)});
 }

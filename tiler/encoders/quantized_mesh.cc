@@ -23,9 +23,10 @@ Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::LatticeV
                                    const std::stop_token& stop) {
   const double sea_level_m = *dataset.water.sea_level_m;
   if (!dataset.source->converts()) return proto::Shortest(proto::SeaLevelMask(lattice, sea_level_m));
-  const Result<dem::TileHeights> counted = dataset.source->ReadInSourceDatum(lattice.key, stop);
-  if (!counted) return tl::unexpected(counted.error());
-  return proto::Shortest(proto::SeaLevelMask({lattice.key, counted->lattice, counted->heights}, sea_level_m));
+  const Result<dem::TileHeights> in_source_datum = dataset.source->ReadInSourceDatum(lattice.key, stop);
+  if (!in_source_datum) return tl::unexpected(in_source_datum.error());
+  return proto::Shortest(
+      proto::SeaLevelMask({lattice.key, in_source_datum->lattice, in_source_datum->heights}, sea_level_m));
 }
 
 Result<proto::WaterMask> WaterMaskOf(const Dataset& dataset, const proto::LatticeView& lattice,

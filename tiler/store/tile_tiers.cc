@@ -7,8 +7,12 @@
 
 namespace terrace::tiler {
 
-TileTiers::TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores, HeaderWriter write_head)
-    : memory_(memory_bytes), stores_(std::move(stores)), write_head_(write_head), store_times_(stores_.size()) {}
+TileTiers::TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
+                     HeaderWriter write_header_lines)
+    : memory_(memory_bytes),
+      stores_(std::move(stores)),
+      write_header_lines_(write_header_lines),
+      store_times_(stores_.size()) {}
 
 Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build) {
   if (TilePtr tile = memory_.Find(key)) return tile;
@@ -17,7 +21,7 @@ Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<
     std::optional<EncodedTile> found = stores_[i]->Find(key);
     store_times_[i].fetch_add(MicrosecondsSince(begun).count(), std::memory_order_relaxed);
     if (!found) continue;
-    found->store = stores_[i]->name();
+    found->found_in = stores_[i]->name();
     return Keep(key, *std::move(found), i);
   }
   Result<EncodedTile> built = build();
@@ -28,7 +32,7 @@ Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<
 
 // The tile as it is sent, after it was inserted into memory and the first `stores_above` stores.
 TilePtr TileTiers::Keep(const CacheKey& key, EncodedTile tile, std::size_t stores_above) {
-  if (write_head_ != nullptr) tile.head = write_head_(key.request, tile);
+  if (write_header_lines_ != nullptr) tile.header_lines = write_header_lines_(key.request, tile);
   auto kept = std::make_shared<const EncodedTile>(std::move(tile));
   memory_.Insert(key, kept);
   for (std::size_t i = 0; i < stores_above; ++i) stores_[i]->Insert(key, kept);

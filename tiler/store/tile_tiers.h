@@ -26,11 +26,11 @@ using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 
 class TileTiers {
  public:
-  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; none is null. `write_head` is
-  // called once for each tile that is built or found in a store, and its lines are cached with the tile; null: heads
-  // are left empty.
+  // `memory_bytes` 0: keeps none in memory. `stores`: below memory, the fastest first; none is null.
+  // `write_header_lines` is called once for each tile that is built or found in a store, and its lines are cached with
+  // the tile; null: they stay empty.
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
-            HeaderWriter write_head = nullptr);
+            HeaderWriter write_header_lines = nullptr);
 
   // The tier in memory: the only one that is asked without blocking.
   TileCache& memory() { return memory_; }
@@ -55,7 +55,7 @@ class TileTiers {
 
   TileCache memory_;
   const std::vector<std::shared_ptr<TileStore>> stores_;
-  const HeaderWriter write_head_;
+  const HeaderWriter write_header_lines_;
   std::vector<std::atomic<std::int64_t>> store_times_;  // microseconds
 };
 

@@ -21,12 +21,12 @@ std::array<float, 3> EastNorthUp(const geo::Vec3& normal, const dem::GeoPosition
 }  // namespace
 
 Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
-                                     bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop) {
+                                     bool normals, const FindMesh& find_mesh, const std::stop_token& stop) {
   PointHeights read;
   read.heights.resize(points.size());
   read.tile_of_point.resize(points.size());
   if (normals) read.normals.resize(points.size());
-  DrawnTiles tiles(has_tile, level, "surface: the points", mesh_of);
+  DrawnTiles tiles(has_tile, level, "surface: the points", find_mesh);
   // All tiles are counted before the first is made.
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (i % kPointsBetweenStops == 0 && stop.stop_requested()) return Stopped();

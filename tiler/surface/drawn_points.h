@@ -16,6 +16,6 @@ namespace terrace::tiler {
 // only the neighbour has triangles, it belongs to the neighbour. In holes heights and normals are NaN. `normals`: adds
 // normals. kInvalidArgument: too many tiles.
 Result<PointHeights> ReadDrawnPoints(const HasTile& has_tile, int level, std::span<const dem::GeoPosition> points,
-                                     bool normals, const MeshOfTile& mesh_of, const std::stop_token& stop);
+                                     bool normals, const FindMesh& find_mesh, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -128,9 +128,9 @@ class BorderCrossings {
 // Follows rays over the meshes of tiles.
 class MeshWalk {
  public:
-  MeshWalk(const HasTile& has_tile, int level, const dem::SightOptions& options, const MeshOfTile& mesh_of,
+  MeshWalk(const HasTile& has_tile, int level, const dem::SightOptions& options, const FindMesh& find_mesh,
            const std::stop_token& stop)
-      : tiles_(has_tile, level, "surface: the rays", mesh_of), options_(options), stop_(stop) {}
+      : tiles_(has_tile, level, "surface: the rays", find_mesh), options_(options), stop_(stop) {}
 
   // Divides a ray where it leaves a region.
   Result<dem::SightAnswer> Look(const dem::SightRay& ray) {
@@ -279,9 +279,9 @@ Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays) {
 
 Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
-                                                     const dem::SightOptions& options, const MeshOfTile& mesh_of,
+                                                     const dem::SightOptions& options, const FindMesh& find_mesh,
                                                      const std::stop_token& stop) {
-  MeshWalk walk(has_tile, level, options, mesh_of, stop);
+  MeshWalk walk(has_tile, level, options, find_mesh, stop);
   std::vector<dem::SightAnswer> answers;
   answers.reserve(rays.size());
   for (const dem::SightRay& ray : rays) {

@@ -20,10 +20,10 @@ Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem
 Result<void> CheckSamplesAlong(int level, std::span<const dem::SightRay> rays);
 
 // As DemSource::LookAlong, over the meshes of `level` and, where that is not available, of ancestors. kInvalidArgument:
-// the rays cross more than kMaxTilesRead tiles. Other errors: those of `mesh_of`.
+// the rays cross more than kMaxTilesRead tiles. Other errors: those of `find_mesh`.
 Result<std::vector<dem::SightAnswer>> LookAlongDrawn(const HasTile& has_tile, int level,
                                                      std::span<const dem::SightRay> rays,
-                                                     const dem::SightOptions& options, const MeshOfTile& mesh_of,
+                                                     const dem::SightOptions& options, const FindMesh& find_mesh,
                                                      const std::stop_token& stop);
 
 }  // namespace terrace::tiler

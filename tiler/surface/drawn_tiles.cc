@@ -57,7 +57,7 @@ std::optional<std::uint32_t> TileNumbers::NumberBeside(const geo::TileKey& key) 
 Result<const DrawnMesh*> DrawnTiles::MeshOf(std::uint32_t number) {
   meshes_.resize(numbers_.keys().size());
   if (meshes_[number] == nullptr) {
-    Result<std::shared_ptr<const DrawnMesh>> made = mesh_of_(numbers_.keys()[number]);
+    Result<std::shared_ptr<const DrawnMesh>> made = find_mesh_(numbers_.keys()[number]);
     if (!made) return tl::unexpected(std::move(made).error());
     meshes_[number] = *std::move(made);
   }

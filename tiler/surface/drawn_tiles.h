@@ -25,8 +25,8 @@ inline constexpr std::size_t kMaxTilesRead = 64;
 
 // Whether a tile exists.
 using HasTile = std::function<bool(const geo::TileKey&)>;
-// The mesh of an available tile.
-using MeshOfTile = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
+// Returns the mesh of an available tile.
+using FindMesh = std::function<Result<std::shared_ptr<const DrawnMesh>>(const geo::TileKey&)>;
 
 // The tile of a level that contains a point. On an edge between two tiles: the eastern and the northern one.
 geo::TileKey TileAt(const dem::GeoPosition& point, int level);
@@ -72,11 +72,11 @@ class TileNumbers {
 class DrawnTiles {
  public:
   // Arguments as those of TileNumbers.
-  DrawnTiles(HasTile has_tile, int level, std::string_view subject, MeshOfTile mesh_of)
-      : numbers_(std::move(has_tile), level, subject), mesh_of_(std::move(mesh_of)) {}
+  DrawnTiles(HasTile has_tile, int level, std::string_view subject, FindMesh find_mesh)
+      : numbers_(std::move(has_tile), level, subject), find_mesh_(std::move(find_mesh)) {}
 
   TileNumbers& numbers() { return numbers_; }
-  // Errors: those of `mesh_of`.
+  // Errors: those of `find_mesh`.
   Result<const DrawnMesh*> MeshOf(std::uint32_t number);
 
   struct Reading {
@@ -89,7 +89,7 @@ class DrawnTiles {
 
  private:
   TileNumbers numbers_;
-  MeshOfTile mesh_of_;
+  FindMesh find_mesh_;
   std::vector<std::shared_ptr<const DrawnMesh>> meshes_;  // by number; null: not made yet
 };
 

@@ -19,8 +19,8 @@ struct StageTimes {
 // How a build used the refinement cache. kNone: the format has no mesh.
 enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
 
-// Header lines of a response that depend on the body alone, not on the request or the configuration. Each ends with
-// CR LF.
+// Header lines of a response that depend on the tile and its TileRequest alone, not on the rest of the HTTP request or
+// on the configuration. Each ends with CR LF.
 struct HeaderLines {
   std::string text;
   std::size_t body_bytes = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
@@ -39,11 +39,11 @@ struct EncodedTile {
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kMade;
-  const char* store = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
-  HeaderLines head;             // MakeTileHeaders of server/api/tile_formats.h
+  const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
+  HeaderLines header_lines;        // MakeTileHeaders of server/api/tile_formats.h
 };
 
-inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.head.text.size(); }
+inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.header_lines.text.size(); }
 
 using TilePtr = std::shared_ptr<const EncodedTile>;
 

@@ -55,8 +55,8 @@ TEST(TileHead, LeavesAnErrorWithoutBoundUnsaid) {
 TEST(TileHead, CountsAmongATilesBytes) {
   tiler::EncodedTile tile = HeadTile();
   EXPECT_EQ(tiler::BytesOf(tile), 5u);
-  tile.head = MakeTileHeaders({}, tile);
-  EXPECT_EQ(tiler::BytesOf(tile), 5u + tile.head.text.size());
+  tile.header_lines = MakeTileHeaders({}, tile);
+  EXPECT_EQ(tiler::BytesOf(tile), 5u + tile.header_lines.text.size());
 }
 
 }  // namespace

@@ -21,7 +21,7 @@ namespace {
 std::shared_ptr<Catalog> CatalogOf(TileBuilder builder) {
   auto catalog = std::make_shared<Catalog>();
   catalog->datasets.resize(1);
-  catalog->datasets[0].generation = 1;
+  catalog->datasets[0].generation = catalog->datasets[0].cache_generation = 1;
   catalog->pipeline = std::make_shared<FakePipeline>(std::move(builder));
   return catalog;
 }
@@ -90,10 +90,10 @@ TEST(TileService, AsksTiersInOrderAndFillsThoseAbove) {
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
   EXPECT_EQ(first->size(), 1u);
   EXPECT_EQ(second->size(), 1u);
-  EXPECT_STREQ(Get(service, catalog)->tile->store, "first");
+  EXPECT_STREQ(Get(service, catalog)->tile->found_in, "first");
   first->Clear();
-  EXPECT_STREQ(Get(service, catalog)->tile->store, "second");
-  EXPECT_STREQ(Get(service, catalog)->tile->store, "first");
+  EXPECT_STREQ(Get(service, catalog)->tile->found_in, "second");
+  EXPECT_STREQ(Get(service, catalog)->tile->found_in, "first");
 }
 
 TEST(TileService, KeepsNoFailure) {
@@ -120,7 +120,7 @@ TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
   ASSERT_TRUE(Get(service, first));
   const auto shifted = CatalogOf(BuildEmpty);
   shifted->datasets.insert(shifted->datasets.begin(), DatasetView());
-  shifted->datasets[0].generation = 7;
+  shifted->datasets[0].cache_generation = 7;
   tiler::TileRequest request;
   EXPECT_EQ(Get(service, shifted, request)->cache, CacheStatus::kMiss) << "another dataset has the index now";
   request.dataset = 1;
@@ -131,14 +131,14 @@ TEST(TileService, BuildsAgainForAnotherGeneration) {
   TileService service({});
   ASSERT_TRUE(Get(service, CatalogOf(BuildEmpty)));
   const auto changed = CatalogOf(BuildEmpty);
-  changed->datasets[0].generation = 2;
+  changed->datasets[0].cache_generation = 2;
   EXPECT_EQ(Get(service, changed)->cache, CacheStatus::kMiss);
 }
 
 TEST(TileService, ForgetsGenerationsThatAreGone) {
   TileService service({});
   const auto old = CatalogOf(BuildEmpty), next = CatalogOf(BuildEmpty);
-  next->datasets[0].generation = 2;
+  next->datasets[0].cache_generation = 2;
   ASSERT_TRUE(Get(service, old));
   ASSERT_TRUE(Get(service, next));
   service.RetainTilesOf(*next);
@@ -154,7 +154,7 @@ TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
   const auto with_edits = [](std::uint64_t generation, std::uint64_t of_touched) {
     const auto catalog = CatalogOf(BuildEmpty);
     catalog->datasets[0].generation = generation;
-    catalog->datasets[0].unedited_generation = 1;
+    catalog->datasets[0].cache_generation = 1;
     catalog->datasets[0].edits_hash = [of_touched](const tiler::TileRequest& request) {
       return request.key.x == 1 ? of_touched : std::uint64_t{0};
     };

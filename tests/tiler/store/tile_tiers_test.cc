@@ -80,7 +80,7 @@ TEST_F(TileTiersTest, AsksInOrderAndKeepsABuiltTileInAllTiers) {
   TileTiers tiers(1 << 20, {disk, shared});
   const Result<TilePtr> built = tiers.FindOrBuild(KeyAt(1), BuildOf("new"));
   EXPECT_EQ((*built)->bytes, "new");
-  EXPECT_EQ((*built)->store, nullptr);
+  EXPECT_EQ((*built)->found_in, nullptr);
   EXPECT_EQ(calls, (Calls{"disk.Find", "shared.Find", "build", "disk.Insert", "shared.Insert"}));
   for (const TilePtr& kept : {tiers.memory().Find(KeyAt(1)), disk->Kept(KeyAt(1)), shared->Kept(KeyAt(1))}) {
     EXPECT_EQ(kept, *built);
@@ -102,7 +102,7 @@ TEST_F(TileTiersTest, FillsOnlyTheTiersAboveTheOneThatHasTheTile) {
   disk->Insert(KeyAt(1), std::make_shared<EncodedTile>());
   calls.clear();
   const Result<TilePtr> found = tiers.FindOrBuild(KeyAt(1), BuildOf("new"));
-  EXPECT_STREQ((*found)->store, "disk");
+  EXPECT_STREQ((*found)->found_in, "disk");
   EXPECT_EQ(calls, (Calls{"archive.Find", "disk.Find", "archive.Insert"}));
   EXPECT_EQ(tiers.memory().Find(KeyAt(1)), *found);
 }
@@ -119,14 +119,14 @@ TEST_F(TileTiersTest, TellsAllStoresThatABuildFailedAndKeepsNothing) {
 }
 
 TEST_F(TileTiersTest, WritesTheHeadOfBuiltAndOfFoundTiles) {
-  const HeaderWriter write_head = [](const TileRequest& request, const EncodedTile& tile) {
+  const HeaderWriter write_header_lines = [](const TileRequest& request, const EncodedTile& tile) {
     return HeaderLines{std::to_string(request.key.x) + ": " + tile.bytes, 1};
   };
   for (const char* round : {"built", "found"}) {  // the store outlives the memory
-    TileTiers tiers(1 << 20, {disk}, write_head);
+    TileTiers tiers(1 << 20, {disk}, write_header_lines);
     const Result<TilePtr> tile = tiers.FindOrBuild(KeyAt(7), BuildOf("body"));
-    EXPECT_EQ((*tile)->head.text, "7: body") << round;
-    EXPECT_EQ(tiers.memory().Find(KeyAt(7))->head.body_bytes, 1u) << round;
+    EXPECT_EQ((*tile)->header_lines.text, "7: body") << round;
+    EXPECT_EQ(tiers.memory().Find(KeyAt(7))->header_lines.body_bytes, 1u) << round;
   }
   EXPECT_EQ(std::ranges::count(calls, "build"), 1);
 }
