@@ -18,7 +18,7 @@ inline constexpr std::size_t kRowBytes = 48;
 std::string EncodeRow(std::uint64_t tile_id, const tiler::EncodedTile& tile, const dem::HeightRange& range);
 
 struct ArchivedTile {
-  tiler::EncodedTile tile;  // as it was added, without ETag, times and head
+  tiler::EncodedTile tile;  // as it was added, without etag, times and header_lines
   dem::HeightRange range;
 };
 

@@ -19,8 +19,8 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::SetHeights for a window. If `part` is set, the trace covers that part only and has no
-// positions.
+// The trace of RasterGrid::SetHeights for a window. If `part` is set, the trace covers that part only, and its
+// `cells` are empty.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};
@@ -110,7 +110,8 @@ class DemSource::Impl {
   HeightRange unedited_heights;  // `info.heights` without edits
   // Hashes by tile: hashing many edits takes longer than finding a cached tile.
   mutable std::mutex hashes_mutex;
-  // Level, column, row; then for Mercator windows their columns and rows, for edits 0, 0, for deeper tiles -1, -1.
+  // Level, column, row; then for MercatorEditsHash the window's columns and rows, for EditsHash 0, 0, for
+  // DeeperTilesHash -1, -1.
   using HashKey = std::array<std::int64_t, 5>;
   struct HashOfKey {
     std::size_t operator()(const HashKey& key) const {

@@ -36,10 +36,10 @@ FitErrors::FitErrors(const HeightField& field, const Sagitta& sagitta, FitMeasur
   lone_star_.ring.Grow(2);
 }
 
-void FitErrors::AddBordersAndSagitta(const Star& star, const PlaneMisfit* misfits, double* errors) const {
+void FitErrors::AddBordersAndSagitta(const Star& star, const PlaneMisfit* worst, double* misfits) const {
   const Triangulation::Vertex p{{static_cast<std::uint16_t>(star.x), static_cast<std::uint16_t>(star.y)}, star.height};
   for (std::size_t i = 0; i < star.count; ++i) {
-    if (!star.IsLeftOut(i)) errors[i] = Of(misfits[i], p, star.ring[i], star.ring[i + 1]);
+    if (!star.IsLeftOut(i)) misfits[i] = Of(worst[i], p, star.ring[i], star.ring[i + 1]);
   }
 }
 

@@ -8,7 +8,7 @@
 //        p               p-w is taken if S(u-v) < q^2 S(p-w),
 //                        u-v is kept if S(p-w) < q^(5/4) S(u-v), at edges further out if S(p-w) < q^(1/4) S(u-v),
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
-// An edge is further out if it came into the outline by a cut that was decided by fit, or by any cut after that one.
+// Edges are further out if the rounds below have put them into the outline, not the first walk around p.
 // For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
 // that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
@@ -68,16 +68,16 @@ class FitErrors {
     return combined * combined;
   }
 
-  // `misfits`: the result of a StarScan. `errors`: the triangles' misfits, only if are_maxima(). Values of triangles
+  // `worst`: the result of a StarScan. `misfits`: those of the triangles, only if are_maxima(). Values of triangles
   // that are left out are undefined.
-  void Scan(const Star& star, PlaneMisfit* misfits, double* errors) const {
-    scan_star_(*field_, star, misfits);
+  void Scan(const Star& star, PlaneMisfit* worst, double* misfits) const {
+    scan_star_(*field_, star, worst);
     if (star.has_border || !sagitta_->is_flat()) [[unlikely]]
-      return AddBordersAndSagitta(star, misfits, errors);
+      return AddBordersAndSagitta(star, worst, misfits);
     // Blocks of eight: branches on the number of triangles would be mispredicted.
     for (std::size_t i = 0; i < star.count; i += kPadding) {
 #pragma GCC unroll 8
-      for (std::size_t k = i; k < i + kPadding; ++k) errors[k] = DistanceOrZero(misfits[k]);
+      for (std::size_t k = i; k < i + kPadding; ++k) misfits[k] = DistanceOrZero(worst[k]);
     }
   }
 
@@ -88,7 +88,7 @@ class FitErrors {
   double Of(const PlaneMisfit& misfit, const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v) const;
 
  private:
-  void AddBordersAndSagitta(const Star& star, const PlaneMisfit* misfits, double* errors) const;
+  void AddBordersAndSagitta(const Star& star, const PlaneMisfit* worst, double* misfits) const;
   double WorstOnBorders(const Triangulation::Vertex& p, const RingVertex& u, const RingVertex& v) const;
   bool IsInside(SamplePosition sample) const;
 

@@ -19,7 +19,9 @@ struct LatticeCrossings {
   double from, to;                  // the coordinate across the lines at the first and the last end, lattice steps
   double along_from, along_change;  // the coordinate along the lines at the first end; last minus first
   double height, rise;              // of the edge at the first end; last minus first; metres
-  double bend;  // between two crossings the surface deviates by at most bend * the cell's twist; without a unit
+  // Between two crossings the surface leaves the straight line between its heights there by at most bend times the
+  // cell's twist, the coefficient of xy of its surface. Without a unit.
+  double bend;
   const float *heights, *twists;   // metres, from the tile's south-western sample and cell
   std::int32_t line_stride, step;  // index = line * line_stride + cell * step
   int cells;                       // along a line

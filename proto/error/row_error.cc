@@ -33,7 +33,8 @@ HWY_INLINE double LinearWith(D d, const LinearRow& row, const float* samples, st
   auto largest = hn::Zero(d);
   ForVectors(d, count, [&](std::size_t i) HWY_ATTR {
     const auto x = hn::Add(hn::Set(d, row.x), hn::Mul(hn::Set(d, row.unit), hn::Iota(d, static_cast<double>(i))));
-    const auto height = hn::Add(hn::Add(hn::Set(d, row.origin), hn::Mul(hn::Set(d, row.dx), x)), hn::Set(d, row.up));
+    const auto height =
+        hn::Add(hn::Add(hn::Set(d, row.origin), hn::Mul(hn::Set(d, row.slope), x)), hn::Set(d, row.rise));
     largest = hn::Max(largest, hn::Abs(hn::Sub(height, SamplesAt(d, samples + i))));
   });
   return hn::GetLane(hn::MaxOfLanes(d, largest));

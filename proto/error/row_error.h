@@ -15,9 +15,10 @@ struct HeightExtent {
 // Precondition: not empty.
 HeightExtent ExtentOf(std::span<const float> heights);
 
-// Heights along a row of nodes, linear in longitude and latitude: origin + dx (x + unit i) + up, in that order.
+// Heights along a row of nodes, linear in longitude and latitude: origin + slope (x + unit i) + rise, in that order.
+// `rise`: what the row's latitude adds, metres.
 struct LinearRow {
-  double origin = 0, dx = 0, x = 0, unit = 1, up = 0;
+  double origin = 0, slope = 0, x = 0, unit = 1, rise = 0;
 };
 
 // The largest difference from `count` samples.

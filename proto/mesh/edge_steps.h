@@ -13,8 +13,8 @@
 // Proof that a tile's own step divides: it is a power of two, so it only has to be at most every edge's step. Let w be
 // the step requested for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the
 // relief to at most 16384 m + S, and every edge's step is at least M = max(m, w). If S = M, that is 16385 M, less than
-// 32767 M. Else S is the NeededStep of a neighbour, at most 2 m for any relief on Earth (below 32 km), and 16384 M + 2
-// <= 32767 M holds since M >= 2^-10 m.
+// 32767 M. Else S is the NeededStep of a neighbour, at most 2 metres for any relief on Earth (below 32 km), and
+// 16384 M + 2 metres <= 32767 M holds since M is at least 2^-10 metres.
 #pragma once
 
 #include <array>

@@ -165,7 +165,8 @@ std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMe
   return points;
 }
 
-GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double min_error_m, PositionWidth width)
+GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double smallest_allowed_m,
+                     PositionWidth width)
     : inside(GridStep(lattice, errors.tile, width)) {
   // A step that does not fit would be doubled, but not by the neighbour (FitsFloats).
   const double side_m = geo::kSemiMajorAxis * geo::ToRadians(lattice.StepDegrees()) * lattice.cells;
@@ -175,7 +176,7 @@ GridSteps::GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, doub
     side[k] = step(errors.side[k]);
     corner[k] = step(errors.corner[k]);
   }
-  inside = step(std::min(errors.tile, min_error_m));
+  inside = step(std::min(errors.tile, smallest_allowed_m));
   // A corner's step may follow from an edge that is not the tile's.
   for (std::size_t k = 0; k < 4; ++k) inside = std::min({inside, side[k], corner[k]});
 }

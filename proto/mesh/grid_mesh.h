@@ -42,13 +42,14 @@ using GridPoint = std::array<std::int64_t, 3>;
 // points have, too.
 std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
 
-// The steps of a tile with limits by place (EdgeErrors). All are multiples of `inside`. Limits refine a step only until
+// The steps of a tile with limits by place (EdgeErrors). `smallest_allowed_m`: the smallest error that a sample of the
+// tile may have. All steps are multiples of `inside`. Limits refine a step only until
 // a tile's side spans 2^22 to 2^23 steps, as with the finest error.
 struct GridSteps {
   double inside = 1;
   std::array<double, 4> side{}, corner{};
 
-  GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double min_error_m, PositionWidth width);
+  GridSteps(const geo::Lattice& lattice, const EdgeErrors& errors, double smallest_allowed_m, PositionWidth width);
   // For tiles that do not fit (FitsFloats). Steps of sides and corners stay unless they are finer than `inside`.
   void Double();
 };

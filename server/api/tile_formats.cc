@@ -164,7 +164,7 @@ tiler::Coding NegotiateCoding(std::string_view accept_encoding, std::span<const 
       known = std::max(known.value_or(0), quality);
     }
   }
-  // Identity is acceptable if it is not mentioned, but only if no other coding is.
+  // Identity that is not mentioned is used only if no offered coding is acceptable.
   tiler::Coding best = tiler::Coding::kIdentity;
   double most = named[static_cast<std::size_t>(tiler::Coding::kIdentity)].value_or(0);
   for (const tiler::Coding coding : offered) {

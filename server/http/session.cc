@@ -307,9 +307,9 @@ asio::awaitable<std::monostate> Session::Sleep(std::chrono::milliseconds time) {
   co_return std::monostate();
 }
 
-// Returns nothing if the client is gone, or if others get the request's memory. Most answers are ready at once, and
-// then neither a timer nor a second coroutine watches the client. `waited` must not throw, so that the race always has
-// a winner.
+// Returns nothing if the client is gone, or if others get the request's memory. Only for answers that are
+// not ready at once: for most answers neither a timer nor a second coroutine watches the client. `waited` must not
+// throw, so that the race always has a winner.
 template <typename T>
 asio::awaitable<std::optional<T>> Session::WhileConnected(asio::awaitable<T> waited) {
   using asio::experimental::awaitable_operators::operator||;

@@ -34,7 +34,7 @@ struct TileServiceOptions {
   tiler::HeaderWriter write_header_lines = nullptr;            // as of tiler::TileTiers; called on a worker
 };
 
-enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: EncodedTile::store
+enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: in a tier below memory
 
 struct ServedTile {
   ServedTile() = default;

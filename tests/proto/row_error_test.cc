@@ -29,7 +29,8 @@ TEST(RowError, IsThatOfTheWorstNode) {
     const PlumbRow plumb{share(random), share(random), 0.7, share(random), 6.3e6 * share(random), 4.5e6};
     double of_linear = 0, of_plumb = 0, least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < count; ++i) {
-      const double height = linear.origin + linear.dx * (linear.x + linear.unit * static_cast<double>(i)) + linear.up;
+      const double height =
+          linear.origin + linear.slope * (linear.x + linear.unit * static_cast<double>(i)) + linear.rise;
       of_linear = std::max(of_linear, std::abs(height - samples[i]));
       const double across = columns[i].cos * plumb.x + columns[i].sin * plumb.y, up = plumb.cos * across + plumb.north;
       of_plumb = std::max(of_plumb, std::abs((plumb.rest - plumb.radius * across) / up - samples[i]));

@@ -71,14 +71,14 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   proto::TileErrorMeter meter(lattice, replayed->error_m, std::move(allowed));
   std::vector<proto::GridPoint> points;
   std::vector<geo::Vec3> positions;
-  const auto measure = [&](const tin::TinMesh& rounded) {
-    points = proto::SnapVertices(lattice, rounded, steps);
+  const auto measure = [&](const tin::TinMesh& candidate) {
+    points = proto::SnapVertices(lattice, candidate, steps);
     while (!proto::FitsFloats(points, step_m, depth_m)) {
       steps.Double();
-      points = proto::SnapVertices(lattice, rounded, steps);
+      points = proto::SnapVertices(lattice, candidate, steps);
     }
     positions = proto::GridPositions(points, step_m);
-    return meter.MeasureFlat(rounded, positions);
+    return meter.MeasureFlat(candidate, positions);
   };
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());

@@ -29,8 +29,8 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
                           const tin::SampleLimits& limits, double error_m, const std::stop_token& stop) {
   proto::TileErrorMeter meter(lattice, error_m, AllowedErrors(limits, error_m));
   MeshedTile meshed;
-  const auto measure = [&](const tin::TinMesh& rounded) {
-    meshed.tile = proto::QuantizeTile(lattice, rounded, steps);
+  const auto measure = [&](const tin::TinMesh& candidate) {
+    meshed.tile = proto::QuantizeTile(lattice, candidate, steps);
     return meter.Measure(meshed.tile);
   };
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);

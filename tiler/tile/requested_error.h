@@ -12,13 +12,13 @@ namespace terrace::tiler {
 // All members are optional.
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
-  std::optional<double> fraction;  // of the level's error; finite, > 0
+  std::optional<double> fraction;  // of geo::LevelError, the error that clients assume for the level; finite, > 0
   bool at_least = false;           // the larger of error_m and the level's default error is used
 };
 
 // What a dataset's steps depend on besides the request.
 struct ErrorScale {
-  double fraction = geo::kDefaultErrorFraction;  // the default error of a level over the level's error
+  double fraction = geo::kDefaultErrorFraction;  // the default error of a level over geo::LevelError
   // The deepest level of the sources; edits may add deeper ones. From it on tiles have all detail of the sources, so
   // RequestedError::at_least does not keep their error at the default one.
   int max_source_level = geo::kMaxLevel;
