@@ -109,8 +109,8 @@ class SeedCache(unittest.TestCase):
         config, cache = self.config("cache")
         process = subprocess.Popen(self.command(config, cache, "--threads", "1"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         deadline = time.monotonic() + 60
-        # Records are in the write-ahead log as soon as a batch of them is written.
-        while sum(file.stat().st_size for file in cache.rglob("*.log")) == 0 and time.monotonic() < deadline:
+        # Records are appended to the write-ahead log one by one; all of them have about 840,000 bytes.
+        while sum(file.stat().st_size for file in cache.rglob("*.log")) < 100_000 and time.monotonic() < deadline:
             self.assertIsNone(process.poll(), "the seeding ended before it was killed")
             time.sleep(0.001)
         process.kill()
