@@ -29,7 +29,8 @@ struct SourceOptions {
 };
 
 // The surface in a hole. A hole is a large void with data all around it and no height from any source. Voids that touch
-// the rim of their source are collars; they always show the floor (docs/decisions/0015-voids.md).
+// a place without a raster are collars; where no source has a height, they always show the floor
+// (docs/decisions/0015-voids.md).
 enum class HoleFill : std::uint8_t {
   kSmooth,  // a harmonic surface between the surrounding heights
   kFloor,

@@ -378,8 +378,8 @@ Result<void> RasterGrid::SetHeightsAt(NodePositions positions, std::span<const s
     heights[node] = rounded;
     if (trace != nullptr) trace->heights[node] = rounded;
     if (weights.empty()) return;
-    // All samples have weights, so this is plain bilinear interpolation. Nodes with weight 0 are left to the grids
-    // below, because they would hide the floor.
+    // All samples have weights, so this is plain bilinear interpolation. The least weight is above 0,
+    // so that a node that no other grid has a height for takes the height of this one.
     constexpr double kMinWeight = 0x1p-10;
     const double weight = sample_weights.empty() ? 1 : Interpolate(sample_weights, window, cell).value_or(1);
     weights[node] = static_cast<float>(std::max(kMinWeight, std::nearbyint(weight * 1024) / 1024));

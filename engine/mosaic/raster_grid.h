@@ -33,7 +33,7 @@ namespace terrace::dem {
 
 // Heights that a tile can take from a raster grid.
 struct GridRange {
-  BlockRange blocks;         // min > max: none
+  BlockRange blocks;         // the lowest and highest height, and whether there are voids; min > max: no height
   bool shows_others = true;  // part of the tile may lie outside the raster grid or in its voids
 };
 

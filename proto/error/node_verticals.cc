@@ -90,8 +90,8 @@ NodeVerticals::Position NodeVerticals::PositionOf(const Vec3& point, int i, int 
 // The region north of a northern parallel is a cone and convex, so no point of the triangle lies south of its
 // southernmost corner. Points may lie north of the northernmost corner, because a chord between meridians is nearer to
 // the axis, at most by the cosine of half the angle between them.
-std::array<int, 2> NodeVerticals::RowsReached(double columns, double low_row, double high_row) const {
-  const double half = std::min(columns * step_ / 2, std::numbers::pi / 2);
+std::array<int, 2> NodeVerticals::RowsReached(double width, double low_row, double high_row) const {
+  const double half = std::min(width * step_ / 2, std::numbers::pi / 2);
   const double nearer = std::cos(half) > 1e-3 ? 1 / std::cos(half) - 1 : 1e3;
   const auto beyond = [&](double row) {
     const double latitude = south_ + row * step_;

@@ -1,5 +1,5 @@
-// Flat triangles on the plumb lines of lattice nodes: the height that a client draws at a longitude and latitude. The
-// plumb line of a position is the ellipsoid's normal there.
+// Where the plumb line of a lattice node meets a flat triangle: the height that a client draws at that longitude and
+// latitude. The plumb line of a position is the ellipsoid's normal there.
 //
 // The point of a flat triangle with barycentric coordinates w is close to the position that w gives in longitude and
 // latitude, but not equal to it: in a triangle of one degree at 60 degrees north the offset is up to a hundred metres,
@@ -90,8 +90,9 @@ class NodeVerticals {
   }
 
   // The first and last row that points of a triangle can reach, also if BoundsOf is infinite. Their columns are those
-  // of the corners, because a wedge between two meridians is convex.
-  std::array<int, 2> RowsReached(double columns, double low_row, double high_row) const;
+  // of the corners, because a wedge between two meridians is convex. `width`: of the triangle from west to east, in
+  // columns.
+  std::array<int, 2> RowsReached(double width, double low_row, double high_row) const;
 
   int cells() const { return cells_; }
   // Of all samples of the lattice and its halo, metres.

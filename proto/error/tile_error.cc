@@ -181,8 +181,8 @@ class TileErrorMeter::Impl {
   bool IsVertex(tin::SamplePosition p) const { return is_vertex_[NodeIndex(p.x, p.y)]; }
 
   struct MissedVertex {
-    tin::SamplePosition at;
-    std::size_t triangle = 0;  // the vertex that exceeds the bound
+    tin::SamplePosition at;    // the vertex that exceeds the bound
+    std::size_t triangle = 0;  // in which it does
   };
 
   // The neighbours in the row and the column of a node inside the tile.

@@ -16,7 +16,7 @@
 namespace terrace::proto {
 
 inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
-// CesiumJS misreads tiles of exactly 65536 vertices; smaller ones have 16-bit indices.
+// All indices then have 16 bits. The format allows 65536 vertices, but CesiumJS misreads tiles of exactly 65536.
 inline constexpr std::size_t kMaxTileVertices = 65534;
 
 // A quantized tile: integers, and the two heights of the header that scale them.

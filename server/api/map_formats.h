@@ -14,7 +14,7 @@ namespace terrace::server {
 int MaxMapLevel(const DatasetView& dataset, tiler::TileFormat format, int size);
 // The level of the coarsest tiles that these parameters are valid for: coarse contours need a large interval.
 int MinMapLevel(const MapTileParameters& parameters);
-// Where tiles of a format are. Precondition: as above.
+// Where tiles of a format are. Precondition for imagery: the dataset has an image.
 dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
 
 // kNotFound: the dataset has no imagery, and the format needs it.

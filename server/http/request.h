@@ -109,7 +109,7 @@ struct Request {
 
 // Why bytes are not a request. The connection cannot be used afterwards, because its framing cannot be trusted.
 struct BadRequest {
-  int status = 400;         // 400, 408, 414 or 431
+  int status = 400;         // 400, 408, 414 or 431; of RequestReader::ReadBody also 0
   std::string_view detail;  // for the client; a literal
 };
 
