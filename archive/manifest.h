@@ -45,7 +45,7 @@ struct BakedDataset {
   bool has_datum = true;
   int metadata_levels = 0;
   int max_level = 0;         // of the dataset, also where the archive ends above it
-  int max_source_level = 0;  // without edits (dem::DemSource::max_source_level)
+  int max_source_level = 0;  // without edits (dem::ElevationModel::max_source_level)
   std::uint64_t sources = 1;
 };
 

@@ -24,8 +24,8 @@ class UnitWriter {
   virtual ~UnitWriter() = default;
 
   // `tile`: in the coding of the archive's kind. Its bytes, errors and counts are stored. `range`:
-  // DemSource::RangeBound of the tile; not used for height tiles. kInvalidArgument: the tile lies outside the unit.
-  // kUnavailable: the disk cannot be written, for example because it is full.
+  // ElevationModel::RangeBound of the tile; not used for height tiles. kInvalidArgument: the tile lies outside the
+  // unit. kUnavailable: the disk cannot be written, for example because it is full.
   virtual Result<void> Add(const geo::TileKey& key, const tiler::EncodedTile& tile, const dem::HeightRange& range) = 0;
 
   // Writes the file and renames it. Call it once, last; the file is complete and on the disk afterwards. Without tiles

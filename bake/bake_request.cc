@@ -106,7 +106,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const BakeReque
 }
 
 archive::BakedDataset Describe(const tiler::Dataset& dataset) {
-  const dem::DemInfo& info = dataset.source->info();
+  const dem::DemInfo& info = dataset.model->info();
   archive::BakedDataset baked;
   baked.name = dataset.name;
   baked.attribution = dataset.attribution;
@@ -116,7 +116,7 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.bounds = info.bounds;
   baked.heights = info.heights;
   baked.floor_m = info.floor;
-  baked.has_datum = dataset.source->has_datum();
+  baked.has_datum = dataset.model->has_datum();
   baked.metadata_levels = dataset.metadata_levels;
   baked.max_level = info.max_level;
   baked.max_source_level = info.max_source_level;
@@ -148,8 +148,8 @@ std::vector<Ranges> TilesWithin(const std::vector<Ranges>& available, const dem:
 
 Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& dataset, const BakeRequest& request,
                                                     const std::string& product) {
-  const dem::DemSource& source = *dataset.source;
-  const dem::GeoBounds& data = source.info().bounds;
+  const dem::ElevationModel& model = *dataset.model;
+  const dem::GeoBounds& data = model.info().bounds;
   if (request.bbox && dem::CommonBounds(data, *request.bbox).empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "--bbox lies outside dataset {}, which covers {},{},{},{} (west, south, east, north)",
@@ -166,7 +166,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
     manifest.dataset = Describe(dataset);
     manifest.kind = *kind;
     const bool is_mercator = tiler::IsMercator(format);
-    const int deepest = is_mercator ? source.info().max_mercator_depth : source.max_level();
+    const int deepest = is_mercator ? model.info().max_mercator_depth : model.max_level();
     const auto [first, last] = request.levels.value_or(std::pair(0, deepest));
     if (last > deepest) {
       return MakeError(ErrorCode::kInvalidArgument, "--levels {}-{}: dataset {} has {} of {} tiles", first, last,
@@ -196,7 +196,7 @@ Result<std::vector<archive::Manifest>> PlanArchives(const tiler::Dataset& datase
       }
       continue;
     }
-    manifest.available = request.bbox ? TilesWithin(source.Availability(), *request.bbox) : source.Availability();
+    manifest.available = request.bbox ? TilesWithin(model.Availability(), *request.bbox) : model.Availability();
     manifest.available.resize(static_cast<std::size_t>(last) + 1);
     for (int level = 0; level <= last; ++level) {
       manifest.error_steps.push_back(tiler::ErrorStep(request.requested, level, dataset.error_scale()));

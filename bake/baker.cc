@@ -256,7 +256,7 @@ class Run {
       const Result<tiler::EncodedTile> tile = pipeline_.Build(request, options_.stop);
       if (!tile) return tl::unexpected(tile.error());
       if (!range) {
-        range = request.format == tiler::TileFormat::kHeightPng ? dem::HeightRange() : dataset_.source->RangeBound(key);
+        range = request.format == tiler::TileFormat::kHeightPng ? dem::HeightRange() : dataset_.model->RangeBound(key);
       }
       {
         const std::lock_guard lock(*output.mutex);

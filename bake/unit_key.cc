@@ -33,7 +33,7 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
 
 // The sources of height tiles. A geodetic tile of the level above the unit's is as wide as the unit, and is read at
 // least as coarsely.
-void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source, const geo::TileKey& root) {
+void AddMercatorContent(dem::ContentHasher& hasher, const dem::ElevationModel& model, const geo::TileKey& root) {
   const double tiles = static_cast<double>(std::int64_t{1} << root.level);
   const auto share = [&](std::int64_t edge) { return static_cast<double>(edge) / tiles; };
   // Interpolation may need one more pixel on each side.
@@ -44,7 +44,7 @@ void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source
   for (const geo::TileRange& range : dem::TilesOverlapping(box, level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x - 1; x <= range.end_x + 1; ++x) {
-        hasher.Add(source.ContentBelow({level, dem::FloorMod(x, geo::TileColumns(level)), y}, level));
+        hasher.Add(model.ContentBelow({level, dem::FloorMod(x, geo::TileColumns(level)), y}, level));
       }
     }
   }
@@ -53,7 +53,7 @@ void AddMercatorContent(dem::ContentHasher& hasher, const dem::DemSource& source
 }  // namespace
 
 std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& manifest, const Unit& unit) {
-  const dem::DemSource& source = *dataset.source;
+  const dem::ElevationModel& model = *dataset.model;
   dem::ContentHasher hasher;
   hasher.Add(kKeyVersion);
   hasher.Add(archive::kFormatVersion);
@@ -62,25 +62,25 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   AddKind(hasher, manifest.kind);
   // Without the levels that edits added elsewhere.
   int last = static_cast<int>(unit.tiles.size()) - 1;
-  while (last > source.max_source_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
+  while (last > model.max_source_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;
   for (int level = 0; level <= last; ++level) {
     const auto& ranges = unit.tiles[static_cast<std::size_t>(level)];
     AddRanges(hasher, ranges);
     if (!ranges.empty()) hasher.Add(RequestOf(manifest, {level, 0, 0}).error_step);
   }
   if (!unit.root) {
-    hasher.Add(source.fingerprint());
+    hasher.Add(model.fingerprint());
   } else if (manifest.kind.format == tiler::TileFormat::kHeightPng) {
-    AddMercatorContent(hasher, source, *unit.root);
+    AddMercatorContent(hasher, model, *unit.root);
   } else {
-    hasher.Add(source.ContentBelow(*unit.root, last));
+    hasher.Add(model.ContentBelow(*unit.root, last));
     if (manifest.kind.extensions.metadata) {
       // Metadata lists the dataset's tiles below a tile.
-      const int deepest = static_cast<int>(source.AvailabilityBelow(*unit.root).size()) - 1;
+      const int deepest = static_cast<int>(model.AvailabilityBelow(*unit.root).size()) - 1;
       for (int level = unit.root->level; level <= deepest; ++level) {
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;
-        for (const geo::TileRange& range : source.Available(level)) {
+        for (const geo::TileRange& range : model.Available(level)) {
           if (const auto common = geo::Intersection(range, below); !geo::IsEmpty(common)) parts.push_back(common);
         }
         AddRanges(hasher, parts);

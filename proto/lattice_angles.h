@@ -6,21 +6,21 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/sines.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
 struct LatticeAngles {
-  explicit LatticeAngles(const LatticeView& lattice) {
-    if (lattice.angles != nullptr) {
-      *this = *lattice.angles;
+  explicit LatticeAngles(const TileSamples& samples) {
+    if (samples.angles != nullptr) {
+      *this = *samples.angles;
       return;
     }
-    const auto nodes = static_cast<std::size_t>(lattice.cells()) + 1;
+    const auto nodes = static_cast<std::size_t>(samples.cells()) + 1;
     std::vector<double> longitudes(nodes), latitudes(nodes);
     for (std::size_t k = 0; k < nodes; ++k) {
-      longitudes[k] = lattice.Longitude(static_cast<int>(k));
-      latitudes[k] = lattice.Latitude(static_cast<int>(k));
+      longitudes[k] = samples.Longitude(static_cast<int>(k));
+      latitudes[k] = samples.Latitude(static_cast<int>(k));
     }
     columns = geo::RoundedSinCosOf(longitudes);
     rows = geo::RoundedSinCosOf(latitudes);

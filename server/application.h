@@ -36,9 +36,9 @@ struct ApplicationParts {
   // Called when a source is no longer the file that was opened; on io threads, must not block. Empty: nothing reopens
   // sources.
   std::function<void()> on_source_changed;
-  // Returns the text of the problem kCacheProblem, "" if there is none. Without a function there is never one.
+  // Returns the text of the problem kCacheProblem, "" if there is none. An empty function: there is never one.
   std::function<std::string()> cache_problem;
-  std::function<double(const std::string&)> progress_of;  // of a pending dataset; may have no function
+  std::function<double(const std::string&)> progress_of;  // of a pending dataset, 0 to 1; may be empty
 };
 
 class TerrainApplication final : public Application, public ProcessState {

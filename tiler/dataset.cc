@@ -20,17 +20,17 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 }  // namespace
 
 ErrorScale Dataset::error_scale() const {
-  if (source) return {error_fraction, source->max_source_level()};
+  if (model) return {error_fraction, model->max_source_level()};
   return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
 }
 
-std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request) {
+std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request) {
   int size = request.side_px, margin = 0;
   switch (request.format) {
     case TileFormat::kQuantizedMesh:
     case TileFormat::kGlb:
-      return request.extensions.metadata ? Mixed(source.EditsHash(request.key), source.DeeperTilesHash(request.key))
-                                         : source.EditsHash(request.key);
+      return request.extensions.metadata ? Mixed(model.EditsHash(request.key), model.DeeperTilesHash(request.key))
+                                         : model.EditsHash(request.key);
     case TileFormat::kImagery:
     case TileFormat::kGeodeticImagery:
       return 0;
@@ -46,8 +46,8 @@ std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& req
       break;
   }
   const MapWindow window(request.key, size, margin);
-  if (window.depth > source.info().max_mercator_depth) return 0;
-  return source.MercatorEditsHash(window.depth, window.nodes);
+  if (window.depth > model.info().max_mercator_depth) return 0;
+  return model.MercatorEditsHash(window.depth, window.nodes);
 }
 
 }  // namespace terrace::tiler

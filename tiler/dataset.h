@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/image/imagery.h"
 #include "engine/image/water_raster.h"
 #include "proto/gltf/glb_tile.h"
@@ -42,17 +42,17 @@ struct WatchedFile {
   std::optional<dem::FileStamp> stamp;  // nullopt: there was none
 };
 
-// One served dataset. Copies share the source, water and imagery, which are immutable: a reload keeps a dataset that
+// One served dataset. Copies share the model, water and imagery, which are immutable: a reload keeps a dataset that
 // has not changed.
 struct Dataset {
   std::string name;
   std::string attribution;
   double error_fraction = 0.5;
   MeshOptions mesh_options;
-  proto::GlbOptions glb;                         // compression: for GLB requests that name none
-  std::shared_ptr<const dem::DemSource> source;  // null: there are no sources, and `baked` is not null
-  std::shared_ptr<const BakedTiles> baked;       // of this generation; null: none
-  std::vector<WatchedFile> baked_files;          // a change of one of them means that there is another archive
+  proto::GlbOptions glb;                             // compression: for GLB requests that name none
+  std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
+  std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none
+  std::vector<WatchedFile> baked_files;              // a change of one of them means that there is another archive
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
@@ -62,10 +62,10 @@ struct Dataset {
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // its `default_steps` is a view into `baked`, if there is one
-  std::uint64_t options_hash = 0;  // of all of `generation` that DemSource::fingerprint does not cover
+  std::uint64_t options_hash = 0;  // of everything in `generation` that ElevationModel::fingerprint leaves out
 };
 
 // A hash of the edits that the tile of a request depends on; 0: none.
-std::uint64_t TileEditsHash(const dem::DemSource& source, const TileRequest& request);
+std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request);
 
 }  // namespace terrace::tiler

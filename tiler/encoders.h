@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 #include "tiler/dataset.h"
 #include "tiler/store/refined_tile.h"
 #include "tiler/surface/drawn_mesh.h"
@@ -17,7 +17,7 @@ struct EncodedTile;  // tile/encoded_tile.h
 
 // What an encoder makes a tile from.
 struct EncoderInput {
-  proto::LatticeView lattice() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
+  proto::TileSamples samples() const { return {request.key, refined->heights.lattice, refined->heights.heights}; }
 
   const Dataset& dataset;
   const TileRequest& request;

@@ -40,7 +40,7 @@ tl::unexpected<Error> NoSources() {
 
 // Whether an archive has the tiles that a drawn surface is read from. GLB tiles of archives are not decoded.
 Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface) {
-  if (dataset.source) return {};
+  if (dataset.model) return {};
   const std::vector<TileFormat>& formats = dataset.baked->extent().formats;
   const bool has = std::ranges::find(formats, TileFormat::kQuantizedMesh) != formats.end();
   if (has && surface.format == TileFormat::kQuantizedMesh) return {};
@@ -51,7 +51,7 @@ Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface
 }
 
 const std::vector<std::vector<geo::TileRange>>& AvailableIn(const Dataset& dataset) {
-  return dataset.source ? dataset.source->Availability() : dataset.baked->extent().available;
+  return dataset.model ? dataset.model->Availability() : dataset.baked->extent().available;
 }
 
 int DeepestOf(const Dataset& dataset) { return static_cast<int>(AvailableIn(dataset).size()) - 1; }
@@ -73,7 +73,7 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<Refine
 // Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
-  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.source->EditsHash(key)};
+  const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.model->EditsHash(key)};
   const RefinedTilePtr known = refinements_->Find(cache_key);
   if (known) encoded.refinement_use = RefinementUse::kContinued;
   if (known && known->error_m <= error_m) {
@@ -86,15 +86,15 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   if (known) {
     heights = known->heights;
   } else {
-    Result<dem::TileHeights> read = dataset.source->Read(key, stop);
+    Result<dem::TileHeights> read = dataset.model->Read(key, stop);
     if (!read) return tl::unexpected(std::move(read).error());
     heights = *std::move(read);
     encoded.times.read = MicrosecondsSince(start);
     start = Clock::now();
   }
-  const proto::LatticeView lattice{key, heights.lattice, heights.heights};
-  const tin::HeightField field = FieldOf(lattice);
-  tin::GreedyOptions options = RefineOptionsOf(*dataset.source, lattice, dataset.mesh_options.criterion);
+  const proto::TileSamples samples{key, heights.lattice, heights.heights};
+  const tin::HeightField field = FieldOf(samples);
+  tin::GreedyOptions options = RefineOptionsOf(*dataset.model, samples, dataset.mesh_options.criterion);
   tin::GreedyTriangulation greedy = known ? tin::GreedyTriangulation(field, std::move(options), known->refinement)
                                           : tin::GreedyTriangulation(field, std::move(options));
   tin::GreedyGoal goal;
@@ -115,14 +115,14 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
   if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
   const Dataset& dataset = datasets_[request.dataset];
-  if (!dataset.source) return TakeBaked(dataset, request);
+  if (!dataset.model) return TakeBaked(dataset, request);
   const auto* const encoder = std::ranges::find(kEncoders, request.format, &Encoder::format);
   TERRACE_CHECK(encoder != std::end(kEncoders));
   EncodedTile encoded;
   RefinedTilePtr refined;
   double error_m = 0;
   if (encoder->needs_refinement) {
-    if (!dataset.source->IsAvailable(request.key)) {
+    if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
     error_m = NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
@@ -145,9 +145,9 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
 
 Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                               dem::HeightDatum datum, std::stop_token stop) const {
-  if (!datasets_[dataset].source) return NoSources();
+  if (!datasets_[dataset].model) return NoSources();
   std::vector<std::uint8_t> filled(points.size());
-  Result<std::vector<float>> heights = datasets_[dataset].source->ReadPoints(points, datum, std::move(stop), filled);
+  Result<std::vector<float>> heights = datasets_[dataset].model->ReadPoints(points, datum, std::move(stop), filled);
   if (!heights) return tl::unexpected(std::move(heights).error());
   return PointHeights{*std::move(heights), std::move(filled)};
 }
@@ -155,8 +155,8 @@ Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<c
 Result<std::vector<std::array<float, 3>>> TilePipeline::ReadNormals(std::uint32_t dataset,
                                                                     std::span<const dem::GeoPosition> points,
                                                                     std::stop_token stop) const {
-  if (!datasets_[dataset].source) return NoSources();
-  return SourceNormals(*datasets_[dataset].source, points, stop);
+  if (!datasets_[dataset].model) return NoSources();
+  return SourceNormals(*datasets_[dataset].model, points, stop);
 }
 
 Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dataset, const TileRequest& request,
@@ -165,7 +165,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   const DrawnMeshKey cache_key{dataset.generation, request.key, request.error_step, is_glb,
                                is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
   if (std::shared_ptr<const DrawnMesh> known = drawn_->Find(cache_key)) return known;
-  if (!dataset.source) {
+  if (!dataset.model) {
     const Result<EncodedTile> baked = TakeBaked(dataset, request);
     if (!baked) return tl::unexpected(baked.error());
     Result<DrawnTriangles> decoded = DrawnByBytes(baked->bytes, request.key);
@@ -217,30 +217,30 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
                                                               const dem::SightOptions& options,
                                                               std::stop_token stop) const {
   const Dataset& of = datasets_[dataset];
-  if (!of.source && !surface) return NoSources();
-  if (of.source) {
-    if (const Result<void> bounded = CheckSamplesAlong(*of.source, rays); !bounded)
+  if (!of.model && !surface) return NoSources();
+  if (of.model) {
+    if (const Result<void> bounded = CheckSamplesAlong(*of.model, rays); !bounded)
       return tl::unexpected(bounded.error());
-    if (!surface) return of.source->LookAlong(rays, options, std::move(stop));
+    if (!surface) return of.model->LookAlong(rays, options, std::move(stop));
   }
   if (const Result<void> has = CheckHasSurface(of, *surface); !has) return tl::unexpected(has.error());
   const Result<int> level = LevelOf(*surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  if (!of.source) {
+  if (!of.model) {
     if (const Result<void> bounded = CheckSamplesAlong(*level, rays); !bounded) return tl::unexpected(bounded.error());
   }
   return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshFinder(dataset, *surface, stop), stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {
-  if (!datasets_[dataset].source) return NoSources();
-  return tiler::PlanArea(*datasets_[dataset].source, datasets_[dataset].error_fraction, area, max_samples);
+  if (!datasets_[dataset].model) return NoSources();
+  return tiler::PlanArea(*datasets_[dataset].model, datasets_[dataset].error_fraction, area, max_samples);
 }
 
 Result<EncodedTile> TilePipeline::BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                             std::stop_token stop) const {
-  if (!datasets_[dataset].source) return NoSources();
-  return BuildAreaMesh(*datasets_[dataset].source, plan, area, std::move(stop));
+  if (!datasets_[dataset].model) return NoSources();
+  return BuildAreaMesh(*datasets_[dataset].model, plan, area, std::move(stop));
 }
 
 }  // namespace terrace::tiler

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tiler/area/area_mesh.h"
 #include "tiler/dataset.h"
 #include "tiler/store/refined_tile.h"
@@ -49,7 +49,7 @@ class TilePipeline {
   // to be opened again. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // DemSource::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.
+  // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 

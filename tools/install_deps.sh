@@ -21,7 +21,7 @@ runtime_packages=(
 )
 test_packages=(
   libgtest-dev libgmock-dev libbenchmark-dev libpng-dev chromium python3-jsonschema strace wrk proj-bin
-  clang-14 libclang-rt-14-dev llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3 redis-server
+  clang-14 libclang-rt-14-dev lld llvm-14 clang-format-14 clang-tidy-14 nginx-light curl openssl faketime pyflakes3 redis-server
   prometheus python3-yaml python3-numpy
   debhelper help2man lintian mkdocs systemd
 )

@@ -62,8 +62,8 @@ Json WriteObject(const Target& source, const std::vector<Option<Target>>& table)
 template <typename Target>
 Json ObjectSchema(const std::vector<Option<Target>>& table);
 
-// An object with the options of `table`, which outlives the codec; as a flag the text of its first option alone. That
-// option is the object's member `first`; the object has no value while it is empty. `example`: for the error that the
+// An object with the options of `table`, which outlives the codec; its flag sets only the first option,
+// the object's member `first`. While `first` is empty, the object counts as not set. `example`: for the error that the
 // value is no object.
 template <typename Target, typename Object>
 Codec<Target> ObjectOf(Object Target::*member, std::string Object::*first, const std::vector<Option<Object>>& table,

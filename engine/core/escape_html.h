@@ -6,7 +6,7 @@
 
 namespace terrace {
 
-// Writes &, < and > as entities, and " too unless `quotes` is false; values of attributes need that.
+// Writes &, < and > as entities and, unless `quotes` is false, " too, which must be an entity in attribute values.
 std::string EscapeHtml(std::string_view text, bool quotes = true);
 
 }  // namespace terrace

@@ -1,4 +1,4 @@
-// The pixel positions in the source of a tile's samples.
+// Where a tile's samples lie in the source, in pixels.
 #pragma once
 
 #include <cstddef>

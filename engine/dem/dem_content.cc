@@ -49,7 +49,7 @@ bool HasPrecisionAround(const EditSet& edits, const geo::Lattice& lattice, const
 
 }  // namespace
 
-ContentHash DemSource::ContentBelow(const geo::TileKey& top, int deepest) const {
+ContentHash ElevationModel::ContentBelow(const geo::TileKey& top, int deepest) const {
   TERRACE_CHECK(geo::IsValid(top) && top.level <= deepest && deepest <= geo::kMaxLevel);
   ContentHasher hasher;
   hasher.Add(impl_->floor);

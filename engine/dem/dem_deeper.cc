@@ -26,7 +26,7 @@ std::vector<geo::TileRange> Below(const std::vector<geo::TileRange>& ranges, con
 
 // Lattices of deeper levels have as many cells as the deepest level of the sources, so that each is twice as fine as
 // the one above it.
-void DemSource::Impl::AddDeeperLevels(double error_fraction) {
+void ElevationModel::Impl::AddDeeperLevels(double error_fraction) {
   const int deepest = std::min(info.max_source_level + kMaxDeeperLevels, geo::kMaxLevel);
   std::vector<FinerTiles> finer;
   for (const Edit& edit : edits->edits()) {
@@ -52,7 +52,7 @@ void DemSource::Impl::AddDeeperLevels(double error_fraction) {
   }
 }
 
-std::uint64_t DemSource::DeeperTilesHash(const geo::TileKey& key) const {
+std::uint64_t ElevationModel::DeeperTilesHash(const geo::TileKey& key) const {
   if (!geo::IsValid(key) || key.level >= static_cast<int>(impl_->above_added.size())) return 0;
   const auto& touched = impl_->above_added[static_cast<std::size_t>(key.level)];
   if (!geo::Contains(touched, key)) return 0;
@@ -72,7 +72,7 @@ std::uint64_t DemSource::DeeperTilesHash(const geo::TileKey& key) const {
   return hash;
 }
 
-std::span<const std::vector<geo::TileRange>> DemSource::AvailabilityBelow(const geo::TileKey& key) const {
+std::span<const std::vector<geo::TileRange>> ElevationModel::AvailabilityBelow(const geo::TileKey& key) const {
   const std::span<const std::vector<geo::TileRange>> all = impl_->available;
   std::size_t levels = all.size();
   const auto least = static_cast<std::size_t>(max_source_level()) + 1;

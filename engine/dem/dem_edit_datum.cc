@@ -23,7 +23,7 @@ Result<std::shared_ptr<const Geoid>> GeoidAt(const std::vector<RasterGrid>& grid
 
 }  // namespace
 
-Result<std::string> DemSource::Impl::AddUndulations(Edit& edit) const {
+Result<std::string> ElevationModel::Impl::AddUndulations(Edit& edit) const {
   const EditPlane& plane = edit.plane;
   const auto geoid = GeoidAt(grids, GridsAt({plane.longitude, plane.latitude, plane.longitude, plane.latitude}));
   if (!geoid) return tl::unexpected(geoid.error());

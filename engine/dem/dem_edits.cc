@@ -71,8 +71,8 @@ std::optional<double> FlatHeightOf(FlatHeight kind, std::vector<float> heights) 
 
 }  // namespace
 
-Result<std::string> DemSource::Impl::ResolveEdit(Edit& edit, const DemOptions& options,
-                                                 std::map<std::string, std::size_t>& opened) {
+Result<std::string> ElevationModel::Impl::ResolveEdit(Edit& edit, const DemOptions& options,
+                                                      std::map<std::string, std::size_t>& opened) {
   if (!Meets(edit.reach, info.bounds)) {
     const bool is_swapped = Meets(Swapped(edit.reach), info.bounds);
     return fmt::format("lies outside of the data, which is {:.4f} to {:.4f} N, {:.4f} to {:.4f} E{}", info.bounds.south,
@@ -87,7 +87,7 @@ Result<std::string> DemSource::Impl::ResolveEdit(Edit& edit, const DemOptions& o
   return std::string();
 }
 
-Result<std::string> DemSource::Impl::AddFlatHeight(Edit& edit, const std::stop_token& stop) const {
+Result<std::string> ElevationModel::Impl::AddFlatHeight(Edit& edit, const std::stop_token& stop) const {
   const std::vector<GeoPosition> inside = PositionsInside(edit);
   auto heights = PointsUnedited(inside, HeightDatum::kEllipsoid, stop);
   if (!heights) return tl::unexpected(std::move(heights).error());
@@ -102,15 +102,15 @@ Result<std::string> DemSource::Impl::AddFlatHeight(Edit& edit, const std::stop_t
   return std::string();
 }
 
-Result<std::string> DemSource::Impl::OpenReplacement(Edit& edit, const DemOptions& options,
-                                                     std::map<std::string, std::size_t>& opened) {
+Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemOptions& options,
+                                                          std::map<std::string, std::size_t>& opened) {
   const auto [known, is_new] = opened.emplace(edit.source, replacements.size());
   if (is_new) {
     DemOptions of_replacement;
     of_replacement.source = options.source;
     of_replacement.cache = options.cache;
     of_replacement.stop = options.stop;
-    auto source = DemSource::Open(edit.source, of_replacement);
+    auto source = ElevationModel::Open(edit.source, of_replacement);
     if (!source) {
       opened.erase(known);
       return fmt::format("its source: {}", source.error().message);
@@ -118,18 +118,18 @@ Result<std::string> DemSource::Impl::OpenReplacement(Edit& edit, const DemOption
     replacements.push_back(*std::move(source));
   }
   edit.replacement = known->second;
-  const DemSource& source = *replacements[edit.replacement];
-  edit.low_m = source.info().heights.min;
-  edit.high_m = source.info().heights.max;
+  const ElevationModel& model = *replacements[edit.replacement];
+  edit.low_m = model.info().heights.min;
+  edit.high_m = model.info().heights.max;
   ContentHasher hasher;
   hasher.Add(edit.hash);
-  hasher.Add(source.fingerprint());
+  hasher.Add(model.fingerprint());
   edit.hash = hasher.Hash();
   return std::string();
 }
 
 // Faults are collected: of files, of features, and of features and the sources together.
-Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
+Result<void> ElevationModel::Impl::OpenEdits(const DemOptions& options) {
   unedited_fingerprint = fingerprint;
   unedited_heights = info.heights;
   if (options.edits.empty()) return {};
@@ -166,15 +166,15 @@ Result<void> DemSource::Impl::OpenEdits(const DemOptions& options) {
 }
 
 template <typename NodeGrid>
-std::vector<std::size_t> DemSource::Impl::EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const {
+std::vector<std::size_t> ElevationModel::Impl::EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const {
   if (edits == nullptr) return {};
   return edits->Find(BoxOf(node_grid, window));
 }
 
 template <typename NodeGrid>
-Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
-                                         std::span<const std::size_t> which, std::span<float> heights,
-                                         const std::stop_token& stop, double* error_m) const {
+Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
+                                              std::span<const std::size_t> which, std::span<float> heights,
+                                              const std::stop_token& stop, double* error_m) const {
   // Heights of a replacement before other edits, so that its voids show what is below. Features with the same source
   // share them.
   std::map<std::size_t, ReplacedHeights> known;
@@ -204,45 +204,18 @@ Result<void> DemSource::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWi
   return edits->Apply(node_grid, window, which, heights, replaced, stop, error_m);
 }
 
-template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
-template std::vector<std::size_t> DemSource::Impl::EditsAt(const geo::MercatorGrid&, const NodeWindow&) const;
-template Result<void> DemSource::Impl::ApplyEdits(const geo::Lattice&, const NodeWindow&, std::span<const std::size_t>,
-                                                  std::span<float>, const std::stop_token&, double*) const;
-template Result<void> DemSource::Impl::ApplyEdits(const geo::MercatorGrid&, const NodeWindow&,
-                                                  std::span<const std::size_t>, std::span<float>,
-                                                  const std::stop_token&, double*) const;
-
-// Edits have heights above the ellipsoid. Heights in another datum change by the same differences.
-Result<std::vector<float>> DemSource::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
-                                                      const std::string& what, const std::stop_token& stop) const {
-  const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadUnedited(level, window, datum, what, stop);
-  if (!heights) return heights;
-  const std::vector<std::size_t> which = EditsAt(lattice, window);
-  if (which.empty()) return heights;
-  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
-    if (auto edited = ApplyEdits(lattice, window, which, *heights, stop); !edited) {
-      return tl::unexpected(std::move(edited).error());
-    }
-    return heights;
-  }
-  const auto before = ReadUnedited(level, window, HeightDatum::kEllipsoid, what, stop);
-  if (!before) return before;
-  std::vector<float> after = *before;
-  if (auto edited = ApplyEdits(lattice, window, which, after, stop); !edited) {
-    return tl::unexpected(std::move(edited).error());
-  }
-  for (std::size_t k = 0; k < after.size(); ++k) {
-    if (after[k] == (*before)[k]) continue;
-    (*heights)[k] = RoundHeight(static_cast<double>((*heights)[k]) + static_cast<double>(after[k]) -
-                                static_cast<double>((*before)[k]));
-  }
-  return heights;
-}
+template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
+template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::MercatorGrid&, const NodeWindow&) const;
+template Result<void> ElevationModel::Impl::ApplyEdits(const geo::Lattice&, const NodeWindow&,
+                                                       std::span<const std::size_t>, std::span<float>,
+                                                       const std::stop_token&, double*) const;
+template Result<void> ElevationModel::Impl::ApplyEdits(const geo::MercatorGrid&, const NodeWindow&,
+                                                       std::span<const std::size_t>, std::span<float>,
+                                                       const std::stop_token&, double*) const;
 
 // Where there is no height, an edit whose weight is 1 makes one, but above the ellipsoid alone.
-Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                         std::span<float> heights, const std::stop_token& stop) const {
+Result<void> ElevationModel::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                              std::span<float> heights, const std::stop_token& stop) const {
   std::vector<std::size_t> edited;
   std::vector<std::vector<std::size_t>> which;
   const auto is_stopped = [&](std::size_t point) { return point % 64 == 0 && stop.stop_requested(); };
@@ -290,22 +263,12 @@ Result<void> DemSource::Impl::EditPoints(std::span<const GeoPosition> points, He
   return {};
 }
 
-HeightRange DemSource::Impl::RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice,
-                                                const geo::TileKey& key) const {
+HeightRange ElevationModel::Impl::RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice,
+                                                     const geo::TileKey& key) const {
   return replacements[edit.replacement]->impl_->UneditedRange(lattice, key);
 }
 
-HeightRange DemSource::RangeBound(const geo::TileKey& key) const {
-  TERRACE_CHECK(geo::IsValid(key));
-  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
-  const HeightRange range = impl_->UneditedRange(lattice, key);
-  const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
-  if (which.empty()) return range;
-  return impl_->edits->Extended(range, which,
-                                [&](const Edit& edit) { return impl_->RangeOfReplacement(edit, lattice, key); });
-}
-
-MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
+MeshDemands ElevationModel::DemandsOf(const geo::TileKey& key) const {
   TERRACE_CHECK(geo::IsValid(key));
   if (impl_->edits == nullptr) return {};
   const geo::Lattice& lattice = impl_->LatticeOf(key.level);
@@ -316,7 +279,7 @@ MeshDemands DemSource::DemandsOf(const geo::TileKey& key) const {
   return impl_->edits->DemandsOf(lattice, window, which);
 }
 
-MeshDemands DemSource::DemandsOf(int level, const NodeWindow& window) const {
+MeshDemands ElevationModel::DemandsOf(int level, const NodeWindow& window) const {
   if (impl_->edits == nullptr) return {};
   const geo::Lattice& lattice = impl_->LatticeOf(level);
   const auto which = impl_->EditsAt(lattice, {window.column - 1, window.row - 1, window.columns + 2, window.rows + 2});
@@ -324,7 +287,7 @@ MeshDemands DemSource::DemandsOf(int level, const NodeWindow& window) const {
   return impl_->edits->DemandsOf(lattice, window, which);
 }
 
-std::array<std::vector<MeshDemands>, 4> DemSource::DemandsBeyondCorners(const geo::TileKey& key) const {
+std::array<std::vector<MeshDemands>, 4> ElevationModel::DemandsBeyondCorners(const geo::TileKey& key) const {
   std::array<std::vector<MeshDemands>, 4> demands;
   if (impl_->edits == nullptr) return demands;
   const auto edges = EdgesBeyondCorners(impl_->LatticeOf(key.level), key);
@@ -334,14 +297,14 @@ std::array<std::vector<MeshDemands>, 4> DemSource::DemandsBeyondCorners(const ge
   return demands;
 }
 
-std::uint64_t DemSource::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
+std::uint64_t ElevationModel::unedited_fingerprint() const { return impl_->unedited_fingerprint; }
 
-std::uint64_t DemSource::EditsHash(const geo::TileKey& key) const {
+std::uint64_t ElevationModel::EditsHash(const geo::TileKey& key) const {
   if (impl_->edits == nullptr || !geo::IsValid(key) || key.level > geo::kMaxLevel) return 0;
   return impl_->ComputeEditsHash(key);
 }
 
-std::uint64_t DemSource::MercatorEditsHash(int depth, const NodeWindow& window) const {
+std::uint64_t ElevationModel::MercatorEditsHash(int depth, const NodeWindow& window) const {
   if (impl_->edits == nullptr) return 0;
   const geo::MercatorGrid grid{depth};
   if (!impl_->edits->Any(BoxOf(grid, window))) return 0;
@@ -354,20 +317,20 @@ std::uint64_t DemSource::MercatorEditsHash(int depth, const NodeWindow& window) 
   return hash;
 }
 
-std::optional<std::uint64_t> DemSource::Impl::KnownHash(const HashKey& key) const {
+std::optional<std::uint64_t> ElevationModel::Impl::KnownHash(const HashKey& key) const {
   const std::lock_guard lock(hashes_mutex);
   const auto known = hashes.find(key);
   return known != hashes.end() ? std::optional(known->second) : std::nullopt;
 }
 
-void DemSource::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
+void ElevationModel::Impl::KeepHash(const HashKey& key, std::uint64_t hash) const {
   constexpr std::size_t kMaxHashes = std::size_t{1} << 18;
   const std::lock_guard lock(hashes_mutex);
   if (hashes.size() >= kMaxHashes) hashes.clear();
   hashes.emplace(key, hash);
 }
 
-void DemSource::Impl::AddPrecisionBeyondCorners(const geo::TileKey& key, std::set<std::size_t>& found) const {
+void ElevationModel::Impl::AddPrecisionBeyondCorners(const geo::TileKey& key, std::set<std::size_t>& found) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   for (const auto& edges : EdgesBeyondCorners(lattice, key)) {
     for (const NodeWindow& edge : edges) {
@@ -382,7 +345,7 @@ void DemSource::Impl::AddPrecisionBeyondCorners(const geo::TileKey& key, std::se
 // The edits that reach the tile's samples or their halo. The height steps of common edges and corners depend on the
 // ranges of neighbours that edits have changed, and on the precision on edges beyond the corners
 // (proto/mesh/edge_steps.h).
-std::uint64_t DemSource::Impl::ComputeEditsHash(const geo::TileKey& key) const {
+std::uint64_t ElevationModel::Impl::ComputeEditsHash(const geo::TileKey& key) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   const bool is_polar = key.y == 0 || key.y == geo::TileRows(key.level) - 1;
   const bool is_range_edited = unedited_heights.min != info.heights.min || unedited_heights.max != info.heights.max;
@@ -431,7 +394,7 @@ std::uint64_t DemSource::Impl::ComputeEditsHash(const geo::TileKey& key) const {
   return hash;
 }
 
-std::vector<EditOutline> DemSource::Edits() const {
+std::vector<EditOutline> ElevationModel::Edits() const {
   std::vector<EditOutline> outlines;
   if (impl_->edits == nullptr) return outlines;
   for (const Edit& edit : impl_->edits->edits()) {

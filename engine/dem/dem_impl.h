@@ -1,4 +1,4 @@
-// The state of a DemSource. Immutable after Open.
+// The state of a ElevationModel. Immutable after Open.
 #pragma once
 
 #include <algorithm>
@@ -13,26 +13,26 @@
 #include <unordered_map>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/edits/edit_set.h"
 #include "engine/mosaic/raster_grid.h"
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::SetHeights for a window. If `part` is set, the trace covers that part only, and its
+// The trace of RasterGrid::FillNodes for a window. If `part` is set, the trace covers that part only, and its
 // `cells` are empty.
 struct PartTrace {
   std::optional<NodeWindow> part = {};
   GridTrace trace = {};
 };
 
-// What the heights of a raster grid depend on, for DemSource::ContentBelow.
+// What the heights of a raster grid depend on, for ElevationModel::ContentBelow.
 struct GridContent {
   ContentHash grid;                  // its pixel grid, vertical datum and geoid
   std::vector<ContentHash> members;  // samples, positions and rules for voids, by member
 };
 
-class DemSource::Impl {
+class ElevationModel::Impl {
  public:
   // `what`: names the request in messages.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
@@ -104,7 +104,7 @@ class DemSource::Impl {
 
   // Null: there are no edits.
   std::unique_ptr<const EditSet> edits;
-  std::vector<std::unique_ptr<DemSource>> replacements;  // by Edit::replacement
+  std::vector<std::unique_ptr<ElevationModel>> replacements;  // by Edit::replacement
   StampedFiles edit_files;
   std::uint64_t unedited_fingerprint = 0;
   HeightRange unedited_heights;  // `info.heights` without edits

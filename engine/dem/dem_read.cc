@@ -73,14 +73,13 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
   }
 }
 
-// RasterGrid::SetHeights. If there are many raster grids, only for the part of the window that this one reaches: a
+// RasterGrid::FillNodes. If there are many raster grids, only for the part of the window that this one reaches: a
 // shallow tile may have thousands of small ones, and their traces are kept until all heights are known.
 template <typename NodeGrid>
-Result<void> SetHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window,
-                          std::size_t grids, HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop,
-                          PartTrace* traced) {
+Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
+                         HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
   GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return grid.SetHeights(node_grid, window, datum, nodes, stop, trace);
+  if (grids <= kFewGrids) return grid.FillNodes(node_grid, window, datum, nodes, stop, trace);
   const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0 : Area(part.columns, part.rows));
@@ -92,10 +91,10 @@ Result<void> SetHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, con
   };
   std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth;
   if (nodes.smooth != nullptr) smooth = copy(*nodes.smooth);
-  const auto filled =
-      grid.SetHeights(node_grid, part, datum,
-                      {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, trace);
-  if (!filled) return filled;
+  const auto done =
+      grid.FillNodes(node_grid, part, datum,
+                     {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, trace);
+  if (!done) return done;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
   if (!smooth.empty() && nodes.smooth->empty()) *nodes.smooth = VoidHeights(nodes.heights.size());
@@ -104,7 +103,7 @@ Result<void> SetHeightsOf(const RasterGrid& grid, const NodeGrid& node_grid, con
     traced->part = part;
     trace->cells = {};  // can be located again
   }
-  return filled;
+  return done;
 }
 
 // Converts a trace of a part to one of the window. Positions are known within the raster grid's footprint plus a
@@ -181,10 +180,10 @@ class Blend {
 };
 
 template <typename NodeGrid>
-Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid, const NodeWindow& window,
-                                                      HeightDatum datum, const std::string& what,
-                                                      const std::stop_token& stop,
-                                                      std::vector<PartTrace>* traces) const {
+Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_grid, const NodeWindow& window,
+                                                           HeightDatum datum, const std::string& what,
+                                                           const std::stop_token& stop,
+                                                           std::vector<PartTrace>* traces) const {
   const std::size_t nodes = Area(window.columns, window.rows);
   std::vector<float> heights = VoidHeights(nodes), smooth;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
@@ -198,10 +197,10 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
       weights.assign(nodes, 1);
     }
     PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
-    const auto filled = SetHeightsOf(grids[i], node_grid, window, order.size(), datum,
-                                     {heights, weights, &smooth, are_void}, stop, trace);
-    if (!filled) {
-      return MakeError(filled.error().code, "{}: {}", what, filled.error().message);
+    const auto done = FillNodesOf(grids[i], node_grid, window, order.size(), datum,
+                                  {heights, weights, &smooth, are_void}, stop, trace);
+    if (!done) {
+      return MakeError(done.error().code, "{}: {}", what, done.error().message);
     }
     if (feathers) blend.Add(heights, weights);
     are_void = false;
@@ -217,25 +216,25 @@ Result<std::vector<float>> DemSource::Impl::ReadGrids(const NodeGrid& node_grid,
   return heights;
 }
 
-std::vector<std::size_t> DemSource::Impl::GridsAt(const Box& box) const {
+std::vector<std::size_t> ElevationModel::Impl::GridsAt(const Box& box) const {
   // A single grid is read even where it has no heights. Reading checks its files, so that a tile of floor does not
   // outlive the dataset's only source.
   return grids.size() == 1 ? std::vector<std::size_t>{0} : index.Find(box);
 }
 
-std::vector<std::size_t> DemSource::Impl::GridsNear(const geo::TileKey& tile) const {
+std::vector<std::size_t> ElevationModel::Impl::GridsNear(const geo::TileKey& tile) const {
   const geo::Lattice& lattice = LatticeOf(tile.level);
   return GridsAt(BoxOf(lattice, WindowOfTile(lattice, tile)));
 }
 
-const geo::Lattice& DemSource::Impl::LatticeOf(int level) const {
+const geo::Lattice& ElevationModel::Impl::LatticeOf(int level) const {
   TERRACE_CHECK(level >= 0 && level < static_cast<int>(lattices.size()));
   return lattices[static_cast<std::size_t>(level)];
 }
 
-Result<std::vector<float>> DemSource::Impl::ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
-                                                         const std::string& what, const std::stop_token& stop,
-                                                         std::vector<PartTrace>* traces) const {
+Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
+                                                              const std::string& what, const std::stop_token& stop,
+                                                              std::vector<PartTrace>* traces) const {
   const geo::Lattice& lattice = LatticeOf(level);
   auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
   if (!heights || !HasVoids(*heights)) return heights;
@@ -252,8 +251,36 @@ Result<std::vector<float>> DemSource::Impl::ReadUnedited(int level, const NodeWi
   return heights;
 }
 
-Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum datum,
-                                          const std::stop_token& stop) const {
+// Edits have heights above the ellipsoid. Heights in another datum change by the same differences.
+Result<std::vector<float>> ElevationModel::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
+                                                           const std::string& what, const std::stop_token& stop) const {
+  const geo::Lattice& lattice = LatticeOf(level);
+  auto heights = ReadUnedited(level, window, datum, what, stop);
+  if (!heights) return heights;
+  const std::vector<std::size_t> which = EditsAt(lattice, window);
+  if (which.empty()) return heights;
+  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
+    if (auto edited = ApplyEdits(lattice, window, which, *heights, stop); !edited) {
+      return tl::unexpected(std::move(edited).error());
+    }
+    return heights;
+  }
+  const auto before = ReadUnedited(level, window, HeightDatum::kEllipsoid, what, stop);
+  if (!before) return before;
+  std::vector<float> after = *before;
+  if (auto edited = ApplyEdits(lattice, window, which, after, stop); !edited) {
+    return tl::unexpected(std::move(edited).error());
+  }
+  for (std::size_t k = 0; k < after.size(); ++k) {
+    if (after[k] == (*before)[k]) continue;
+    (*heights)[k] = RoundHeight(static_cast<double>((*heights)[k]) + static_cast<double>(after[k]) -
+                                static_cast<double>((*before)[k]));
+  }
+  return heights;
+}
+
+Result<TileHeights> ElevationModel::Impl::Read(const geo::TileKey& key, HeightDatum datum,
+                                               const std::stop_token& stop) const {
   const geo::Lattice& lattice = LatticeOf(key.level);
   const NodeWindow window = WindowOfTile(lattice, key);
   const std::string what = "tile " + geo::ToString(key);
@@ -278,9 +305,9 @@ Result<TileHeights> DemSource::Impl::Read(const geo::TileKey& key, HeightDatum d
 }
 
 // `traces`: of the raster grids that were read for the heights, in order of precedence.
-Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
-                                           std::vector<PartTrace> traces, const std::stop_token& stop,
-                                           bool counts_between) const {
+Result<double> ElevationModel::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
+                                                std::vector<PartTrace> traces, const std::stop_token& stop,
+                                                bool counts_between) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(tile.lattice, window));
   SourceErrorBound bound(tile.lattice, window, tile.heights, has_feather && order.size() > 1, counts_between);
   for (std::size_t k = 0; k < traces.size(); ++k) {
@@ -294,16 +321,17 @@ Result<double> DemSource::Impl::BoundError(const TileHeights& tile, const NodeWi
     const RasterGrid& grid = grids[order[k]];
     if (none_wanted.empty()) none_wanted = tile.heights;
     PartTrace traced;
-    const auto filled =
-        SetHeightsOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
-    if (!filled) return tl::unexpected(filled.error());
+    const auto done =
+        FillNodesOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
+    if (!done) return tl::unexpected(done.error());
     const GridTrace trace = Widened(std::move(traced), grid, tile.lattice, window);
     if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
   }
   return bound.bound();
 }
 
-Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& window, std::stop_token stop) const {
+Result<std::vector<float>> ElevationModel::ReadMercator(int depth, const NodeWindow& window,
+                                                        std::stop_token stop) const {
   TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
   auto heights = impl_->ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
@@ -317,8 +345,8 @@ Result<std::vector<float>> DemSource::ReadMercator(int depth, const NodeWindow& 
   return heights;
 }
 
-Result<std::vector<float>> DemSource::ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
-                                                        std::stop_token stop) const {
+Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
+                                                             std::stop_token stop) const {
   TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
   const geo::MercatorGrid grid{depth};
@@ -358,8 +386,8 @@ Result<std::vector<float>> DemSource::ReadKnownMercator(int depth, const NodeWin
   return known;
 }
 
-Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
-                                                 std::stop_token stop, std::span<std::uint8_t> filled) const {
+Result<std::vector<float>> ElevationModel::ReadPoints(std::span<const GeoPosition> points, HeightDatum datum,
+                                                      std::stop_token stop, std::span<std::uint8_t> filled) const {
   auto heights = impl_->PointsUnedited(points, datum, stop, filled);
   if (!heights || impl_->edits == nullptr) return heights;
   if (const auto edited = impl_->EditPoints(points, datum, *heights, stop); !edited) {
@@ -368,9 +396,9 @@ Result<std::vector<float>> DemSource::ReadPoints(std::span<const GeoPosition> po
   return heights;
 }
 
-Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
-                                                           const std::stop_token& stop,
-                                                           std::span<std::uint8_t> filled) const {
+Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
+                                                                const std::stop_token& stop,
+                                                                std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
   std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
   const auto take_smooth = [&] {
@@ -384,7 +412,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
     std::ranges::fill(marks, std::uint8_t{0});
-    const auto read = grids.front().SetPointHeights(points, datum, {heights, {}, &smooth}, marks, stop);
+    const auto read = grids.front().FillPoints(points, datum, {heights, {}, &smooth}, marks, stop);
     if (!read) return tl::unexpected(read.error());
     take_smooth();
     return heights;
@@ -404,7 +432,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
     found.assign(those.size(), SampleRules::kVoid);
     found_smooth = found;
     found_filled.assign(those.size(), 0);
-    const auto read = grids[grid].SetPointHeights(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
+    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];
@@ -416,7 +444,7 @@ Result<std::vector<float>> DemSource::Impl::PointsUnedited(std::span<const GeoPo
   return heights;
 }
 
-HeightRange DemSource::Impl::UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const {
+HeightRange ElevationModel::Impl::UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const {
   BlockRange blocks;
   bool floor_shows = true;
   for (const std::size_t i : GridsAt(BoxOf(lattice, WindowOfTile(lattice, key)))) {
@@ -430,6 +458,16 @@ HeightRange DemSource::Impl::UneditedRange(const geo::Lattice& lattice, const ge
   HeightRange bound{std::floor(blocks.min * 1024.0) / 1024, std::ceil(blocks.max * 1024.0) / 1024};
   if (floor_shows) bound = {std::min<double>(bound.min, floor), std::max<double>(bound.max, floor)};
   return bound;
+}
+
+HeightRange ElevationModel::RangeBound(const geo::TileKey& key) const {
+  TERRACE_CHECK(geo::IsValid(key));
+  const geo::Lattice& lattice = impl_->LatticeOf(key.level);
+  const HeightRange range = impl_->UneditedRange(lattice, key);
+  const auto which = impl_->EditsAt(lattice, WindowOfTile(lattice, key));
+  if (which.empty()) return range;
+  return impl_->edits->Extended(range, which,
+                                [&](const Edit& edit) { return impl_->RangeOfReplacement(edit, lattice, key); });
 }
 
 }  // namespace terrace::dem

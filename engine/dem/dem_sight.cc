@@ -37,8 +37,8 @@ bool IsEdited(const EditSet& edits, std::span<const TrackPiece> pieces) {
 
 }  // namespace
 
-Result<std::vector<SightAnswer>> DemSource::LookAlong(std::span<const SightRay> rays, const SightOptions& options,
-                                                      std::stop_token stop) const {
+Result<std::vector<SightAnswer>> ElevationModel::LookAlong(std::span<const SightRay> rays, const SightOptions& options,
+                                                           std::stop_token stop) const {
   GridSights sights;
   std::vector<SightAnswer> answers;
   answers.reserve(rays.size());

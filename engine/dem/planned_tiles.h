@@ -1,4 +1,4 @@
-// The tiles of areas, and of sources that are only planned. Opens no rasters.
+// The tiles that a box overlaps, and those that rasters would have, from their bounds and spacing. Opens no rasters.
 #pragma once
 
 #include <span>
@@ -22,7 +22,7 @@ struct PlannedRaster {
   double east_step_m = 0, north_step_m = 0;  // on the ground, between samples
 };
 
-// DemSource::Availability of a dataset of these rasters. Precondition: not empty.
+// ElevationModel::Availability of a dataset of these rasters. Precondition: not empty.
 std::vector<std::vector<geo::TileRange>> PlannedTiles(std::span<const PlannedRaster> rasters, double error_fraction);
 
 }  // namespace terrace::dem

@@ -33,8 +33,8 @@ bool Contains(const GridWindow& window, const GridWindow& other) {
 
 }  // namespace
 
-std::vector<std::uint8_t> DemSource::Impl::VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
-                                                     std::span<const PartTrace> traces) const {
+std::vector<std::uint8_t> ElevationModel::Impl::VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
+                                                          std::span<const PartTrace> traces) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(lattice, window));
   const auto columns = static_cast<std::size_t>(window.columns - 1), rows = static_cast<std::size_t>(window.rows - 1);
   std::vector<std::uint8_t> cells(columns * rows, 1);

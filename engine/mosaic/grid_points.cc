@@ -135,9 +135,8 @@ Result<PointBlockPtr> RasterGrid::BlockOfCells(std::vector<GridCell>& cells, con
   return std::make_shared<const PointBlock>(*std::move(read));
 }
 
-Result<void> RasterGrid::SetPointHeights(std::span<const GeoPosition> points, HeightDatum datum,
-                                         const NodeHeights& nodes, std::span<std::uint8_t> filled,
-                                         const std::stop_token& stop) const {
+Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+                                    std::span<std::uint8_t> filled, const std::stop_token& stop) const {
   const std::span<float> heights = nodes.heights;
   const auto converted = Conversion::For(vertical(), datum);
   if (!converted) return tl::unexpected(converted.error());

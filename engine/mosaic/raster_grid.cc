@@ -309,9 +309,9 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
   return FeatherWeights(bridged->heights, wide, window, column_step, row_step, feather);
 }
 
-Result<void> RasterGrid::SetHeightsAt(NodePositions positions, std::span<const std::uint8_t> inside,
-                                      std::span<const double> undulations, int factor, const NodeHeights& nodes,
-                                      const std::stop_token& stop, GridTrace* trace) const {
+Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,
+                                     std::span<const double> undulations, int factor, const NodeHeights& nodes,
+                                     const std::stop_token& stop, GridTrace* trace) const {
   const std::span<float> heights = nodes.heights, weights = nodes.weights;
   const bool traces_others = trace != nullptr && !weights.empty();
   std::vector<std::uint8_t> wanted;
@@ -446,8 +446,8 @@ NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindo
 }
 
 template <typename NodeGrid>
-Result<void> RasterGrid::SetHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
-                                    const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
+Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                                   const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
   const int factor = FactorOf(node_grid, spacing_);
   NodePositions positions = PositionsOf(node_grid, window, factor);
   std::vector<std::uint8_t> inside = cover_.Inside(positions);
@@ -469,12 +469,12 @@ Result<void> RasterGrid::SetHeights(const NodeGrid& node_grid, const NodeWindow&
     undulations = *std::move(found);
   }
   if (trace != nullptr) trace->undulations = undulations;
-  return SetHeightsAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
+  return FillNodesAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
 }
 
-template Result<void> RasterGrid::SetHeights(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
-                                             const std::stop_token&, GridTrace*) const;
-template Result<void> RasterGrid::SetHeights(const geo::MercatorGrid&, const NodeWindow&, HeightDatum,
-                                             const NodeHeights&, const std::stop_token&, GridTrace*) const;
+template Result<void> RasterGrid::FillNodes(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
+                                            const std::stop_token&, GridTrace*) const;
+template Result<void> RasterGrid::FillNodes(const geo::MercatorGrid&, const NodeWindow&, HeightDatum,
+                                            const NodeHeights&, const std::stop_token&, GridTrace*) const;
 
 }  // namespace terrace::dem

@@ -37,7 +37,7 @@ struct GridRange {
   bool shows_others = true;  // part of the tile may lie outside the raster grid or in its voids
 };
 
-// What SetHeights read for a window. The error bounds compare served heights with these samples. Heights in metres.
+// What FillNodes read for a window. The error bounds compare served heights with these samples. Heights in metres.
 struct GridTrace {
   // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
   // raster grid may have no position.
@@ -62,10 +62,11 @@ struct GridOptions {
   double feather_m = 0;
 };
 
-// Heights of a window's nodes in metres, one per node. Raster grids set them in turn.
+// Heights of a window's nodes in metres, one per node. Raster grids fill them one after the other.
 struct NodeHeights {
   std::span<float> heights;  // NaN: none yet
-  // Blend weights of the heights set, greater than 0, up to 1; the raster grids below have the rest. Empty: all 1.
+  // Blend weights of the heights that have been written, greater than 0, up to 1; the raster grids below have the rest.
+  // Empty: all 1.
   std::span<float> weights = {};
   // Smooth surface for holes where no raster grid has a height. NaN: none yet. Null: not wanted. Empty: no node has one
   // yet.
@@ -111,30 +112,30 @@ class RasterGrid {
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
   // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
   template <typename NodeGrid>
-  Result<void> SetHeights(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
-                          const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
+  Result<void> FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                         const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
 
-  // Returns the cells in which SetHeights locates the window's nodes. Where columns wrap, they are moved by whole turns
+  // Returns the cells in which FillNodes locates the window's nodes. Where columns wrap, they are moved by whole turns
   // to lie near `samples`, the window of a GridTrace.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
-  // SetHeights for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
+  // FillNodes for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
   // void, for points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of
-  // SetHeights and of the geoid for `datum`.
-  Result<void> SetPointHeights(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
-                               std::span<std::uint8_t> filled, const std::stop_token& stop) const;
+  // FillNodes and of the geoid for `datum`.
+  Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
+                          std::span<std::uint8_t> filled, const std::stop_token& stop) const;
 
-  // Whether a position lies in a member, the condition for a height from SetPointHeights. With wrapping: columns 0 ..
+  // Whether a position lies in a member, the condition for a height from FillPoints. With wrapping: columns 0 ..
   // columns().
   bool Covers(const Position& pixel) const { return cover_.Inside(std::span(&pixel, 1))[0] != 0; }
 
   // Returns the block of cells with these numbers (PointBlockKey), and keeps it. Does not check whether the files are
-  // unchanged if the block was kept. Errors: those of SetHeights.
+  // unchanged if the block was kept. Errors: those of FillNodes.
   Result<PointBlockPtr> FindPointBlock(std::int64_t block_column, std::int64_t block_row,
                                        const std::stop_token& stop) const;
 
   // Returns the samples of a window, metres in vertical(), NaN for voids, row by row from the north. On a raster grid
-  // that wraps, columns are taken modulo columns(). Errors: those of SetHeights.
+  // that wraps, columns are taken modulo columns(). Errors: those of FillNodes.
   Result<std::vector<float>> ReadSamples(const GridWindow& window, const std::stop_token& stop) const {
     return ReadAverages(1, window, stop);
   }
@@ -160,7 +161,7 @@ class RasterGrid {
   // Which voids of a member are holes, by region.
   std::span<const std::uint8_t> HoleRegions(std::size_t member) const { return voids_.HoleRegions(member); }
 
-  // Returns bounds on the ellipsoidal heights that SetHeights gives to the tile's nodes, edges included, in metres.
+  // Returns bounds on the ellipsoidal heights that FillNodes gives to the tile's nodes, edges included, in metres.
   GridRange RangeOf(const geo::Lattice& lattice, const geo::TileKey& key) const;
 
  private:
@@ -175,7 +176,7 @@ class RasterGrid {
 
   // Ranges of a box between column 0 and the last one, if columns wrap.
   BlockRange RangesInTurn(const Box& pixels) const;
-  // Averages of the valid samples of each block; NaN where there is none.
+  // Averages of the valid samples of each block (grid_blocks.cc); NaN where there is none.
   Result<std::vector<float>> ReadAverages(int factor, const GridWindow& window, const std::stop_token& stop) const;
   // Averages of `step` x `step` samples each, into rows of `out` that are `window.columns` wide. Precondition: every
   // member begins at a block; the window does not wrap.
@@ -212,9 +213,9 @@ class RasterGrid {
   NodePositions PositionsOf(const NodeGrid& node_grid, const NodeWindow& window, int factor) const;
   // `inside`: one entry per node, 0 where it gets no height. `undulations`: one per node, added to heights; empty:
   // none are.
-  Result<void> SetHeightsAt(NodePositions positions, std::span<const std::uint8_t> inside,
-                            std::span<const double> undulations, int factor, const NodeHeights& nodes,
-                            const std::stop_token& stop, GridTrace* trace = nullptr) const;
+  Result<void> FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,
+                           std::span<const double> undulations, int factor, const NodeHeights& nodes,
+                           const std::stop_token& stop, GridTrace* trace = nullptr) const;
   void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
                    const std::vector<float>& filled, std::span<const double> undulations, GridTrace& trace) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north

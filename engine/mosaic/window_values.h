@@ -24,8 +24,9 @@ inline std::size_t IndexIn(const GridWindow& window, std::int64_t column, std::i
   return static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
 }
 
-// The smallest window with all samples of a kind in a window; without columns if there are none. ends_in(row) returns
-// the first and the last column of such samples in a row, counted from the window's first row and column, or nothing.
+// The smallest part of `window` with all samples that `ends_in` reports; without columns if there are none.
+// ends_in(row) returns the first and the last column of these samples in a row, counted from the window's first row and
+// column, or nothing.
 template <typename EndsIn>
 GridWindow HullOf(const GridWindow& window, const EndsIn& ends_in) {
   std::int64_t west = window.columns, east = -1, north = window.rows, south = -1;

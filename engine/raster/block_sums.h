@@ -25,7 +25,8 @@ struct BlockSum {
   float Mean() const { return weight == 0 ? SampleRules::kVoid : static_cast<float>(sum / weight); }
 };
 
-// Adds a row of samples, `block` to each sum and all with the same weight, as BlockSum::Add does in their order.
+// Adds the first `block` samples of a row to the first sum, the next ones to the second, ..., each sample with this
+// weight. Equal to calls of BlockSum::Add in the order of the samples.
 void AddRowOfBlocks(const float* samples, int block, double weight, std::span<BlockSum> sums);
 
 // Writes the mean of each sum, and sets the sums to zero.

@@ -2,8 +2,8 @@
 //
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 5. An error e of
 // a sample counts as
-//   weight e           while e <= cap,
-//   weight e 2^34 above the cap: precedes all errors of a run that are below 2^34 times the smallest cap,
+//   weight e           up to the cap,
+//   weight e 2^34      above the cap, so it comes before all errors below 2^34 times the smallest cap,
 //   max(e, 1) 2^40     if the sample is forced, whatever its error is.
 // None of this depends on the goal of a run, so coarser meshes stay prefixes of finer ones. A mesh to the error E has
 // e <= min(E / weight, cap) at every sample, and all forced samples as vertices.

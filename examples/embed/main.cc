@@ -8,7 +8,7 @@
 #include <cstdlib>
 #include <fstream>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/error_ladder.h"
 #include "tiler/tile_pipeline.h"
 
@@ -18,14 +18,14 @@ int main(int count, char** arguments) {
     std::fputs("usage: embed DEM LEVEL X Y ERROR_M OUT.terrain\n", stderr);
     return 2;
   }
-  auto source = dem::DemSource::Open(arguments[1]);
+  auto source = dem::ElevationModel::Open(arguments[1]);
   if (!source) {
     std::fprintf(stderr, "embed: %s\n", source.error().message.c_str());
     return 1;
   }
   tiler::Dataset dataset;
   dataset.name = "dem";
-  dataset.source = *std::move(source);
+  dataset.model = *std::move(source);
   const double error_fraction = dataset.error_fraction;
   const tiler::TilePipeline pipeline({std::move(dataset)});
 

@@ -31,6 +31,7 @@ constexpr int kDamagedAttempts = 2;
 double Spread(std::uint64_t i) { return 0.75 + 0.5 * std::fmod(static_cast<double>(i) * 0.6180339887498949, 1.0); }
 
 bool IsTransient(const HttpReply& reply, Outcome outcome) {
+  if (reply.failure == Failure::kUntrusted) return false;
   switch (outcome) {
     case Outcome::kOk:
     case Outcome::kNotFound:
@@ -58,6 +59,7 @@ Outcome Client::OutcomeOf(const HttpReply& reply) {
     case Failure::kNone:
       break;
     case Failure::kConnect:
+    case Failure::kUntrusted:
       return Outcome::kNoConnection;
     case Failure::kTimeout:
       return Outcome::kTimeout;

@@ -61,6 +61,11 @@ void Fail(HttpReply& reply, Failure failure, const error_code& error) {
   reply.detail = error.message();
 }
 
+bool IsUntrusted(const error_code& error) {
+  return error.category() == asio::error::get_ssl_category() &&
+         ERR_GET_REASON(static_cast<unsigned long>(error.value())) == SSL_R_CERTIFICATE_VERIFY_FAILED;
+}
+
 }  // namespace
 
 class HttpClient::Impl {
@@ -132,7 +137,12 @@ class HttpClient::Impl {
       }
       auto [tls_error] = co_await connection->tls->async_handshake(asio::ssl::stream_base::client, kAwait);
       if (tls_error) {
-        Fail(reply, Failure::kConnect, tls_error);
+        if (IsUntrusted(tls_error)) {
+          Fail(reply, Failure::kUntrusted, tls_error);
+          reply.detail += "; SSL_CERT_FILE names a file of trusted certificates, --insecure accepts every certificate";
+        } else {
+          Fail(reply, Failure::kConnect, tls_error);
+        }
         co_return nullptr;
       }
     }

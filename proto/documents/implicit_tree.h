@@ -14,7 +14,7 @@
 
 namespace terrace::proto {
 
-// The result of dem::DemSource::Available by level, from 0. Includes every ancestor of an available tile.
+// The result of dem::ElevationModel::Available by level, from 0. Includes every ancestor of an available tile.
 using Availability = std::span<const std::vector<geo::TileRange>>;
 
 inline constexpr std::int64_t kMaxImplicitRoots = 4;

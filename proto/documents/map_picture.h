@@ -21,7 +21,8 @@ const char* ToString(PictureFormat format);
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
 
 // A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has colours
-// at `quality`, `background` for transparent pixels. Errors as above. Preconditions: those of EncodePng, kRgba.
+// at `quality`, and `background` where pixels are transparent. Errors as above. Preconditions: those of EncodePng,
+// kRgba.
 Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, int quality,
                                 const std::array<std::uint8_t, 3>& background);
 

@@ -98,14 +98,14 @@ constexpr std::size_t kLanes = 16;  // limit of the lanes, and so of the values 
 
 }  // namespace
 
-EdgeBound::EdgeBound(const LatticeView& lattice)
-    : lattice_(lattice), twists_(std::make_unique_for_overwrite<float[]>(lattice.heights.size() + kLanes)) {
-  const auto cells = static_cast<std::size_t>(lattice.cells());
+EdgeBound::EdgeBound(const TileSamples& samples)
+    : samples_(samples), twists_(std::make_unique_for_overwrite<float[]>(samples.heights.size() + kLanes)) {
+  const auto cells = static_cast<std::size_t>(samples.cells());
   std::vector<float> of_cells(cells + 2 + kLanes);  // by cell, with the one west of the first
   std::vector<float> below(of_cells.size());        // by node
   float* out = twists_.get() + cells + 4;
-  for (int j = 0; j <= lattice.cells(); ++j, out += cells + 3) {
-    const float *const south = lattice.Row(j), *const north = lattice.Row(std::min(j + 1, lattice.cells()));
+  for (int j = 0; j <= samples.cells(); ++j, out += cells + 3) {
+    const float *const south = samples.Row(j), *const north = samples.Row(std::min(j + 1, samples.cells()));
     HWY_DYNAMIC_DISPATCH(MeasureCells)(south, north, cells, of_cells.data() + 1, steepest_east_, steepest_north_);
     steepest_north_ = std::max(steepest_north_, std::abs(north[cells] - south[cells]));
     HWY_DYNAMIC_DISPATCH(SpreadTwists)(of_cells.data(), cells + 1, below.data(), out);
@@ -113,14 +113,14 @@ EdgeBound::EdgeBound(const LatticeView& lattice)
 }
 
 EdgeBound::End EdgeBound::EndAt(LatticePoint place, double height) const {
-  const int cells = lattice_.cells();
+  const int cells = samples_.cells();
   const int i = std::clamp(static_cast<int>(place.x), 0, cells - 1),
             j = std::clamp(static_cast<int>(place.y), 0, cells - 1);
-  const float *const south = lattice_.Row(j) + i, *const north = lattice_.Row(j + 1) + i;
+  const float *const south = samples_.Row(j) + i, *const north = samples_.Row(j + 1) + i;
   const double x = place.x - i, y = place.y - j;
   const double below = south[0] + x * (double{south[1]} - south[0]),
                above = north[0] + x * (double{north[1]} - north[0]);
-  const std::ptrdiff_t at = south - lattice_.heights.data();
+  const std::ptrdiff_t at = south - samples_.heights.data();
   const std::ptrdiff_t nearest = at + (x > 0.5 ? 1 : 0) + (y > 0.5 ? cells + 3 : 0);
   return {place, height, std::abs(height - (below + y * (above - below))), twists_[static_cast<std::size_t>(nearest)]};
 }
@@ -129,12 +129,12 @@ EdgeBound::End EdgeBound::EndAt(LatticePoint place, double height) const {
 // a quarter of its bend: the cell's twist, times the lengths of the piece on both axes. These are at most one step and
 // the edge's slope against its longer axis. Each end of a piece counts the twists of all cells around it.
 double EdgeBound::Over(const End& a, const End& b) const {
-  const int cells = lattice_.cells();
+  const int cells = samples_.cells();
   const std::int32_t stride = cells + 3;
   const double dx = b.place.x - a.place.x, dy = b.place.y - a.place.y, rise = b.height - a.height;
   const double longer = std::max(std::abs(dx), std::abs(dy)), shorter = std::min(std::abs(dx), std::abs(dy));
   const double bend = longer > 0 ? shorter / longer / 4 : 0;
-  const float *const heights = lattice_.Row(0), *const twists = twists_.get() + stride + 1;
+  const float *const heights = samples_.Row(0), *const twists = twists_.get() + stride + 1;
   const LatticeCrossings columns{a.place.x, b.place.x, a.place.y, dy, a.height, rise,
                                  bend,      heights,   twists,    1,  stride,   cells};
   const LatticeCrossings rows{a.place.y, b.place.y, a.place.x, dx,     a.height, rise,

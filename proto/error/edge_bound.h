@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -29,8 +29,8 @@ struct LatticeCrossings {
 
 class EdgeBound {
  public:
-  // The lattice must outlive this object.
-  explicit EdgeBound(const LatticeView& lattice);
+  // `samples` must outlive this object.
+  explicit EdgeBound(const TileSamples& samples);
 
   // A vertex, prepared once for all its edges.
   struct End {
@@ -51,7 +51,7 @@ class EdgeBound {
   double steepest_north() const { return steepest_north_; }
 
  private:
-  const LatticeView& lattice_;
+  const TileSamples& samples_;
   float steepest_east_ = 0, steepest_north_ = 0;
   // By node, as the lattice's heights: the largest |twist| of a cell at the node. A cell's twist is the coefficient of
   // xy of its surface.

@@ -16,18 +16,18 @@ using geo::Vec3;
 
 }  // namespace
 
-NodeVerticals::NodeVerticals(const LatticeView& lattice)
-    : cells_(lattice.cells()),
-      step_(geo::ToRadians(lattice.lattice.StepDegrees())),
-      south_(geo::ToRadians(lattice.Latitude(0))) {
-  LatticeAngles angles(lattice);
+NodeVerticals::NodeVerticals(const TileSamples& samples)
+    : cells_(samples.cells()),
+      step_(geo::ToRadians(samples.lattice.StepDegrees())),
+      south_(geo::ToRadians(samples.Latitude(0))) {
+  LatticeAngles angles(samples);
   columns_ = std::move(angles.columns);
   rows_.reserve(angles.rows.size());
   for (const geo::SinCos& row : angles.rows) {
     const Vec3 surface = geo::ToEcef({0, 1}, row, 0);
     rows_.push_back({row.sin, row.cos, surface.x, surface.z});
   }
-  const HeightExtent extent = ExtentOf(lattice.heights);
+  const HeightExtent extent = ExtentOf(samples.heights);
   lowest_ = extent.lowest;
   highest_ = extent.highest;
   relief_per_radius_ = (highest_ - lowest_ + 1) / kMinRadius;  // vertices are rounded

@@ -15,13 +15,13 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "proto/error/edge_rows.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
 class NodeVerticals {
  public:
-  explicit NodeVerticals(const LatticeView& lattice);
+  explicit NodeVerticals(const TileSamples& samples);
 
   // The plane through three points in ECEF.
   struct Plane {

@@ -26,11 +26,11 @@ LatticePoint Between(LatticePoint a, LatticePoint b, double t) {
 // the nearest node. The first omitted term is the fifth power of half a cell, below 3e-9 for the widest cells.
 class Ground {
  public:
-  explicit Ground(const LatticeView& lattice)
-      : step_(geo::ToRadians(lattice.lattice.StepDegrees())),
-        west_(geo::ToRadians(lattice.Longitude(0))),
-        south_(geo::ToRadians(lattice.Latitude(0))),
-        angles_(lattice),
+  explicit Ground(const TileSamples& samples)
+      : step_(geo::ToRadians(samples.lattice.StepDegrees())),
+        west_(geo::ToRadians(samples.Longitude(0))),
+        south_(geo::ToRadians(samples.Latitude(0))),
+        angles_(samples),
         narrowest_(std::min(angles_.rows.front().cos, angles_.rows.back().cos) - step_) {}
 
   // Metres above the ellipsoid of a point near the place, along the normal there.
@@ -138,8 +138,8 @@ double LargestOn(double length, double edge_bend, double first, double last, dou
 
 class EdgeMeter {
  public:
-  EdgeMeter(const LatticeView& lattice, const EdgeBound& bound)
-      : lattice_(lattice), cells_(lattice.cells()), steepest_{bound.steepest_east(), bound.steepest_north()} {}
+  EdgeMeter(const TileSamples& samples, const EdgeBound& bound)
+      : samples_(samples), cells_(samples.cells()), steepest_{bound.steepest_east(), bound.steepest_north()} {}
 
   // An upper bound, in metres, on the change of the lattice surface over these steps.
   double LargestChange(LatticePoint steps) const {
@@ -160,9 +160,9 @@ class EdgeMeter {
       if (!(end > begin)) continue;
       const LatticePoint centre = Between(a, b, (begin + end) / 2), last = Between(a, b, end);
       const int i = CellOf(centre.x), j = CellOf(centre.y);
-      const double south_west = lattice_.At(i, j), along = lattice_.At(i + 1, j) - south_west;
-      const double across = lattice_.At(i, j + 1) - south_west;
-      const double twist = lattice_.At(i + 1, j + 1) - south_west - along - across;
+      const double south_west = samples_.At(i, j), along = samples_.At(i + 1, j) - south_west;
+      const double across = samples_.At(i, j + 1) - south_west;
+      const double twist = samples_.At(i + 1, j + 1) - south_west - along - across;
       const double x = last.x - i, y = last.y - j;
       visit(Piece{begin, end, twist * turn, south_west + x * along + y * (across + x * twist)});
       begin = end;
@@ -172,8 +172,8 @@ class EdgeMeter {
   double SampleAt(LatticePoint place) const {
     const int i = CellOf(place.x), j = CellOf(place.y);
     const double x = place.x - i, y = place.y - j;
-    const double south = lattice_.At(i, j) + x * (double{lattice_.At(i + 1, j)} - lattice_.At(i, j));
-    const double north = lattice_.At(i, j + 1) + x * (double{lattice_.At(i + 1, j + 1)} - lattice_.At(i, j + 1));
+    const double south = samples_.At(i, j) + x * (double{samples_.At(i + 1, j)} - samples_.At(i, j));
+    const double north = samples_.At(i, j + 1) + x * (double{samples_.At(i + 1, j + 1)} - samples_.At(i, j + 1));
     return south + y * (north - south);
   }
 
@@ -185,10 +185,10 @@ class EdgeMeter {
   // Metres between the lowest and the highest node. Computed on demand, because few tiles need it.
   double Relief() const {
     if (relief_ < 0) {
-      double lowest = lattice_.At(0, 0), highest = lowest;
+      double lowest = samples_.At(0, 0), highest = lowest;
       for (int j = 0; j <= cells_; ++j) {
         for (int i = 0; i <= cells_; ++i) {
-          const double height = lattice_.At(i, j);
+          const double height = samples_.At(i, j);
           lowest = std::min(lowest, height);
           highest = std::max(highest, height);
         }
@@ -215,7 +215,7 @@ class EdgeMeter {
     double first, last, inverse, line, at = 0;
   };
 
-  const LatticeView& lattice_;
+  const TileSamples& samples_;
   const int cells_;
   LatticePoint steepest_;  // metres between neighbouring samples of a row and of a column
   mutable double relief_ = -1;
@@ -342,12 +342,12 @@ double ChordDeviation(const Ground& ground, double steps) {
 //
 // A chord is at most its sagitta below the line between its ends, and the lattice surface changes little over its
 // shift. Most chords are therefore known to stay below the largest difference found so far, and are not measured.
-double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>& places,
+double MeasureEdges(const TileSamples& samples, const std::vector<LatticePoint>& places,
                     const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef, double beside_m,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles, double known_m) {
-  const EdgeBound bound(lattice);
-  const EdgeMeter meter(lattice, bound);
-  const Ground ground(lattice);
+  const EdgeBound bound(samples);
+  const EdgeMeter meter(samples, bound);
+  const Ground ground(samples);
   std::vector<End> ends(places.size());
   std::vector<EdgeBound::End> bounded(places.size());
   for (std::size_t k = 0; k < places.size(); ++k) {
@@ -391,33 +391,33 @@ double MeasureEdges(const LatticeView& lattice, const std::vector<LatticePoint>&
 
 }  // namespace
 
-double MeasureSurfaceError(const LatticeView& lattice, const QuantizedTile& tile,
+double MeasureSurfaceError(const TileSamples& samples, const QuantizedTile& tile,
                            const std::vector<geo::Vec3>& positions, double at_samples_m) {
   std::vector<LatticePoint> places;
   std::vector<double> heights;
   places.reserve(tile.u.size());
   heights.reserve(tile.u.size());
-  const double scale = static_cast<double>(lattice.cells()) / kQuantizedMax;
+  const double scale = static_cast<double>(samples.cells()) / kQuantizedMax;
   for (std::size_t k = 0; k < tile.u.size(); ++k) {
     places.push_back({tile.u[k] * scale, tile.v[k] * scale});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  return MeasureEdges(lattice, places, heights, positions, 0, tile.triangles, at_samples_m);
+  return MeasureEdges(samples, places, heights, positions, 0, tile.triangles, at_samples_m);
 }
 
-double MeasureFlatSurfaceError(const LatticeView& lattice, const tin::TinMesh& mesh,
+double MeasureFlatSurfaceError(const TileSamples& samples, const tin::TinMesh& mesh,
                                const std::vector<geo::Vec3>& positions, double at_samples_m) {
   std::vector<LatticePoint> places;
   for (const tin::SamplePosition p : mesh.vertices) {
     places.push_back({static_cast<double>(p.x), static_cast<double>(p.y)});
   }
-  const NodeVerticals plumb(lattice);
+  const NodeVerticals plumb(samples);
   double beside_m = 0;
   for (std::size_t k = 0; k < positions.size(); ++k) {
     const tin::SamplePosition node = mesh.vertices[k];
     beside_m = std::max(beside_m, plumb.PositionOf(positions[k], node.x, node.y).beside_m);
   }
-  return MeasureEdges(lattice, places, {}, positions, beside_m, mesh.triangles, at_samples_m);
+  return MeasureEdges(samples, places, {}, positions, beside_m, mesh.triangles, at_samples_m);
 }
 
 }  // namespace terrace::proto

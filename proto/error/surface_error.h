@@ -9,8 +9,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/quantized_mesh.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -20,11 +20,11 @@ namespace terrace::proto {
 // proof.
 //
 // `positions`: of the tile's vertices, DecodePositions.
-double MeasureSurfaceError(const LatticeView& lattice, const QuantizedTile& tile,
+double MeasureSurfaceError(const TileSamples& samples, const QuantizedTile& tile,
                            const std::vector<geo::Vec3>& positions, double at_samples_m);
 
 // The same for flat triangles with their vertices at exact lattice positions, as in TileErrorMeter::MeasureFlat.
-double MeasureFlatSurfaceError(const LatticeView& lattice, const tin::TinMesh& mesh,
+double MeasureFlatSurfaceError(const TileSamples& samples, const tin::TinMesh& mesh,
                                const std::vector<geo::Vec3>& positions, double at_samples_m);
 
 }  // namespace terrace::proto

@@ -73,14 +73,14 @@ bool IsSame(const Surface& a, const Surface& b, std::size_t t, bool of_same_vert
 
 class TileErrorMeter::Impl {
  public:
-  Impl(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m)
-      : lattice_(lattice),
-        cells_(lattice.cells()),
+  Impl(const TileSamples& samples, double bound_m, std::vector<float> allowed_m)
+      : samples_(samples),
+        cells_(samples.cells()),
         bound_(bound_m),
         allowed_(std::move(allowed_m)),
         min_allowed_(allowed_.empty() ? bound_m
                                       : std::min(bound_m, static_cast<double>(*std::ranges::min_element(allowed_)))),
-        verticals_(lattice) {}
+        verticals_(samples) {}
 
   int cells() const { return cells_; }
   const Surface& surface() const { return surface_; }
@@ -107,15 +107,15 @@ class TileErrorMeter::Impl {
     TileError result;
     std::vector<MissedVertex> vertices;
     const auto measure = [&](std::size_t t) {
-      if (!errors_[t].is_exact) errors_[t] = MeasureTriangle(t, result.misses, vertices);
+      if (!errors_[t].is_exact) errors_[t] = MeasureTriangle(t, result.to_insert, vertices);
       result.max_m = std::max(result.max_m, errors_[t].max_m);
     };
     if (!errors_.empty() && errors_[worst].max_m <= min_allowed_) measure(worst);
     for (std::size_t t = 0; t < errors_.size(); ++t) {
       if (errors_[t].max_m > std::min(result.max_m, min_allowed_)) measure(t);
     }
-    if (result.misses.empty()) result.misses = NeighboursOf(vertices);
-    result.is_cut_through = result.misses.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
+    if (result.to_insert.empty()) result.to_insert = NeighboursOf(vertices);
+    result.is_cut_through = result.to_insert.empty() && std::ranges::any_of(vertices, [&](const MissedVertex& vertex) {
                               return PassesBetween(vertex);
                             });
     return result;
@@ -225,7 +225,7 @@ class TileErrorMeter::Impl {
       if (first > last) continue;
       visit(static_cast<int>(j), static_cast<int>(first), static_cast<int>(last),
             LargestOfRow(plane, static_cast<double>(first * unit - corner.x), static_cast<double>(j * unit - corner.y),
-                         static_cast<double>(unit), lattice_.Row(static_cast<int>(j)) + first, last - first + 1));
+                         static_cast<double>(unit), samples_.Row(static_cast<int>(j)) + first, last - first + 1));
     }
   }
 
@@ -290,7 +290,7 @@ class TileErrorMeter::Impl {
     box.height = static_cast<float>(height);
     box.per_column = static_cast<float>(plane.dx * unit);
     box.per_row = static_cast<float>(plane.dy * unit);
-    const double largest = LargestInTriangle(box, lattice_.Row(south) + west, cells_ + 3);
+    const double largest = LargestInTriangle(box, samples_.Row(south) + west, cells_ + 3);
     const double rise = std::abs(plane.dx * unit) * box.columns + std::abs(plane.dy * unit) * box.rows;
     return largest + 0x1p-20 * (largest + rise) + std::abs(height - static_cast<double>(box.height));
   }
@@ -322,7 +322,7 @@ class TileErrorMeter::Impl {
             const double y = static_cast<double>(j * surface_.unit - p[0].y);
             for (int i = first; i <= last; ++i) {
               const double height = plane.At(static_cast<double>(i * surface_.unit - p[0].x), y);
-              Take(std::abs(height - lattice_.At(i, j)), i, j, found);
+              Take(std::abs(height - samples_.At(i, j)), i, j, found);
             }
           });
     };
@@ -362,7 +362,7 @@ class TileErrorMeter::Impl {
       if (columns.first > columns.last) continue;
       const auto measure = [&](std::int64_t from, std::int64_t to) {
         for (int i = static_cast<int>(from); i <= to; ++i) {
-          const double error = std::abs(verticals_.HeightOn(plane, i, j) - lattice_.At(i, j));
+          const double error = std::abs(verticals_.HeightOn(plane, i, j) - samples_.At(i, j));
           const double counted = Counted(error, i, j);
           const bool counts = error > found.largest || (counted > bound_ && counted > MissOf(i, j, found).error);
           if (!counts) continue;  // NaN: no height
@@ -374,7 +374,7 @@ class TileErrorMeter::Impl {
       // Inner nodes need no test. If none of them has too large an error, only their largest one counts.
       const bool has_inner = columns.inner_first <= columns.inner_last;
       const double inner =
-          has_inner ? verticals_.LargestOfRow(plane, j, columns.inner_first, columns.inner_last, lattice_.Row(j)) : 0;
+          has_inner ? verticals_.LargestOfRow(plane, j, columns.inner_first, columns.inner_last, samples_.Row(j)) : 0;
       if (has_inner && inner <= min_allowed_) {
         found.largest = std::max(found.largest, inner);
         measure(columns.first, columns.inner_first - 1);
@@ -387,7 +387,7 @@ class TileErrorMeter::Impl {
 
   bool IsInside(int i, int j) const { return i > 0 && j > 0 && i < cells_ && j < cells_; }
 
-  const LatticeView lattice_;
+  const TileSamples samples_;
   const int cells_;
   const double bound_;
   const std::vector<float> allowed_;  // by node; empty: the bound
@@ -401,8 +401,8 @@ class TileErrorMeter::Impl {
   const NodeVerticals verticals_;
 };
 
-TileErrorMeter::TileErrorMeter(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m)
-    : impl_(std::make_unique<Impl>(lattice, bound_m, std::move(allowed_m))) {}
+TileErrorMeter::TileErrorMeter(const TileSamples& samples, double bound_m, std::vector<float> allowed_m)
+    : impl_(std::make_unique<Impl>(samples, bound_m, std::move(allowed_m))) {}
 TileErrorMeter::~TileErrorMeter() = default;
 
 TileError TileErrorMeter::Measure(const QuantizedTile& tile) {

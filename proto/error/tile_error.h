@@ -6,8 +6,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/quantized_mesh.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -17,18 +17,18 @@ struct TileError {
   // If there are none, the neighbours of the vertices that exceed the bound: rounding moves vertices along steep
   // triangles, but triangles between neighbouring samples are no steeper than the ground. Empty if nothing can be
   // inserted, whatever max_m is.
-  std::vector<tin::SamplePosition> misses;
+  std::vector<tin::SamplePosition> to_insert;
   // Nothing can be inserted, but a vertex exceeds the bound because an edge passes between it and a neighbouring
   // vertex. A Delaunay triangulation has no such edges.
   bool is_cut_through = false;
 };
 
 // Measures the mesh of a tile repeatedly while samples are inserted. Triangles that have not changed since the last
-// call are not measured again. All meshes must be of the tile given by `lattice`.
+// call are not measured again. All meshes must be of the tile given by `samples`.
 class TileErrorMeter {
  public:
   // `allowed_m`: the bound of each sample, at most `bound_m`, row by row; empty: `bound_m` everywhere.
-  TileErrorMeter(const LatticeView& lattice, double bound_m, std::vector<float> allowed_m = {});
+  TileErrorMeter(const TileSamples& samples, double bound_m, std::vector<float> allowed_m = {});
   ~TileErrorMeter();
 
   // Measures two surfaces at every lattice sample: the height interpolated in longitude and latitude, which clients

@@ -24,20 +24,20 @@ GridPoint Snap(geo::Vec3 ecef, double per_metre) {
 
 class NodePlacer {
  public:
-  explicit NodePlacer(const LatticeView& lattice) : lattice_(lattice), angles_(lattice) {
+  explicit NodePlacer(const TileSamples& samples) : samples_(samples), angles_(samples) {
     for (const geo::SinCos& row : angles_.rows) bases_.push_back(geo::ToEcef({}, row, 0));
   }
 
   geo::Vec3 Place(tin::SamplePosition node, double below_m) const {
     const geo::SinCos &longitude = angles_.columns[node.x], &latitude = angles_.rows[node.y];
     const geo::Vec3& base = bases_[node.y];
-    const double height = static_cast<double>(lattice_.At(node.x, node.y)) - below_m;
+    const double height = static_cast<double>(samples_.At(node.x, node.y)) - below_m;
     const double from_axis = base.x + latitude.cos * height;
     return {from_axis * longitude.cos, from_axis * longitude.sin, base.z + latitude.sin * height};
   }
 
  private:
-  const LatticeView& lattice_;
+  const TileSamples& samples_;
   const LatticeAngles angles_;
   std::vector<geo::Vec3> bases_;  // by row: on the ellipsoid at longitude 0
 };
@@ -157,8 +157,8 @@ double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width
   return std::min(step_m, std::max(kBorderStepMetres, fitting_m));
 }
 
-std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m) {
-  const NodePlacer placer(lattice);
+std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m) {
+  const NodePlacer placer(samples);
   std::vector<GridPoint> points;
   points.reserve(mesh.vertices.size());
   for (const tin::SamplePosition node : mesh.vertices) points.push_back(Snap(placer.Place(node, 0), 1 / step_m));
@@ -187,15 +187,15 @@ void GridSteps::Double() {
   for (std::size_t k = 0; k < 4; ++k) side[k] = std::max(side[k], inside), corner[k] = std::max(corner[k], inside);
 }
 
-std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, const GridSteps& steps) {
-  const NodePlacer placer(lattice);
+std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, const GridSteps& steps) {
+  const NodePlacer placer(samples);
   EdgeSteps of_edges;
   of_edges.side = steps.side;
   of_edges.corner = steps.corner;
   std::vector<GridPoint> points;
   points.reserve(mesh.vertices.size());
   for (const tin::SamplePosition node : mesh.vertices) {
-    const double on_edge = StepAt(of_edges, node.x, node.y, lattice.cells());
+    const double on_edge = StepAt(of_edges, node.x, node.y, samples.cells());
     const double step = on_edge > 0 ? on_edge : steps.inside;
     GridPoint point = Snap(placer.Place(node, 0), 1 / step);
     const auto units = static_cast<std::int64_t>(step / steps.inside);
@@ -225,12 +225,12 @@ std::vector<geo::Vec3> GridPositions(const std::vector<GridPoint>& points, doubl
   return positions;
 }
 
-GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
+GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
                       const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
                       const std::vector<std::uint8_t>& left_out) {
   TERRACE_CHECK(points.size() == mesh.vertices.size() && normals.size() == points.size());
-  const NodePlacer placer(lattice);
-  const std::vector<std::uint32_t> rim = Rim(mesh, lattice.cells());
+  const NodePlacer placer(samples);
+  const std::vector<std::uint32_t> rim = Rim(mesh, samples.cells());
   std::vector<GridPoint> all = points;
   std::vector<geo::Vec3> all_normals = normals;
   std::vector<tin::SamplePosition> nodes = mesh.vertices;
@@ -259,7 +259,7 @@ GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, cons
     grid.origin[axis] = box.min[axis] + (box.max[axis] - box.min[axis]) / 2;
   }
   grid.triangles = std::move(order.triangles);
-  grid.cells = lattice.cells();
+  grid.cells = samples.cells();
   grid.uv.reserve(order.old_index.size());
   grid.positions.reserve(order.old_index.size());
   grid.normals.reserve(order.old_index.size());

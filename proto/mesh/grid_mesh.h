@@ -14,8 +14,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/edge_steps.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -40,7 +40,7 @@ using GridPoint = std::array<std::int64_t, 3>;
 // The vertices of `mesh` at their exact lattice positions and heights, rounded to the grid. The point of a node does
 // not depend on the tile. Sines and cosines have the same bits on every processor (engine/geo/sine.h), so the
 // points have, too.
-std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, double step_m);
+std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m);
 
 // The steps of a tile with limits by place (EdgeErrors). `smallest_allowed_m`: the smallest error that a sample of the
 // tile may have. All steps are multiples of `inside`. Limits refine a step only until
@@ -55,7 +55,7 @@ struct GridSteps {
 };
 
 // As above, but points on edges lie on the grids of side and corner, which both neighbours have. In units of `inside`.
-std::vector<GridPoint> SnapVertices(const LatticeView& lattice, const tin::TinMesh& mesh, const GridSteps& steps);
+std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, const GridSteps& steps);
 
 // Whether decoders that compute in 32-bit floats decode all points, and the lower rim of skirts of this depth, exactly.
 // This is so if the tile spans less than 2^23 steps. A float has one bit more, but Draco adds one half. False for very
@@ -85,7 +85,7 @@ struct GridMesh {
 // neighbours and the surface stays closed. `left_out`: by triangle, 1 for those in holes, which get no skirts; empty:
 // none. If no triangle is left, the skirt of one edge of the rim is kept, because decoders expect a triangle. `points`
 // and `normals` have one entry per vertex.
-GridMesh MakeGridMesh(const LatticeView& lattice, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
+GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, const std::vector<GridPoint>& points,
                       const std::vector<geo::Vec3>& normals, double step_m, double skirt_depth_m,
                       const std::vector<std::uint8_t>& left_out = {});
 

@@ -29,19 +29,19 @@ HeightScale ChooseScale(double low, double high) {
 
 }  // namespace
 
-QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh, const EdgeSteps& steps) {
-  const int cells = lattice.cells();
+QuantizedTile QuantizeTile(const TileSamples& samples, const tin::TinMesh& mesh, const EdgeSteps& steps) {
+  const int cells = samples.cells();
   std::vector<double> heights;
   heights.reserve(mesh.vertices.size());
   for (const tin::SamplePosition p : mesh.vertices) {
-    const double height = lattice.At(p.x, p.y), step = StepAt(steps, p.x, p.y, cells);
+    const double height = samples.At(p.x, p.y), step = StepAt(steps, p.x, p.y, cells);
     heights.push_back(step > 0 ? SnapHeight(height, step) : height);
   }
   const auto [low, high] = std::minmax_element(heights.begin(), heights.end());
   const HeightScale scale = ChooseScale(*low, *high);
 
   QuantizedTile tile;
-  tile.key = lattice.key;
+  tile.key = samples.key;
   tile.min_height = static_cast<float>(scale.min);
   tile.max_height = static_cast<float>(scale.min + kQuantizedMax * scale.step);
   tile.triangles = mesh.triangles;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/edge_steps.h"
 #include "proto/mesh/quantized_mesh.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -21,6 +21,6 @@ constexpr std::uint16_t QuantizedPosition(int i, int cells) {
 // the smallest power of two that covers the relief in 32767 steps and whose multiples are exact in float32 at these
 // heights. The height range of the header is at most twice the relief, or 32767 units of float32 at that height.
 // Normals are left empty.
-QuantizedTile QuantizeTile(const LatticeView& lattice, const tin::TinMesh& mesh, const EdgeSteps& steps);
+QuantizedTile QuantizeTile(const TileSamples& samples, const tin::TinMesh& mesh, const EdgeSteps& steps);
 
 }  // namespace terrace::proto

@@ -43,8 +43,8 @@ double Limited(double central, double before, double after) {
 // Metres over the two steps of a central difference on one row. Computed once a row: a square root and a division each.
 class RowWidths {
  public:
-  RowWidths(const LatticeView& lattice, const std::vector<geo::SinCos>& rows)
-      : lattice_(lattice), rows_(rows), step_(lattice.lattice.StepDegrees()), widths_(rows.size()) {}
+  RowWidths(const TileSamples& samples, const std::vector<geo::SinCos>& rows)
+      : samples_(samples), rows_(rows), step_(samples.lattice.StepDegrees()), widths_(rows.size()) {}
 
   struct Width {
     double east = 0, north = 0;
@@ -53,7 +53,7 @@ class RowWidths {
   const Width& At(int j) {
     Width& width = widths_[static_cast<std::size_t>(j)];
     if (width.north > 0) return width;
-    const double latitude = lattice_.Latitude(j);
+    const double latitude = samples_.Latitude(j);
     const geo::SinCos& row = rows_[static_cast<std::size_t>(j)];
     width = {2 * step_ * geo::MetresPerDegreeEast(row), 2 * step_ * geo::MetresPerDegreeNorth(row),
              latitude <= -90 || latitude >= 90};
@@ -61,24 +61,24 @@ class RowWidths {
   }
 
  private:
-  const LatticeView& lattice_;
+  const TileSamples& samples_;
   const std::vector<geo::SinCos>& rows_;
   const double step_;
   std::vector<Width> widths_;
 };
 
-geo::Vec3 LatticeNormal(const LatticeView& lattice, const LocalFrame& frame, const RowWidths::Width& across,
+geo::Vec3 LatticeNormal(const TileSamples& samples, const LocalFrame& frame, const RowWidths::Width& across,
                         tin::SamplePosition p, bool is_on_edge) {
   if (across.is_pole) return frame.up;
   const double rise_east =
-      static_cast<double>(lattice.At(p.x + 1, p.y)) - static_cast<double>(lattice.At(p.x - 1, p.y));
+      static_cast<double>(samples.At(p.x + 1, p.y)) - static_cast<double>(samples.At(p.x - 1, p.y));
   const double rise_north =
-      static_cast<double>(lattice.At(p.x, p.y + 1)) - static_cast<double>(lattice.At(p.x, p.y - 1));
+      static_cast<double>(samples.At(p.x, p.y + 1)) - static_cast<double>(samples.At(p.x, p.y - 1));
   double east = rise_east / across.east, north = rise_north / across.north;
   if (is_on_edge) {
-    const double height = static_cast<double>(lattice.At(p.x, p.y));
-    const double from_west = 2 * (height - static_cast<double>(lattice.At(p.x - 1, p.y))) / across.east;
-    const double from_south = 2 * (height - static_cast<double>(lattice.At(p.x, p.y - 1))) / across.north;
+    const double height = static_cast<double>(samples.At(p.x, p.y));
+    const double from_west = 2 * (height - static_cast<double>(samples.At(p.x - 1, p.y))) / across.east;
+    const double from_south = 2 * (height - static_cast<double>(samples.At(p.x, p.y - 1))) / across.north;
     east = Limited(east, from_west, 2 * east - from_west);
     north = Limited(north, from_south, 2 * north - from_south);
   }
@@ -108,18 +108,18 @@ geo::Vec3 TurnTowards(geo::Vec3 normal, geo::Vec3 goal) {
 
 }  // namespace
 
-std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+std::vector<geo::Vec3> VertexNormals(const TileSamples& samples, const tin::TinMesh& mesh,
                                      const std::vector<geo::Vec3>& positions) {
   const std::vector<geo::Vec3> of_mesh = AreaWeightedNormals(mesh.triangles, positions);
   std::vector<geo::Vec3> normals;
   normals.reserve(mesh.vertices.size());
-  const LatticeAngles angles(lattice);
-  RowWidths widths(lattice, angles.rows);
+  const LatticeAngles angles(samples);
+  RowWidths widths(samples, angles.rows);
   for (std::size_t k = 0; k < mesh.vertices.size(); ++k) {
     const tin::SamplePosition p = mesh.vertices[k];
     const LocalFrame frame = FrameOf(angles.columns[p.x], angles.rows[p.y]);
-    const bool is_on_edge = p.x == 0 || p.y == 0 || p.x == lattice.cells() || p.y == lattice.cells();
-    geo::Vec3 normal = LatticeNormal(lattice, frame, widths.At(p.y), p, is_on_edge);
+    const bool is_on_edge = p.x == 0 || p.y == 0 || p.x == samples.cells() || p.y == samples.cells();
+    geo::Vec3 normal = LatticeNormal(samples, frame, widths.At(p.y), p, is_on_edge);
     if (!is_on_edge) {
       const geo::Vec3 turned = TurnTowards(normal, geo::Normalized(of_mesh[k]));
       if (geo::Dot(turned, frame.up) > kLowestUp) normal = turned;
@@ -140,11 +140,11 @@ std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>&
   return misfits;
 }
 
-std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+std::vector<std::array<std::uint8_t, 2>> TileNormals(const TileSamples& samples, const tin::TinMesh& mesh,
                                                      const std::vector<geo::Vec3>& positions) {
   std::vector<std::array<std::uint8_t, 2>> encoded;
   encoded.reserve(mesh.vertices.size());
-  for (const geo::Vec3& normal : VertexNormals(lattice, mesh, positions)) {
+  for (const geo::Vec3& normal : VertexNormals(samples, mesh, positions)) {
     encoded.push_back(OctEncode(normal));
   }
   return encoded;

@@ -8,7 +8,7 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -20,7 +20,7 @@ namespace terrace::proto {
 // every tile that shares it. On a pole it is the ellipsoid's normal. Inside, it is the plain gradient, turned to within
 // 13 degrees of the mesh's area-weighted normal: where the mesh lacks relief of the lattice, and at cliffs, shading
 // must still fit the triangles.
-std::vector<geo::Vec3> VertexNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+std::vector<geo::Vec3> VertexNormals(const TileSamples& samples, const tin::TinMesh& mesh,
                                      const std::vector<geo::Vec3>& positions);
 
 // The number of normals that are more than 13.5 degrees from the area-weighted normal of the triangles around their
@@ -29,7 +29,7 @@ std::size_t CountMisfits(const tin::TinMesh& mesh, const std::vector<geo::Vec3>&
                          const std::vector<geo::Vec3>& normals);
 
 // VertexNormals oct-encoded.
-std::vector<std::array<std::uint8_t, 2>> TileNormals(const LatticeView& lattice, const tin::TinMesh& mesh,
+std::vector<std::array<std::uint8_t, 2>> TileNormals(const TileSamples& samples, const tin::TinMesh& mesh,
                                                      const std::vector<geo::Vec3>& positions);
 
 }  // namespace terrace::proto

@@ -36,15 +36,15 @@ std::uint8_t Share(const Corners& corners, double x, double y, double size, doub
 
 }  // namespace
 
-WaterMask SeaLevelMask(const LatticeView& lattice, double sea_level_m) {
-  TERRACE_CHECK(kWaterMaskSide % lattice.cells() == 0);
-  const int pixels = kWaterMaskSide / lattice.cells();  // along a cell's edge
+WaterMask SeaLevelMask(const TileSamples& samples, double sea_level_m) {
+  TERRACE_CHECK(kWaterMaskSide % samples.cells() == 0);
+  const int pixels = kWaterMaskSide / samples.cells();  // along a cell's edge
   const double size = 1.0 / pixels;
   WaterMask mask(std::size_t{kWaterMaskSide} * kWaterMaskSide);
-  for (int j = 0; j < lattice.cells(); ++j) {
-    for (int i = 0; i < lattice.cells(); ++i) {
-      const Corners corners{static_cast<double>(lattice.At(i, j)), static_cast<double>(lattice.At(i + 1, j)),
-                            static_cast<double>(lattice.At(i, j + 1)), static_cast<double>(lattice.At(i + 1, j + 1))};
+  for (int j = 0; j < samples.cells(); ++j) {
+    for (int i = 0; i < samples.cells(); ++i) {
+      const Corners corners{static_cast<double>(samples.At(i, j)), static_cast<double>(samples.At(i + 1, j)),
+                            static_cast<double>(samples.At(i, j + 1)), static_cast<double>(samples.At(i + 1, j + 1))};
       const auto [lowest, highest] =
           std::minmax({corners.south_west, corners.south_east, corners.north_west, corners.north_east});
       // The surface in a cell lies between the lowest and the highest corner.

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -17,7 +17,7 @@ using WaterMask = std::vector<std::uint8_t>;
 // A place is water if the bilinear surface through the lattice's samples lies at or below `sea_level_m`. A pixel
 // depends only on its level and global position. The halo is not used. Precondition: kWaterMaskSide is a multiple of
 // the lattice's cells.
-WaterMask SeaLevelMask(const LatticeView& lattice, double sea_level_m);
+WaterMask SeaLevelMask(const TileSamples& samples, double sea_level_m);
 
 // Reduces a mask of equal pixels to a single value.
 WaterMask Shortest(WaterMask mask);

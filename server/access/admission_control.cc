@@ -37,7 +37,7 @@ bool HasName(const RequestContext& context) { return context.grant && !context.g
 // The key of a client for rate limits: a token's name after a slash, with which no address begins, or the block of the
 // address.
 std::string Who(const RequestContext& context, const ClientIdentity& client) {
-  return HasName(context) ? "/" + context.grant->name : client.block;
+  return HasName(context) ? "/" + context.grant->name : client.counted_as;
 }
 
 Response Unauthorized(bool has_token, std::string_view request_id) {

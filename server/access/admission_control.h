@@ -53,11 +53,12 @@ std::optional<std::string> TakeToken(std::string& target);
 struct ClientIdentity {
   ClientIdentity() = default;
   explicit ClientIdentity(const asio::ip::address& a)
-      : address(a), text(a.to_string()), block(ClientBlock(a)), number(std::hash<std::string>{}(block) | 1) {}
+      : address(a), text(a.to_string()), counted_as(ClientBlock(a)), number(std::hash<std::string>{}(counted_as) | 1) {}
 
   asio::ip::address address;
-  std::string text = "-", block;
-  std::uint64_t number = 1;  // of the block; never 0
+  std::string text = "-";
+  std::string counted_as;    // an IPv4 address or an IPv6 /64 (ClientBlock)
+  std::uint64_t number = 1;  // hash of `counted_as`; never 0
 };
 
 struct AdmissionOptions {

@@ -20,7 +20,7 @@ dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
 // kNotFound: the dataset has no imagery, and the format needs it.
 Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format);
 
-// TileFormatRow::read, with its errors, and media_type of formats for maps.
+// The functions TileFormatRow::read (with the same errors) and TileFormatRow::media_type of the formats for maps.
 Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile);
 std::string_view MapTileType(const tiler::TileRequest& tile);
 

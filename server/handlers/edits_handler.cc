@@ -67,7 +67,7 @@ DocumentAnswer DescribeEdits(const HandlerState& state, const RequestContext& co
   plan.key = "edits " + std::to_string(*index);
   plan.content_type = "application/geo+json";
   plan.cache_control = kRevalidate;
-  plan.write = [&dataset](const std::stop_token& stop) { return EditsGeoJson(dataset.source->Edits(), stop); };
+  plan.write = [&dataset](const std::stop_token& stop) { return EditsGeoJson(dataset.model->Edits(), stop); };
   return plan;
 }
 

@@ -22,10 +22,10 @@ void RequestReader::Close(std::chrono::milliseconds grace) {
   if (waiting_) stream_.ExpiresAt(std::min(stream_.deadline(), close_at_));
 }
 
-asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
+asio::awaitable<RequestReader::HeadOutcome> RequestReader::ReadHead(Request& request, Stream::Clock::time_point now) {
   const auto refused = [&](BadRequest why) {
     request = FirstLineOf(Unread());
-    return Head(tl::unexpected(why));
+    return HeadOutcome(tl::unexpected(why));
   };
   std::size_t scanned = 0;
   bool begun = !Unread().empty();
@@ -40,7 +40,7 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
     }
     if (const std::size_t size = TakeRepeated(Unread(), memo_, request)) {
       Consume(size);
-      co_return Head(std::in_place);
+      co_return HeadOutcome(std::in_place);
     }
     if (!Unread().empty()) {
       const auto end = FindHeadEnd(Unread(), scanned);
@@ -50,7 +50,7 @@ asio::awaitable<RequestReader::Head> RequestReader::ReadHead(Request& request, S
         if (!parsed) co_return refused(parsed.error());
         Consume(*end);
         request = *std::move(parsed);
-        co_return Head(std::in_place);
+        co_return HeadOutcome(std::in_place);
       }
       scanned = Unread().size();
       if (!begun) stream_.ExpiresAfter(timeouts_.message);

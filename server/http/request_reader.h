@@ -30,8 +30,8 @@ class RequestReader {
 
   // Returns nothing if the connection has ended, was idle for too long, or is closing and no request came in time.
   // `now`: the current time, or shortly before.
-  using Head = std::optional<tl::expected<void, BadRequest>>;
-  asio::awaitable<Head> ReadHead(Request& request, Stream::Clock::time_point now);
+  using HeadOutcome = std::optional<tl::expected<void, BadRequest>>;
+  asio::awaitable<HeadOutcome> ReadHead(Request& request, Stream::Clock::time_point now);
 
   // Reads the request's body until `text`, which holds its beginning, has `size` bytes. On errors, `status` 0 means
   // that the client left or the stream was cancelled.

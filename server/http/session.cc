@@ -30,8 +30,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long, and how many bytes of, a closing connection are still read. Unread bytes would make the kernel send a
-// reset, which discards the part of the last reply that the client has not read yet.
+// Limits of time and bytes for reading from a connection that is being closed. Unread bytes would make the kernel send
+// a reset, which discards the part of the last reply that the client has not read yet.
 constexpr std::chrono::milliseconds kLingerTime{500};
 constexpr std::size_t kLingerBytes = std::size_t{64} << 20;
 constexpr int kClientLeft = 499;
@@ -43,7 +43,7 @@ Response Overloaded(std::string_view detail, std::string_view request_id) {
 }
 
 // Checked before a body is read: nothing if it may be sent.
-std::optional<Response> WhyNoBody(const Request& request, const Admission& admission) {
+std::optional<Response> RefuseBody(const Request& request, const Admission& admission) {
   if (request.content_length > admission.max_body_bytes) {
     return ProblemResponse(
         413,
@@ -178,7 +178,7 @@ asio::awaitable<void> Session::ServeAll() {
     if (served_ > 0 && reader_.has_unread()) {
       co_await asio::post(stream_.socket().get_executor(), asio::use_awaitable);
     }
-    const RequestReader::Head head = co_await reader_.ReadHead(exchange_.request, replied_);
+    const RequestReader::HeadOutcome head = co_await reader_.ReadHead(exchange_.request, replied_);
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
@@ -209,7 +209,7 @@ asio::awaitable<bool> Session::ServeOne() {
   Admission& admission = exchange_.admission;
   admission = handler_->Admit(request, context_->deadline->load(std::memory_order_relaxed));
   exchange_.is_admitted = true;
-  if (!admission.refusal) admission.refusal = WhyNoBody(request, admission);
+  if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
   if (admission.delays_refusal) {
     co_await DelayRefusal();
   } else if (admission.wait.count() > 0 && !co_await WhileConnected(Sleep(admission.wait))) {

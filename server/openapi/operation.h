@@ -36,7 +36,7 @@ struct Operation {
   std::string_view description;  // Markdown
   std::vector<ParameterNote> parameters = {};
   std::vector<MediaNote> replies = {};      // of 200
-  std::vector<MediaNote> unavailable = {};  // of 503, besides problems
+  std::vector<MediaNote> unavailable = {};  // of 503, besides application/problem+json
   std::vector<std::string_view> headers = {};
   std::vector<ExampleRequest> examples = {};
 };

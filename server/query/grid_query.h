@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/export/output_grid.h"
 #include "tiler/surface/drawn_surface.h"
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tiler/area/area_mesh.h"
 
 namespace terrace::server {

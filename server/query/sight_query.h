@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "server/query/points_input.h"
 #include "tiler/surface/drawn_surface.h"
 

@@ -33,7 +33,7 @@ std::vector<tiler::WatchedFile> FilesOf(const tiler::Dataset& dataset) {
   const auto add = [&](const dem::StampedFiles& more) {
     for (std::size_t i = 0; i < more.size(); ++i) files.push_back({more.path(i), more.stamp(i)});
   };
-  if (dataset.source) add(dataset.source->files());
+  if (dataset.model) add(dataset.model->files());
   if (dataset.water.mask) add(dataset.water.mask->files());
   if (dataset.imagery.image) add(dataset.imagery.image->files());
   return files;
@@ -131,7 +131,7 @@ std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
 }
 
 bool DatasetSlot::HasToRecoverCache() {
-  if (Clock::now() < recover_at_ || !serving_->source || !serving_->source->has_lost_cache()) return false;
+  if (Clock::now() < recover_at_ || !serving_->model || !serving_->model->has_lost_cache()) return false;
   recover_delay_ = std::clamp<Clock::duration>(2 * recover_delay_, kFirstRecovery, kLastRecovery);
   recover_at_ = Clock::now() + recover_delay_;
   return true;

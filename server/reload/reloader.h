@@ -79,7 +79,7 @@ class Reloader {
   std::size_t next_slot_ = 0;         // whose files are checked next
   std::string config_problem_;
   config::ConfigResult seen_;    // at the last check, valid or not
-  bool config_settles_ = false;  // it had changed at the check before
+  bool config_settles_ = false;  // it changed at the last check; it is applied once two checks in a row agree
   bool is_published_ = true;     // what the slots serve, with config_
   std::map<std::string, std::string> reported_;
   Clock::time_point next_check_, next_config_;

@@ -11,7 +11,7 @@ namespace terrace::server {
 void BakedStore::Use(const std::vector<tiler::Dataset>& datasets) {
   std::multimap<std::uint64_t, Archive> baked;
   for (const tiler::Dataset& dataset : datasets) {
-    if (dataset.baked) baked.emplace(dataset.cache_generation(), Archive{dataset.baked, dataset.source});
+    if (dataset.baked) baked.emplace(dataset.cache_generation(), Archive{dataset.baked, dataset.model});
   }
   const std::unique_lock lock(mutex_);
   baked_.swap(baked);
@@ -25,8 +25,8 @@ std::optional<tiler::EncodedTile> BakedStore::Find(const tiler::CacheKey& key) {
     // Datasets may differ only in their edits.
     const auto [first, last] = baked_.equal_range(key.generation);
     const auto found = std::find_if(first, last, [&](const auto& entry) {
-      const auto& source = entry.second.source;
-      return (source ? tiler::TileEditsHash(*source, key.request) : 0) == key.edits;
+      const auto& model = entry.second.model;
+      return (model ? tiler::TileEditsHash(*model, key.request) : 0) == key.edits;
     });
     if (found == last) return std::nullopt;
     baked = found->second.tiles;

@@ -42,7 +42,7 @@ class BakedStore final : public tiler::TileStore {
   mutable std::shared_mutex mutex_;
   struct Archive {
     std::shared_ptr<const tiler::BakedTiles> tiles;
-    std::shared_ptr<const dem::DemSource> source;  // whose edits the tiles have; null: without sources
+    std::shared_ptr<const dem::ElevationModel> model;  // whose edits the tiles have; null: without sources
   };
   std::multimap<std::uint64_t, Archive> baked_;  // by Dataset::cache_generation; guarded by mutex_
   std::set<std::string> reported_;               // guarded by mutex_

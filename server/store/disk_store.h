@@ -1,9 +1,9 @@
 // A key-value store on a disk that may fail: a read returns the value that was written, or nothing.
 //
 // Thread-safe. Find and Erase block. Keep puts the value into a queue, from which a thread of the store writes it; it
-// blocks only if the queue is full and waits_for_room is set. Only Erase returns errors. After an error the store stops
-// using the disk and tries again every `retry_after`: after a failed write it continues to read, after a failed read it
-// finds nothing. Log and statistics report this.
+// blocks only if the queue is full and waits_for_room is set. Only Erase returns errors. After a failed
+// write the store only reads, after a failed read it does neither; it tries again every `retry_after`. Log and
+// statistics report this.
 #pragma once
 
 #include <atomic>

@@ -92,8 +92,8 @@ prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
                                   {}};
   if (pipeline == nullptr) return family;
   for (const tiler::Dataset& dataset : pipeline->datasets()) {
-    if (!dataset.source) continue;
-    const dem::SampleCounts counts = dataset.source->CountSamples();
+    if (!dataset.model) continue;
+    const dem::SampleCounts counts = dataset.model->CountSamples();
     for (const auto& [kind, count] : {std::pair("measured", counts.measured), std::pair("filled", counts.filled),
                                       std::pair("void", counts.voids)}) {
       AddMetric(family, {{"dataset", dataset.name}, {"kind", kind}}, static_cast<double>(count));
@@ -310,7 +310,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
   if (state.catalog->pipeline) {
     tiers.push_back({"memory", "drawn_meshes", {state.catalog->pipeline->drawn_meshes()}, false});
   }
-  const dem::KeptBlocks blocks = dem::DemSource::CountKeptBlocks();
+  const dem::KeptBlocks blocks = dem::ElevationModel::CountKeptBlocks();
   tiler::ByteCacheStats of_blocks;
   of_blocks.entries = blocks.count;
   of_blocks.bytes = blocks.bytes;

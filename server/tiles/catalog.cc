@@ -62,21 +62,21 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
   view.generation = dataset.generation;
   view.cache_generation = dataset.cache_generation();
   if (dataset.baked) view.baked_coding = dataset.baked->coding();
-  if (!dataset.source) {
+  if (!dataset.model) {
     SetExtent(dataset, view);
     return view;
   }
-  const dem::DemInfo& info = dataset.source->info();
-  view.available = dataset.source->Availability();
+  const dem::DemInfo& info = dataset.model->info();
+  view.available = dataset.model->Availability();
   view.bounds = info.bounds;
   view.heights = info.heights;
-  view.range_bound = [pipeline, &source = *dataset.source](const geo::TileKey& key) { return source.RangeBound(key); };
+  view.range_bound = [pipeline, &model = *dataset.model](const geo::TileKey& key) { return model.RangeBound(key); };
   if (info.edits > 0) {
-    view.edits_hash = [pipeline, &source = *dataset.source](const tiler::TileRequest& request) {
-      return tiler::TileEditsHash(source, request);
+    view.edits_hash = [pipeline, &model = *dataset.model](const tiler::TileRequest& request) {
+      return tiler::TileEditsHash(model, request);
     };
   }
-  view.has_datum = dataset.source->has_datum();
+  view.has_datum = dataset.model->has_datum();
   view.sources = info.sources.size();
   view.has_water = dataset.water.any();
   if (dataset.imagery.image) {

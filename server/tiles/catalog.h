@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 #include "engine/image/imagery.h"
 #include "proto/gltf/glb_tile.h"
@@ -38,8 +38,8 @@ struct DatasetView {
   dem::GeoBounds bounds;
   dem::HeightRange heights;  // of the data
   double floor_m = 0;        // height where there is no data
-  // DemSource::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the range
-  // above holds for all tiles.
+  // ElevationModel::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the
+  // range above holds for all tiles.
   std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
   bool has_datum = true;                         // the vertical datum of its heights is known
   std::size_t sources = 1;                       // rasters that the heights come from
@@ -67,8 +67,8 @@ struct Catalog {
 };
 using CatalogPtr = std::shared_ptr<const Catalog>;
 
-// The problem of a dataset whose reopening takes long, as clients see it. Other problems of datasets contain file
-// names.
+// The problem of a dataset whose reopening takes long. Clients see only this text: other problems name files and stay
+// in the log.
 inline constexpr const char* kReopening = "is being reopened; cached tiles are still served";
 
 CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending = {});
@@ -76,8 +76,8 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// Returns the bounds of the largest connected group of ranges of the deepest tiles without edits, clipped to the
-// dataset's bounds. Degrees; west > east: across the antimeridian.
+// On the deepest level of the sources, returns the bounds of the largest range and of the ranges connected with it,
+// clipped to the dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
 // Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.

@@ -42,9 +42,9 @@ class ThrowingWriter final : public archive::UnitWriter {
 void ExpectOneFailure(Throws throws, int levels, const std::string& message) {
   tiler::Dataset dataset;
   dataset.name = "jacksboro";
-  auto source = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
+  auto source = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
   ASSERT_TRUE(source) << source.error().message;
-  dataset.source = *std::move(source);
+  dataset.model = *std::move(source);
   BakeRequest request;
   request.levels = {0, levels};
   const auto manifests = PlanArchives(dataset, request, "test");

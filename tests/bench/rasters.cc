@@ -42,7 +42,7 @@ std::optional<tin::HeightField> ReadField(const std::string& name, const Window&
   const dem::GridWindow all{0, 0, raster->width, raster->height};
   std::vector<float> heights = dem::FillVoids(raster->heights, all, all, kMaxVoidGap);
   for (float& height : heights) {
-    height = std::isnan(height) ? 0 : std::nearbyint(height * 1024) / 1024;  // as dem::DemSource rounds heights
+    height = std::isnan(height) ? 0 : std::nearbyint(height * 1024) / 1024;  // as dem::ElevationModel rounds heights
   }
   return MakeField(raster->width, raster->height, std::move(heights));
 }

@@ -1,5 +1,6 @@
-// terrace_sight_rays measures DemSource::LookAlong over rays of one length in all directions: CPU time of one thread,
-// rays a second a core. "hash" is one of all answers, bit for bit: programs with the same answers print the same.
+// terrace_sight_rays measures ElevationModel::LookAlong over rays of one length in all directions: CPU time of one
+// thread, rays a second a core. "hash" is one of all answers, bit for bit: programs with the same answers print the
+// same.
 #include <fmt/format.h>
 #include <xxhash.h>
 
@@ -15,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/ellipsoid.h"
 #include "tests/bench/cpu_clock.h"
 
@@ -32,7 +33,7 @@ struct Arguments {
 };
 
 // From places in the box, both ends at the same height above ground.
-Result<std::vector<dem::SightRay>> RaysOver(const dem::DemSource& source, const Arguments& arguments) {
+Result<std::vector<dem::SightRay>> RaysOver(const dem::ElevationModel& model, const Arguments& arguments) {
   std::mt19937_64 random(11);
   const auto share = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
   std::vector<dem::GeoPosition> ends;
@@ -44,7 +45,7 @@ Result<std::vector<dem::SightRay>> RaysOver(const dem::DemSource& source, const 
     ends.push_back({longitude + arguments.length_m * std::sin(turn) / geo::MetresPerDegreeEast(latitude),
                     latitude + arguments.length_m * std::cos(turn) / geo::MetresPerDegreeNorth(latitude)});
   }
-  const Result<std::vector<float>> ground = source.ReadPoints(ends);
+  const Result<std::vector<float>> ground = model.ReadPoints(ends);
   if (!ground) return tl::unexpected(ground.error());
   std::vector<dem::SightRay> rays;
   const auto end = [&](std::size_t k) {
@@ -60,7 +61,7 @@ int Run(const Arguments& arguments) {
   dem::DemOptions options;
   if (!arguments.vertical.empty()) options.source.vertical = arguments.vertical;
   for (const std::string& dem : arguments.dems) files.push_back({dem, static_cast<int>(files.size())});
-  const auto source = dem::DemSource::Open(std::move(files), options);
+  const auto source = dem::ElevationModel::Open(std::move(files), options);
   const auto fail = [](const Error& error) {
     std::fprintf(stderr, "terrace_sight_rays: %s\n", error.message.c_str());
     return 1;

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
@@ -92,10 +92,10 @@ bool IsInside(const tiler::SampleIndex& samples, const geo::TileKey& key) {
 
 // Random tiles of the level with samples of the source, with equal probability: those inside the source, or those at
 // its rim. If there are none of the requested kind, the others.
-std::vector<geo::TileKey> Draw(const dem::DemSource& source, const tiler::SampleIndex& samples, int level,
+std::vector<geo::TileKey> Draw(const dem::ElevationModel& model, const tiler::SampleIndex& samples, int level,
                                const Arguments& arguments) {
   std::vector<geo::TileKey> keys;
-  for (const geo::TileRange& range : source.Available(level)) {
+  for (const geo::TileRange& range : model.Available(level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y; ++y) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x) keys.push_back({level, x, y});
     }
@@ -121,10 +121,10 @@ double SquareKilometres(const geo::TileKey& key) {
   return side * geo::MetresPerDegreeEast(latitude) * side * geo::MetresPerDegreeNorth(latitude) / 1e6;
 }
 
-std::shared_ptr<const tiler::TilePipeline> PipelineOf(const std::shared_ptr<const dem::DemSource>& source, bool compact,
-                                                      std::size_t refinement_bytes) {
+std::shared_ptr<const tiler::TilePipeline> PipelineOf(const std::shared_ptr<const dem::ElevationModel>& model,
+                                                      bool compact, std::size_t refinement_bytes) {
   std::vector<tiler::Dataset> datasets(1);
-  datasets[0].source = source;
+  datasets[0].model = model;
   datasets[0].mesh_options.compact = compact;
   return std::make_shared<const tiler::TilePipeline>(std::move(datasets), refinement_bytes);
 }
@@ -178,7 +178,7 @@ Result<void> Measure(const Sampling& sampling, const tiler::SampleIndex& samples
 std::vector<Cell> RowOf(const Sampling& sampling) {
   const double count = static_cast<double>(sampling.tiles.size());
   const int level = sampling.tiles.front().request.key.level;
-  const dem::DemSource& source = *sampling.cold->datasets().front().source;
+  const dem::ElevationModel& model = *sampling.cold->datasets().front().model;
   Tile sum;
   sum.cost = {0, 0, 0, 0, 0, 0};
   double square_km = 0, most_certified = 0;
@@ -191,10 +191,10 @@ std::vector<Cell> RowOf(const Sampling& sampling) {
     sum.cost.encode += tile.cost.encode, sum.cost.compress += tile.cost.compress;
   }
   std::int64_t of_level = 0;
-  for (const geo::TileRange& range : source.Available(level)) of_level += geo::Cells(range);
+  for (const geo::TileRange& range : model.Available(level)) of_level += geo::Cells(range);
   const auto each = [&](double all) { return Milliseconds(all / count); };
   return {fmt::format("{}", level),
-          fmt::format("{}", source.LatticeOf(level).cells + 1),
+          fmt::format("{}", model.LatticeOf(level).cells + 1),
           Number(sampling.error_m, 3),
           sampling.mesh,
           Count(sampling.tiles.size()),
@@ -233,9 +233,9 @@ Result<void> Try(std::vector<Sampling>& meshes, const tiler::SampleIndex& sample
 }
 
 Result<void> Run(const Arguments& arguments) {
-  auto opened = dem::DemSource::Open(arguments.dem);
+  auto opened = dem::ElevationModel::Open(arguments.dem);
   if (!opened) return tl::unexpected(opened.error());
-  const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
+  const std::shared_ptr<const dem::ElevationModel> model = *std::move(opened);
   const tiler::SampleIndex samples(tiler::SamplesOf(arguments.dem));
   Table table("tile_accuracy", std::filesystem::path(arguments.dem).filename().string(),
               {"level",    "nodes",      "error, m",  "mesh",         "tiles",
@@ -243,16 +243,16 @@ Result<void> Run(const Arguments& arguments) {
                "vertices", "bytes",      "kB/km2",    "cold, ms",     "warm, ms",
                "read",     "refine",     "encode",    "compress",     "tiles of the level"});
   std::vector<int> levels = arguments.levels;
-  if (levels.empty()) levels = {source->max_level(), source->max_level() - 1};
+  if (levels.empty()) levels = {model->max_level(), model->max_level() - 1};
   for (const int level : levels) {
-    const std::vector<geo::TileKey> keys = Draw(*source, samples, level, arguments);
+    const std::vector<geo::TileKey> keys = Draw(*model, samples, level, arguments);
     if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles with samples at level {}", level);
     for (const int step : arguments.steps) {
       std::vector<Sampling> meshes;
       for (const bool compact : {false, true}) {
         Sampling& sampling = meshes.emplace_back();
-        sampling.cold = PipelineOf(source, compact, 0);
-        sampling.warm = PipelineOf(source, compact, std::size_t{1} << 30);
+        sampling.cold = PipelineOf(model, compact, 0);
+        sampling.warm = PipelineOf(model, compact, std::size_t{1} << 30);
         sampling.mesh = compact ? "compact" : "greedy";
         sampling.error_m = geo::LadderError(level, step);
         for (const geo::TileKey& key : keys) {

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tests/bench/cpu_clock.h"
 #include "tests/bench/table.h"
 #include "tiler/tile_pipeline.h"
@@ -58,8 +58,8 @@ std::vector<Variant> Variants() {
 }
 
 // The first tiles of the level's first block that are not on its rim.
-std::vector<geo::TileKey> TilesOf(const dem::DemSource& source, const Arguments& arguments) {
-  const geo::TileRange& range = source.Available(arguments.level).front();
+std::vector<geo::TileKey> TilesOf(const dem::ElevationModel& model, const Arguments& arguments) {
+  const geo::TileRange& range = model.Available(arguments.level).front();
   std::vector<geo::TileKey> keys;
   for (std::int64_t y = range.start_y + 1; y < range.end_y; ++y) {
     for (std::int64_t x = range.start_x + 1; x < range.end_x; ++x) {
@@ -76,13 +76,13 @@ struct Cost {
 
 // Builds all tiles without a cached refinement, then with it.
 Result<void> Measure(const Variant& variant, const Arguments& arguments, Cost& cost) {
-  auto source = dem::DemSource::Open(arguments.dem);
+  auto source = dem::ElevationModel::Open(arguments.dem);
   if (!source) return tl::unexpected(source.error());
   const std::vector<geo::TileKey> keys = TilesOf(**source, arguments);
   if (keys.empty()) return MakeError(ErrorCode::kInvalidArgument, "no tiles inside level {}", arguments.level);
   cost.tiles = keys.size();
   std::vector<tiler::Dataset> datasets(1);
-  datasets[0].source = *std::move(source);
+  datasets[0].model = *std::move(source);
   datasets[0].glb.draco = variant.draco;
   const tiler::TilePipeline pipeline(std::move(datasets), std::size_t{1} << 30);
   for (double* const best : {&cost.cold_s, &cost.warm_s}) {

@@ -41,7 +41,7 @@ struct Seen {
 asio::awaitable<void> ReadAll(RequestReader& reader, Seen& seen) {
   for (bool more = true; more;) {
     Request request;
-    const RequestReader::Head head = co_await reader.ReadHead(request, Stream::Clock::now());
+    const RequestReader::HeadOutcome head = co_await reader.ReadHead(request, Stream::Clock::now());
     if (!head) break;
     if (!*head) {
       seen.refused = head->error().status;

@@ -222,7 +222,7 @@ TEST(TileErrorMeter, CountsTheCurvatureOfTheEarthUnderFlatTriangles) {
                               .MeasureFlat(mesh, GridPositions(SnapVertices(ground.view(), mesh, step), step));
   const double side = geo::kSemiMajorAxis * geo::ToRadians(180.0 / 512);
   EXPECT_NEAR(error.max_m, side * side / (4 * geo::kSemiMajorAxis), 0.6);
-  EXPECT_TRUE(error.misses.empty());
+  EXPECT_TRUE(error.to_insert.empty());
 }
 
 TEST(TileErrorMeter, SeesTheGridsRounding) {

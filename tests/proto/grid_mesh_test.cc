@@ -146,7 +146,7 @@ TEST(SnapVertices, StaysWithinHalfAStepOfThePlace) {
   const tin::TinMesh mesh = RegularMesh(32, 1);
   const double step = 0.5;
   const std::vector<GridPoint> points = SnapVertices(ground.view(), mesh, step);
-  const LatticeView view = ground.view();
+  const TileSamples view = ground.view();
   ASSERT_EQ(points.size(), mesh.vertices.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
     const auto [x, y] = mesh.vertices[k];
@@ -193,7 +193,7 @@ TEST(MakeGridMesh, HangsSkirtsStraightDownFromEveryEdgeVertex) {
   for (const auto& p : grid.positions) {
     points.insert({grid.origin[0] + p[0], grid.origin[1] + p[1], grid.origin[2] + p[2]});
   }
-  const LatticeView view = ground.view();
+  const TileSamples view = ground.view();
   for (const auto [x, y] : mesh.vertices) {
     if (x != 0 && y != 0 && x != 32 && y != 32) continue;
     const double height = static_cast<double>(view.At(x, y)) - depth;

@@ -13,7 +13,7 @@
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -31,12 +31,12 @@ struct GlobalGround {
       for (int i = -1; i <= cells + 1; ++i) {
         const std::int64_t column = ((lattice.FirstColumn(tile) + i) % columns + columns) % columns;
         const std::int64_t row = std::clamp<std::int64_t>(lattice.FirstRow(tile) + j, 0, rows);
-        const bool pole = row == 0 || row == rows;  // has one height, by the contract of DemSource
+        const bool pole = row == 0 || row == rows;  // has one height, by the contract of ElevationModel
         heights.push_back(static_cast<float>(std::floor(height(pole ? 0 : column, row) * 1024) / 1024));
       }
     }
   }
-  LatticeView view() const { return {key, lattice, heights}; }
+  TileSamples view() const { return {key, lattice, heights}; }
 };
 
 // Random heights between 0 and `relief`, the same for the same seed.
@@ -50,7 +50,7 @@ struct RandomGround {
     for (int k = 0; k < (cells + 3) * (cells + 3); ++k) {
       heights.push_back(static_cast<float>(relief * static_cast<double>(random() % 4096) / 4096));
     }
-    // A pole has one height, by the contract of DemSource.
+    // A pole has one height, by the contract of ElevationModel.
     const std::size_t stride = static_cast<std::size_t>(cells) + 3;
     const std::int64_t south = lattice.FirstRow(tile), north = south + cells;
     if (south == 0) std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(stride), stride, heights[stride]);
@@ -59,14 +59,14 @@ struct RandomGround {
       std::fill_n(heights.begin() + static_cast<std::ptrdiff_t>(first), stride, heights[first]);
     }
   }
-  LatticeView view() const { return {key, lattice, heights}; }
+  TileSamples view() const { return {key, lattice, heights}; }
 };
 
-inline tin::TinMesh GreedyMesh(const LatticeView& lattice, const tin::GreedyGoal& goal) {
-  const int side = lattice.cells() + 1;
+inline tin::TinMesh GreedyMesh(const TileSamples& samples, const tin::GreedyGoal& goal) {
+  const int side = samples.cells() + 1;
   std::vector<float> inside;
   for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) inside.push_back(lattice.At(i, j));
+    for (int i = 0; i < side; ++i) inside.push_back(samples.At(i, j));
   }
   const auto field = tin::HeightField::Make(side, side, inside);
   tin::GreedyTriangulation triangulation(*field);

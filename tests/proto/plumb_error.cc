@@ -14,17 +14,17 @@ bool IsFarFrom(const geo::Vec3& foot, const geo::Vec3& up, const geo::Vec3& a, c
 
 // Triangles that may be near a plumb line of a block of nodes. The margin is the largest difference of the block's feet
 // and directions from those of its middle node. Testing all nodes against every triangle would take minutes.
-std::vector<std::size_t> NearBlock(const LatticeView& lattice, int west, int south, int side,
+std::vector<std::size_t> NearBlock(const TileSamples& samples, int west, int south, int side,
                                    const std::vector<geo::Vec3>& ecef,
                                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  const int east = std::min(west + side - 1, lattice.cells()), north = std::min(south + side - 1, lattice.cells());
-  const double x = lattice.Longitude((west + east) / 2), y = lattice.Latitude((south + north) / 2);
+  const int east = std::min(west + side - 1, samples.cells()), north = std::min(south + side - 1, samples.cells());
+  const double x = samples.Longitude((west + east) / 2), y = samples.Latitude((south + north) / 2);
   const geo::Vec3 foot = geo::ToEcef(x, y, 0), up = geo::SurfaceNormal(x, y);
   double apart = 0, turned = 0;
   for (int j = south; j <= north; ++j) {
     for (int i = west; i <= east; ++i) {
-      apart = std::max(apart, geo::Length(geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0) - foot));
-      turned = std::max(turned, geo::Length(geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j)) - up));
+      apart = std::max(apart, geo::Length(geo::ToEcef(samples.Longitude(i), samples.Latitude(j), 0) - foot));
+      turned = std::max(turned, geo::Length(geo::SurfaceNormal(samples.Longitude(i), samples.Latitude(j)) - up));
     }
   }
   std::vector<std::size_t> near;
@@ -39,7 +39,7 @@ std::vector<std::size_t> NearBlock(const LatticeView& lattice, int west, int sou
 
 }  // namespace
 
-FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Vec3>& ecef,
+FlatError LargestFlatError(const TileSamples& samples, const std::vector<geo::Vec3>& ecef,
                            const std::vector<std::array<std::uint32_t, 3>>& triangles, int margin) {
   using Vector = std::array<long double, 3>;
   const auto minus = [](const geo::Vec3& a, const geo::Vec3& b) {
@@ -53,17 +53,17 @@ FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Ve
   FlatError largest;
   constexpr int kBlock = 8;
   std::vector<std::vector<std::size_t>> near;  // for a row of blocks
-  for (int j = 0; j <= lattice.cells(); ++j) {
+  for (int j = 0; j <= samples.cells(); ++j) {
     if (j % kBlock == 0) {
       near.clear();
-      for (int i = 0; i <= lattice.cells(); i += kBlock) {
-        near.push_back(NearBlock(lattice, i, j, kBlock, ecef, triangles));
+      for (int i = 0; i <= samples.cells(); i += kBlock) {
+        near.push_back(NearBlock(samples, i, j, kBlock, ecef, triangles));
       }
     }
-    if (j < margin || j > lattice.cells() - margin) continue;
-    for (int i = margin; i <= lattice.cells() - margin; ++i) {
-      const geo::Vec3 foot = geo::ToEcef(lattice.Longitude(i), lattice.Latitude(j), 0);
-      const geo::Vec3 normal = geo::SurfaceNormal(lattice.Longitude(i), lattice.Latitude(j));
+    if (j < margin || j > samples.cells() - margin) continue;
+    for (int i = margin; i <= samples.cells() - margin; ++i) {
+      const geo::Vec3 foot = geo::ToEcef(samples.Longitude(i), samples.Latitude(j), 0);
+      const geo::Vec3 normal = geo::SurfaceNormal(samples.Longitude(i), samples.Latitude(j));
       const Vector down = {-normal.x, -normal.y, -normal.z};
       for (const std::size_t index : near[static_cast<std::size_t>(i / kBlock)]) {
         const auto& t = triangles[index];
@@ -79,7 +79,7 @@ FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Ve
         const long double beside = 2e-6L / std::abs(all);
         if (u < -beside * length(ac) || v < -beside * length(ab) || 1 - u - v < -beside * length(bc)) continue;
         const long double height = determinant(ab, ac, to_foot) / all;
-        const auto error = static_cast<double>(std::abs(height - lattice.At(i, j)));
+        const auto error = static_cast<double>(std::abs(height - samples.At(i, j)));
         largest.most = std::max(largest.most, error);
         const bool is_inside = u > beside * length(ac) && v > beside * length(ab) && 1 - u - v > beside * length(bc);
         if (is_inside) largest.least = std::max(largest.least, error);

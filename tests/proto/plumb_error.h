@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::proto {
 
@@ -18,7 +18,7 @@ struct FlatError {
 
 // Intersects every node's plumb line with every triangle in ECEF by Cramer's rule. A vertical triangle has no height.
 // Nodes within `margin` of the tile's rim are left out.
-FlatError LargestFlatError(const LatticeView& lattice, const std::vector<geo::Vec3>& ecef,
+FlatError LargestFlatError(const TileSamples& samples, const std::vector<geo::Vec3>& ecef,
                            const std::vector<std::array<std::uint32_t, 3>>& triangles, int margin = 0);
 
 }  // namespace terrace::proto

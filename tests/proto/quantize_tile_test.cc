@@ -26,7 +26,7 @@ struct Ground {
         heights.push_back(static_cast<float>(std::floor(height(i, j) * 1024) / 1024));
     }
   }
-  LatticeView view() const { return {key, lattice, heights}; }
+  TileSamples view() const { return {key, lattice, heights}; }
 };
 
 tin::TinMesh TwoTriangles(int cells) {
@@ -110,9 +110,9 @@ TEST(TileErrorMeter, FindsOneLiftedSample) {
   const QuantizedTile tile = QuantizeTile(ground.view(), TwoTriangles(64), AllSteps(0.25));
   const TileError error = TileErrorMeter(ground.view(), 5).Measure(tile);
   EXPECT_NEAR(error.max_m, 7.5, 0.001);
-  ASSERT_EQ(error.misses.size(), 1u);
-  EXPECT_EQ(error.misses[0], (tin::SamplePosition{20, 31}));
-  EXPECT_TRUE(TileErrorMeter(ground.view(), 7.501).Measure(tile).misses.empty());
+  ASSERT_EQ(error.to_insert.size(), 1u);
+  EXPECT_EQ(error.to_insert[0], (tin::SamplePosition{20, 31}));
+  EXPECT_TRUE(TileErrorMeter(ground.view(), 7.501).Measure(tile).to_insert.empty());
 }
 
 TEST(TileErrorMeter, DoesNotOfferEdgeSamples) {
@@ -120,7 +120,7 @@ TEST(TileErrorMeter, DoesNotOfferEdgeSamples) {
   const TileError error =
       TileErrorMeter(ground.view(), 5).Measure(QuantizeTile(ground.view(), TwoTriangles(32), AllSteps(0.25)));
   EXPECT_NEAR(error.max_m, 50, 0.001);
-  EXPECT_TRUE(error.misses.empty());
+  EXPECT_TRUE(error.to_insert.empty());
 }
 
 TEST(TileErrorMeter, SeesEverySampleOfAFullMesh) {

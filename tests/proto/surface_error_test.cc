@@ -15,12 +15,12 @@ namespace terrace::proto {
 namespace {
 
 // Bilinear between the four samples around a position.
-double LatticeHeight(const LatticeView& lattice, double x, double y) {
-  const int i = std::min(static_cast<int>(x), lattice.cells() - 1),
-            j = std::min(static_cast<int>(y), lattice.cells() - 1);
+double LatticeHeight(const TileSamples& samples, double x, double y) {
+  const int i = std::min(static_cast<int>(x), samples.cells() - 1),
+            j = std::min(static_cast<int>(y), samples.cells() - 1);
   x -= i, y -= j;
-  return (1 - x) * (1 - y) * lattice.At(i, j) + x * (1 - y) * lattice.At(i + 1, j) +
-         (1 - x) * y * lattice.At(i, j + 1) + x * y * lattice.At(i + 1, j + 1);
+  return (1 - x) * (1 - y) * samples.At(i, j) + x * (1 - y) * samples.At(i + 1, j) +
+         (1 - x) * y * samples.At(i, j + 1) + x * y * samples.At(i + 1, j + 1);
 }
 
 // The foot of a point's plumb line on the ellipsoid in lattice steps, and the height above it in metres. Computed by
@@ -28,21 +28,21 @@ double LatticeHeight(const LatticeView& lattice, double x, double y) {
 struct Foot {
   double x = 0, y = 0, height = 0;
 };
-Foot FootOf(const LatticeView& lattice, const geo::Vec3& point, double near_x) {
-  const double radius = std::hypot(point.x, point.y), step = geo::ToRadians(lattice.lattice.StepDegrees());
+Foot FootOf(const TileSamples& samples, const geo::Vec3& point, double near_x) {
+  const double radius = std::hypot(point.x, point.y), step = geo::ToRadians(samples.lattice.StepDegrees());
   double latitude = std::atan2(point.z, radius);
   for (int k = 0; k < 9; ++k) {
     const double sine = std::sin(latitude);
     const double normal = geo::kSemiMajorAxis / std::sqrt(1 - geo::kEccentricitySquared * sine * sine);
     latitude = std::atan2(point.z + geo::kEccentricitySquared * normal * sine, radius);
   }
-  const double longitude = std::atan2(point.y, point.x) - geo::ToRadians(lattice.Longitude(0));
+  const double longitude = std::atan2(point.y, point.x) - geo::ToRadians(samples.Longitude(0));
   const double turn = 2 * std::numbers::pi, near = near_x * step;
   const double turned = longitude - std::round((longitude - near) / turn) * turn;
   const double degrees = geo::ToDegrees(latitude);
   const geo::Vec3 up = geo::SurfaceNormal(geo::ToDegrees(std::atan2(point.y, point.x)), degrees);
   const geo::Vec3 on = geo::ToEcef(geo::ToDegrees(std::atan2(point.y, point.x)), degrees, 0);
-  return {turned / step, (latitude - geo::ToRadians(lattice.Latitude(0))) / step, geo::Dot(point - on, up)};
+  return {turned / step, (latitude - geo::ToRadians(samples.Latitude(0))) / step, geo::Dot(point - on, up)};
 }
 
 struct Largest {
@@ -50,7 +50,7 @@ struct Largest {
 };
 
 // Compares many points of every triangle and of its rim with the lattice surface.
-Largest Sampled(const LatticeView& lattice, const std::vector<std::array<double, 2>>& places,
+Largest Sampled(const TileSamples& samples, const std::vector<std::array<double, 2>>& places,
                 const std::vector<double>& heights, const std::vector<geo::Vec3>& ecef,
                 const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   constexpr int kSteps = 24;
@@ -61,15 +61,15 @@ Largest Sampled(const LatticeView& lattice, const std::vector<std::array<double,
         const double u = double(a) / kSteps, v = double(b) / kSteps, w = 1 - u - v;
         const double x = u * places[t[0]][0] + v * places[t[1]][0] + w * places[t[2]][0];
         const double y = u * places[t[0]][1] + v * places[t[1]][1] + w * places[t[2]][1];
-        const double ground = LatticeHeight(lattice, x, y);
+        const double ground = LatticeHeight(samples, x, y);
         if (!heights.empty()) {
           const double height = u * heights[t[0]] + v * heights[t[1]] + w * heights[t[2]];
           largest.planar = std::max(largest.planar, std::abs(height - ground));
         }
         const geo::Vec3 point = ecef[t[0]] * u + ecef[t[1]] * v + ecef[t[2]] * w;
-        const Foot foot = FootOf(lattice, point, x);
-        if (foot.x < 0 || foot.y < 0 || foot.x > lattice.cells() || foot.y > lattice.cells()) continue;
-        largest.drawn = std::max(largest.drawn, std::abs(foot.height - LatticeHeight(lattice, foot.x, foot.y)));
+        const Foot foot = FootOf(samples, point, x);
+        if (foot.x < 0 || foot.y < 0 || foot.x > samples.cells() || foot.y > samples.cells()) continue;
+        largest.drawn = std::max(largest.drawn, std::abs(foot.height - LatticeHeight(samples, foot.x, foot.y)));
       }
     }
   }
@@ -78,15 +78,15 @@ Largest Sampled(const LatticeView& lattice, const std::vector<std::array<double,
 
 constexpr EdgeSteps kFineSteps{{0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}, {0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}};
 
-Largest SampledTile(const LatticeView& lattice, const QuantizedTile& tile) {
+Largest SampledTile(const TileSamples& samples, const QuantizedTile& tile) {
   std::vector<std::array<double, 2>> places;
   std::vector<double> heights;
   for (std::size_t k = 0; k < tile.u.size(); ++k) {
     places.push_back(
-        {double(tile.u[k]) * lattice.cells() / kQuantizedMax, double(tile.v[k]) * lattice.cells() / kQuantizedMax});
+        {double(tile.u[k]) * samples.cells() / kQuantizedMax, double(tile.v[k]) * samples.cells() / kQuantizedMax});
     heights.push_back(HeightAt(tile, tile.h[k]));
   }
-  return Sampled(lattice, places, heights, DecodePositions(tile), tile.triangles);
+  return Sampled(samples, places, heights, DecodePositions(tile), tile.triangles);
 }
 
 // If the surface is a saddle inside a cell, the largest error on an edge is neither at a sample nor at a crossing.

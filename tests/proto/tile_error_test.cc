@@ -20,8 +20,8 @@ namespace {
 EdgeSteps FineSteps() { return {{0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}, {0x1p-6, 0x1p-6, 0x1p-6, 0x1p-6}}; }
 
 // Measures every node against every triangle, by signs of areas.
-double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
-  const std::int64_t cells = lattice.cells();
+double LargestError(const TileSamples& samples, const QuantizedTile& tile) {
+  const std::int64_t cells = samples.cells();
   double largest = 0;
   for (const auto& t : tile.triangles) {
     std::array<std::int64_t, 3> x{}, y{};
@@ -45,7 +45,7 @@ double LargestError(const LatticeView& lattice, const QuantizedTile& tile) {
         const double surface = (static_cast<double>(area[0]) * z[0] + static_cast<double>(area[1]) * z[1] +
                                 static_cast<double>(area[2]) * z[2]) /
                                static_cast<double>(area[0] + area[1] + area[2]);
-        const double sample = lattice.At(static_cast<int>(i), static_cast<int>(j));
+        const double sample = samples.At(static_cast<int>(i), static_cast<int>(j));
         largest = std::max(largest, std::abs(surface - sample));
       }
     }
@@ -57,9 +57,9 @@ TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
   const RandomGround ground({9, 300, 400}, 64, 256, 9);
   const QuantizedTile tile = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 120}), FineSteps());
   const TileError error = TileErrorMeter(ground.view(), 60).Measure(tile);
-  ASSERT_FALSE(error.misses.empty());
-  EXPECT_LE(error.misses.size(), tile.triangles.size());
-  for (const tin::SamplePosition miss : error.misses) {
+  ASSERT_FALSE(error.to_insert.empty());
+  EXPECT_LE(error.to_insert.size(), tile.triangles.size());
+  for (const tin::SamplePosition miss : error.to_insert) {
     EXPECT_TRUE(miss.x > 0 && miss.y > 0 && miss.x < 64 && miss.y < 64);
   }
 }
@@ -78,7 +78,7 @@ TEST(TileError, FindsTheLargestErrorThatAnySampleHas) {
       const FlatError drawn = LargestFlatError(ground.view(), DecodePositions(tile), tile.triangles);
       EXPECT_GE(error.max_m, std::max(planar, drawn.least) - 1e-6) << cells << ' ' << seed;
       EXPECT_LE(error.max_m, std::max(planar, drawn.most) + 1e-3) << cells << ' ' << seed;
-      EXPECT_TRUE(error.misses.empty());
+      EXPECT_TRUE(error.to_insert.empty());
     }
   }
 }
@@ -112,9 +112,9 @@ TEST(TileError, IsThatOfThePlumbLinesOfAllSamples) {
 
 void ExpectEqual(const TileError& a, const TileError& b) {
   EXPECT_EQ(a.max_m, b.max_m);
-  ASSERT_EQ(a.misses.size(), b.misses.size());
-  for (std::size_t i = 0; i < a.misses.size(); ++i) {
-    EXPECT_TRUE(a.misses[i].x == b.misses[i].x && a.misses[i].y == b.misses[i].y) << i;
+  ASSERT_EQ(a.to_insert.size(), b.to_insert.size());
+  for (std::size_t i = 0; i < a.to_insert.size(); ++i) {
+    EXPECT_TRUE(a.to_insert[i].x == b.to_insert[i].x && a.to_insert[i].y == b.to_insert[i].y) << i;
   }
 }
 
@@ -131,8 +131,8 @@ TEST(TileErrorMeter, MeasuresAsIfItWereTheFirstTime) {
     tile = QuantizeTile(ground.view(), mesh, FineSteps());
     const TileError error = meter.Measure(tile);
     ExpectEqual(error, TileErrorMeter(ground.view(), 60).Measure(tile));
-    misses = !error.misses.empty();
-    if (misses) mesh = tin::InsertSamples(mesh, {error.misses.data(), 1 + error.misses.size() / 3});
+    misses = !error.to_insert.empty();
+    if (misses) mesh = tin::InsertSamples(mesh, {error.to_insert.data(), 1 + error.to_insert.size() / 3});
   }
   EXPECT_GT(rounds, 5);
   const QuantizedTile other = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 100}), FineSteps());
@@ -154,8 +154,8 @@ TEST(TileErrorMeter, MeasuresFlatTrianglesAsIfItWereTheFirstTime) {
     const std::vector<geo::Vec3> positions = GridPositions(SnapVertices(ground.view(), mesh, step), step);
     const TileError error = meter.MeasureFlat(mesh, positions);
     ExpectEqual(error, TileErrorMeter(ground.view(), 60).MeasureFlat(mesh, positions));
-    misses = error.misses.size();
-    mesh = tin::InsertSamples(mesh, {error.misses.data(), misses / 3});
+    misses = error.to_insert.size();
+    mesh = tin::InsertSamples(mesh, {error.to_insert.data(), misses / 3});
   }
   EXPECT_GT(misses, 0u) << "nothing was left to be told again";
 }

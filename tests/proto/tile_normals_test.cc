@@ -27,7 +27,7 @@ struct SampledGround {
       for (int i = -1; i <= kCells + 1; ++i) heights.push_back(static_cast<float>(height(i, j)));
     }
   }
-  LatticeView view() const { return {key, lattice, heights}; }
+  TileSamples view() const { return {key, lattice, heights}; }
 };
 
 // The four corners and one sample inside.

@@ -23,7 +23,7 @@ struct WaterTile {
     view.heights = heights;
   }
   std::vector<float> heights;
-  LatticeView view;
+  TileSamples view;
 };
 
 int Pixel(const WaterMask& mask, int row, int column) {

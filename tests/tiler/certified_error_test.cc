@@ -49,13 +49,13 @@ class CertifiedError : public testing::TestWithParam<CertifiedCase> {
 };
 
 std::optional<TilePipeline> Open(const CertifiedSource& source) {
-  auto opened = dem::DemSource::Open(source.files, source.options);
+  auto opened = dem::ElevationModel::Open(source.files, source.options);
   EXPECT_TRUE(opened.has_value()) << (opened ? "" : opened.error().message);
   if (!opened) return std::nullopt;
   Dataset dataset;
   dataset.name = "tried";
-  dataset.source = *std::move(opened);
-  dataset.generation = dataset.source->fingerprint();
+  dataset.model = *std::move(opened);
+  dataset.generation = dataset.model->fingerprint();
   std::vector<Dataset> datasets;
   datasets.push_back(std::move(dataset));
   return std::optional<TilePipeline>(std::in_place, std::move(datasets));
@@ -64,8 +64,8 @@ std::optional<TilePipeline> Open(const CertifiedSource& source) {
 // Tiles around random samples, the same number for all levels except those whose tiles have too many samples.
 class RandomTiles {
  public:
-  RandomTiles(const dem::DemSource& source, const SampleIndex& samples)
-      : source_(source), samples_(samples), tries_(static_cast<std::size_t>(source.max_level() + 1)) {}
+  RandomTiles(const dem::ElevationModel& model, const SampleIndex& samples)
+      : source_(model), samples_(samples), tries_(static_cast<std::size_t>(model.max_level() + 1)) {}
 
   // A tile of the next level that needs more tiles. `deep_and_fine`: of the two deepest levels, with the smallest
   // error.
@@ -98,7 +98,7 @@ class RandomTiles {
     return count <= kManySamples;
   }
 
-  const dem::DemSource& source_;
+  const dem::ElevationModel& source_;
   const SampleIndex& samples_;
   std::vector<int> tries_;  // by level
   std::size_t turn_ = 0;
@@ -114,7 +114,7 @@ TEST_P(CertifiedError, IsNeverBelowTheTruthAndNotMuchAboveIt) {
   const auto pipeline = Open(*source);
   ASSERT_TRUE(pipeline.has_value());
   const SampleIndex samples(std::move(source->samples));
-  RandomTiles random(*pipeline->datasets().front().source, samples);
+  RandomTiles random(*pipeline->datasets().front().model, samples);
   const int tiles = IsLong() ? 240 : 16;
   int above = 0;
   std::vector<double> ratios;

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/tiler/source_samples.h"
 

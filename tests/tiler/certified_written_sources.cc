@@ -56,13 +56,13 @@ std::string WriteAtNodes(const dem::TempDir& dir, const std::string& name, int c
 }
 
 // Served heights at full resolution, at the samples that are visible or blended.
-std::vector<Sample> BlendedSamples(const dem::DemSource& source) {
+std::vector<Sample> BlendedSamples(const dem::ElevationModel& model) {
   std::vector<Sample> samples;
-  const geo::Lattice lattice = source.LatticeOf(kLevel);
+  const geo::Lattice lattice = model.LatticeOf(kLevel);
   EXPECT_EQ(lattice.cells, 256);
   const dem::NodeWindow window{kFirstColumn - kRim, kFirstRow - kPieces - kRim, 2 * kPieces + 2 * kRim,
                                kPieces + 2 * kRim};
-  const auto heights = source.ReadNodes(kLevel, window);
+  const auto heights = model.ReadNodes(kLevel, window);
   EXPECT_TRUE(heights.has_value());
   for (int y = kBase; y < window.rows - kBase; ++y) {
     for (int x = 0; x < window.columns - kBase; ++x) {
@@ -98,7 +98,7 @@ CertifiedCase Feathered(double feather, const std::string& vertical) {
     source.options.feather = feather;
     if (feather == 0) source.options.max_void_gap = 0;  // filled nodes would be neither samples nor blended
     source.options.source.vertical = vertical;
-    const auto opened = dem::DemSource::Open(source.files, source.options);
+    const auto opened = dem::ElevationModel::Open(source.files, source.options);
     EXPECT_TRUE(opened.has_value());
     if (opened) source.samples = BlendedSamples(**opened);
     return source;

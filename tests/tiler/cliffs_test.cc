@@ -72,10 +72,10 @@ void ForEachTile(const Visit& visit) {
   for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
     for (const bool compact : {false, true}) {
       const TilePipeline pipeline = MakePipeline(path, criterion, compact);
-      const dem::DemSource& source = *pipeline.datasets().front().source;
-      for (const int level : {source.max_level() - 2, source.max_level() - 1}) {
-        for (const geo::TileKey& key : dem::SomeTiles(source, level, 1000)) {
-          const auto heights = source.Read(key);
+      const dem::ElevationModel& model = *pipeline.datasets().front().model;
+      for (const int level : {model.max_level() - 2, model.max_level() - 1}) {
+        for (const geo::TileKey& key : dem::SomeTiles(model, level, 1000)) {
+          const auto heights = model.Read(key);
           ASSERT_TRUE(heights.has_value());
           if (LargestLoss(*heights, 1, 1) < kCliff_m / 2) continue;
           for (const int step : {0, 8}) {
@@ -135,9 +135,9 @@ TEST(Cliffs, CostGlbTilesNoMoreThanTheirGrid) {
       if (tiles % 16 != 0) continue;
       const auto glb = proto::DecodeGlb(encoded->bytes);
       ASSERT_TRUE(glb.has_value());
-      const proto::LatticeView lattice{request.key, heights.lattice, heights.heights};
+      const proto::TileSamples samples{request.key, heights.lattice, heights.heights};
       // Leaves out the rim, which has skirts.
-      EXPECT_LE(proto::LargestFlatError(lattice, glb->positions, glb->triangles, 1).least,
+      EXPECT_LE(proto::LargestFlatError(samples, glb->positions, glb->triangles, 1).least,
                 encoded->max_error_m * 1.0001 + 0.001);
     }
   });

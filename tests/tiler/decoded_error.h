@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tests/proto/quantized_mesh_decoder.h"
 
 namespace terrace::tiler {

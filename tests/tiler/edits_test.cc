@@ -44,14 +44,14 @@ class Edits : public testing::Test {
                                  std::filesystem::copy_options::skip_existing);
       options.edits = {path};
     }
-    auto source = dem::DemSource::Open(Jacksboro(), options);
+    auto source = dem::ElevationModel::Open(Jacksboro(), options);
     EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
     Dataset dataset;
     dataset.name = "edited";
     dataset.mesh_options = mesh;
-    if (source) dataset.source = *std::move(source);
-    dataset.generation = dataset.source->fingerprint();
-    dataset.unedited_generation = dataset.source->unedited_fingerprint();
+    if (source) dataset.model = *std::move(source);
+    dataset.generation = dataset.model->fingerprint();
+    dataset.unedited_generation = dataset.model->unedited_fingerprint();
     std::vector<Dataset> datasets;
     datasets.push_back(std::move(dataset));
     return TilePipeline(std::move(datasets));
@@ -75,7 +75,7 @@ TileRequest RequestFor(const geo::TileKey& key, int step) {
   return request;
 }
 
-const dem::DemSource& SourceOf(const TilePipeline& pipeline) { return *pipeline.datasets().front().source; }
+const dem::ElevationModel& SourceOf(const TilePipeline& pipeline) { return *pipeline.datasets().front().model; }
 
 constexpr std::array kSteps = {-8, 0, 8, 20};
 constexpr std::array kLevels = {9, 11, 12};
@@ -122,7 +122,7 @@ TEST_F(Edits, LeaveEdgesOfNeighboursEqual) {
 // The distance that quantized-mesh may leave at a node although it and all of its neighbours are vertices. Positions
 // are 32767ths of a tile, which is the more the steeper the ground is beside the node. Heights are 32767ths of a tile's
 // range; on edges multiples of a step that both tiles have, 2^k from a 16384th of the larger range on (edge_steps.h).
-double LeastInFormat(const dem::DemSource& source, const geo::TileKey& key, const FetchedTile& mesh,
+double LeastInFormat(const dem::ElevationModel& model, const geo::TileKey& key, const FetchedTile& mesh,
                      const dem::TileHeights& tile, std::size_t k) {
   const int cells = tile.lattice.cells, x = static_cast<int>(k) % (cells + 1), y = static_cast<int>(k) / (cells + 1);
   const int east = x == 0 ? -1 : (x == cells ? 1 : 0), north = y == 0 ? -1 : (y == cells ? 1 : 0);
@@ -130,7 +130,7 @@ double LeastInFormat(const dem::DemSource& source, const geo::TileKey& key, cons
   if (east != 0 || north != 0) {
     double range = 0;
     for (const auto& [dx, dy] : {std::pair{0, 0}, {east, 0}, {0, north}, {east, north}}) {
-      const dem::HeightRange of = source.RangeBound(geo::Neighbour(key, dx, dy));
+      const dem::HeightRange of = model.RangeBound(geo::Neighbour(key, dx, dy));
       range = std::max(range, of.max - of.min);
     }
     step = 0x1p-10;
@@ -214,9 +214,9 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
 
 // Of up to 60 tiles of a level below the sources' deepest: common edges, and the precision at every sample.
 void ExpectEdgesAndPrecision(const TilePipeline& pipeline, int level, int step) {
-  const dem::DemSource& source = SourceOf(pipeline);
+  const dem::ElevationModel& model = SourceOf(pipeline);
   TilesByPlace tiles;
-  for (const geo::TileRange& range : source.Available(level)) {
+  for (const geo::TileRange& range : model.Available(level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y && tiles.size() < 60; ++y) {
       for (std::int64_t x = range.start_x; x <= range.end_x; ++x)
         tiles[{x, y}] = FetchTile(pipeline, RequestFor({level, x, y}, step));
@@ -226,15 +226,15 @@ void ExpectEdgesAndPrecision(const TilePipeline& pipeline, int level, int step) 
   std::size_t limited = 0;
   for (const auto& [at, tile] : tiles) {
     const geo::TileKey key{level, at.first, at.second};
-    const auto heights = source.Read(key);
+    const auto heights = model.Read(key);
     ASSERT_TRUE(heights.has_value());
-    const dem::MeshDemands demands = source.DemandsOf(key);
+    const dem::MeshDemands demands = model.DemandsOf(key);
     const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
     for (std::size_t k = 0; k < demands.caps.size(); ++k) {
       const auto allowed = static_cast<double>(demands.caps[k]);
       if (allowed > 0.25) continue;
       ++limited;
-      EXPECT_LE(errors[k], std::max(allowed, LeastInFormat(source, key, tile, *heights, k)) + 0x1p-11)
+      EXPECT_LE(errors[k], std::max(allowed, LeastInFormat(model, key, tile, *heights, k)) + 0x1p-11)
           << geo::ToString(key) << " step " << step;
     }
   }
@@ -250,9 +250,9 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   const std::vector<std::string> features = {Feature(R"({"op":"flatten","height":"mean","blend_m":15})", small),
                                              Feature(R"({"op":"precision","error_m":0.2,"blend_m":20})", small)};
   const TilePipeline plain = Open({}), pipeline = Open(features);
-  const dem::DemSource& source = SourceOf(pipeline);
-  const int finest = SourceOf(plain).max_level(), deepest = source.max_level();
-  ASSERT_EQ(source.max_source_level(), finest);
+  const dem::ElevationModel& model = SourceOf(pipeline);
+  const int finest = SourceOf(plain).max_level(), deepest = model.max_level();
+  ASSERT_EQ(model.max_source_level(), finest);
   ASSERT_GT(deepest, finest + 1);
   for (const MeshOptions& mesh : kMeshes) {
     const TilePipeline meshed = Open(features, mesh);
@@ -262,14 +262,14 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   }
   // Elsewhere the deepest tiles stay as they are, whatever a request asks for.
   const geo::TileKey beside = TileAt(finest, -4, 3);
-  ASSERT_EQ(source.EditsHash(beside), 0u);
+  ASSERT_EQ(model.EditsHash(beside), 0u);
   for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
     for (const bool metadata : {false, true}) {
       for (const int step : kSteps) {
         TileRequest request = RequestFor(beside, step);
         request.format = format;
         request.extensions.metadata = metadata;
-        EXPECT_EQ(TileEditsHash(source, request), 0u);
+        EXPECT_EQ(TileEditsHash(model, request), 0u);
         const auto a = plain.Build(request, {}), b = pipeline.Build(request, {});
         ASSERT_TRUE(a.has_value() && b.has_value());
         EXPECT_EQ(a->bytes, b->bytes) << step;

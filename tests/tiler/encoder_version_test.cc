@@ -38,11 +38,11 @@ std::string TilesText(const TilePipeline& pipeline) {
                         proto::FormatErrorUp(tile->certified_error_m.value_or(0)));
   };
   for (std::uint32_t dataset = 0; dataset < pipeline.datasets().size(); ++dataset) {
-    const dem::DemSource& source = *pipeline.datasets()[dataset].source;
-    for (int level = 0; level <= source.max_level(); level += 3) {
+    const dem::ElevationModel& model = *pipeline.datasets()[dataset].model;
+    for (int level = 0; level <= model.max_level(); level += 3) {
       TileRequest request;
       request.dataset = dataset;
-      const geo::TileRange& range = source.Available(level).front();
+      const geo::TileRange& range = model.Available(level).front();
       request.key = {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
       for (const int step : {-4, 0, 3}) {
         request.error_step = step;
@@ -63,7 +63,7 @@ std::string TilesText(const TilePipeline& pipeline) {
         request.coding = coding;
         add(pipeline.Build(request, {}));
       }
-      const dem::HeightRange bound = source.RangeBound(request.key);
+      const dem::HeightRange bound = model.RangeBound(request.key);
       text += fmt::format("{} {}\n", bound.min, bound.max);
     }
     TileRequest heights;
@@ -74,12 +74,12 @@ std::string TilesText(const TilePipeline& pipeline) {
       add(pipeline.Build(heights, {}));
     }
   }
-  const dem::DemSource& source = *pipeline.datasets().back().source;
+  const dem::ElevationModel& model = *pipeline.datasets().back().model;
   const AreaRequest area{-84.25, 36.25, -84.2, 36.29, 5};
-  const auto plan = PlanArea(source, 0.5, area, 1'000'000);
+  const auto plan = PlanArea(model, 0.5, area, 1'000'000);
   EXPECT_TRUE(plan);
-  if (plan) add(BuildAreaMesh(source, *plan, area, {}));
-  const auto points = source.ReadPoints(std::vector<dem::GeoPosition>{{-84.2, 36.3}, {-84.217, 36.3181}});
+  if (plan) add(BuildAreaMesh(model, *plan, area, {}));
+  const auto points = model.ReadPoints(std::vector<dem::GeoPosition>{{-84.2, 36.3}, {-84.217, 36.3181}});
   EXPECT_TRUE(points);
   if (points) text += fmt::format("{}\n", fmt::join(*points, " "));
   return text;
@@ -127,12 +127,12 @@ TEST(EncoderVersion, IsRaisedWithTheBytesOfProjectedTiles) {
   spec.value = [](int column, int row) { return (column * column + 3 * row * column) % 4001 / 8.0 + row; };
   std::vector<Dataset> datasets;
   datasets.push_back(OpenDataset("pole", dem::WriteRaster(dir, spec)));
-  ASSERT_NE(datasets.front().source, nullptr);
-  const dem::DemSource& source = *datasets.front().source;
+  ASSERT_NE(datasets.front().model, nullptr);
+  const dem::ElevationModel& model = *datasets.front().model;
   const TilePipeline pipeline(datasets);
   std::string text;
-  for (int level = 0; level <= std::min(source.max_level(), 4); ++level) {
-    const geo::TileRange& range = source.Available(level).front();
+  for (int level = 0; level <= std::min(model.max_level(), 4); ++level) {
+    const geo::TileRange& range = model.Available(level).front();
     for (std::int64_t x = range.start_x; x <= range.end_x; ++x) {
       TileRequest request;
       request.key = {level, x, range.start_y};
@@ -140,7 +140,7 @@ TEST(EncoderVersion, IsRaisedWithTheBytesOfProjectedTiles) {
       const auto tile = pipeline.Build(request, {});
       ASSERT_TRUE(tile) << tile.error().message;
       // Most differences of heights are smaller than the steps of these tiles.
-      const auto read = source.Read(request.key);
+      const auto read = model.Read(request.key);
       ASSERT_TRUE(read) << read.error().message;
       const std::string_view heights(reinterpret_cast<const char*>(read->heights.data()),
                                      read->heights.size() * sizeof(float));
@@ -155,7 +155,7 @@ TEST(EncoderVersion, IsRaisedWithTheBytesOfProjectedTiles) {
 TEST(EncoderVersion, FingerprintsOfUnchangedSourcesStay) {
   std::string text;
   for (const Dataset& dataset : SamplePipeline().datasets()) {
-    text += fmt::format("{:016x} ", dataset.source->fingerprint());
+    text += fmt::format("{:016x} ", dataset.model->fingerprint());
   }
   EXPECT_EQ(text, kRecordedFingerprints);
 }

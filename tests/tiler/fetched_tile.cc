@@ -10,12 +10,12 @@
 namespace terrace::tiler {
 
 Dataset OpenDataset(const std::string& name, const std::string& path) {
-  auto source = dem::DemSource::Open(path);
+  auto source = dem::ElevationModel::Open(path);
   Dataset dataset;
   dataset.name = name;
   EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
-  if (source) dataset.source = *std::move(source);
-  if (dataset.source) dataset.generation = dataset.source->fingerprint();  // pipelines use it as the cache key
+  if (source) dataset.model = *std::move(source);
+  if (dataset.model) dataset.generation = dataset.model->fingerprint();  // pipelines use it as the cache key
   return dataset;
 }
 

@@ -23,7 +23,7 @@ namespace {
 using proto::Corner;
 using proto::GlbCompression;
 
-const dem::DemSource& Source(std::uint32_t dataset) { return *SamplePipeline().datasets()[dataset].source; }
+const dem::ElevationModel& Source(std::uint32_t dataset) { return *SamplePipeline().datasets()[dataset].model; }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
   const geo::TileRange& range = Source(dataset).Available(level).front();

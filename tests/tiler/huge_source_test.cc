@@ -75,12 +75,12 @@ double Since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-std::unique_ptr<dem::DemSource> Open(const std::string& path, const std::string& cache,
-                                     const std::function<void(double)>& progress = {}) {
+std::unique_ptr<dem::ElevationModel> Open(const std::string& path, const std::string& cache,
+                                          const std::function<void(double)>& progress = {}) {
   dem::DemOptions options;
   options.cache.folder = std::make_shared<dem::CacheFolder>(cache);
   options.progress = progress;
-  auto source = dem::DemSource::Open(path, options);
+  auto source = dem::ElevationModel::Open(path, options);
   EXPECT_TRUE(source.has_value()) << source.error().message;
   return source ? *std::move(source) : nullptr;
 }
@@ -131,21 +131,21 @@ TEST(HugeSource, IsPreparedOnceAndServedFromFewBytes) {
   double before = MegabytesRead();
   std::vector<Dataset> datasets(1);
   datasets[0].name = "huge";
-  datasets[0].source = Open(path, cache, [](double share) { EXPECT_EQ(share, 1) << "nothing is left to do"; });
-  ASSERT_NE(datasets[0].source, nullptr);
+  datasets[0].model = Open(path, cache, [](double share) { EXPECT_EQ(share, 1) << "nothing is left to do"; });
+  ASSERT_NE(datasets[0].model, nullptr);
   std::printf("second start: %.2f s, %.0f MB read\n", Since(start), MegabytesRead() - before);
   EXPECT_LT(MegabytesRead() - before, 200);
 
   const TilePipeline pipeline(std::move(datasets));
-  const dem::DemSource& source = *pipeline.datasets()[0].source;
+  const dem::ElevationModel& model = *pipeline.datasets()[0].model;
   std::mt19937 random(5);
   double slowest = 0, most_read = 0;
-  for (int level = 0; level <= source.max_level(); ++level) {
+  for (int level = 0; level <= model.max_level(); ++level) {
     double slowest_here = 0, read_here = 0;
     std::uint32_t vertices = 0;
     for (int i = 0; i < 6; ++i) {
       TileRequest request;
-      const geo::TileRange& range = source.Available(level)[0];
+      const geo::TileRange& range = model.Available(level)[0];
       request.key = {level, range.start_x + static_cast<std::int64_t>(random()) % (range.end_x - range.start_x + 1),
                      range.start_y + static_cast<std::int64_t>(random()) % (range.end_y - range.start_y + 1)};
       // Half of the tiles are in the corner with the first patch.

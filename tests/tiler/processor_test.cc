@@ -40,9 +40,9 @@ std::string WriteProjectedGround(const dem::TempDir& dir) {
 // Prints a hash of the bytes and the errors in the headers, for every tile, or for some of a level with many tiles.
 void PrintTiles(const TilePipeline& pipeline) {
   for (std::uint32_t dataset = 0; dataset < pipeline.datasets().size(); ++dataset) {
-    const dem::DemSource& source = *pipeline.datasets()[dataset].source;
-    for (int level = 0; level <= source.max_level(); ++level) {
-      for (const geo::TileKey& key : dem::SomeTiles(source, level, 12)) {
+    const dem::ElevationModel& model = *pipeline.datasets()[dataset].model;
+    for (int level = 0; level <= model.max_level(); ++level) {
+      for (const geo::TileKey& key : dem::SomeTiles(model, level, 12)) {
         for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
           TileRequest request;
           request.dataset = dataset;

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_key.h"
 #include "tests/support/test_data.h"
@@ -48,9 +48,9 @@ class RealTiles : public testing::TestWithParam<Dem> {
   }
 
   // The south-western tile of a block at the centre of the source.
-  static geo::TileKey FirstTile(const dem::DemSource& source, int level) {
+  static geo::TileKey FirstTile(const dem::ElevationModel& model, int level) {
     if (GetParam().file == nullptr) return {level, geo::TileColumns(level) - 2, geo::TileRows(level) / 2 - 1};
-    const dem::GeoBounds& bounds = source.info().bounds;
+    const dem::GeoBounds& bounds = model.info().bounds;
     const auto at = [level](double degrees) { return static_cast<std::int64_t>(std::ldexp(degrees / 180, level)); };
     return {level, (at(bounds.west + 180) + at(bounds.east + 180)) / 2 - 1,
             (at(bounds.south + 90) + at(bounds.north + 90)) / 2 - 1};
@@ -64,7 +64,7 @@ std::map<int, Block> FetchBlocks(const TilePipeline& pipeline, const geo::TileKe
     for (int y = 0; y < kSide; ++y) {
       TileRequest request;
       request.key = geo::Neighbour(first, x, y);
-      if (!pipeline.datasets().front().source->IsAvailable(request.key)) continue;
+      if (!pipeline.datasets().front().model->IsAvailable(request.key)) continue;
       for (const int step : kSteps) {
         request.error_step = step;
         blocks[step][static_cast<std::size_t>(x)][static_cast<std::size_t>(y)] = FetchTile(pipeline, request);
@@ -98,13 +98,13 @@ int ExpectMatchingEdges(const Block& block) {
 // By tile, as Block.
 using BlockHeights = std::array<std::array<dem::TileHeights, kSide>, kSide>;
 
-BlockHeights ReadHeights(const dem::DemSource& source, const geo::TileKey& first) {
+BlockHeights ReadHeights(const dem::ElevationModel& model, const geo::TileKey& first) {
   BlockHeights heights;
   for (int x = 0; x < kSide; ++x) {
     for (int y = 0; y < kSide; ++y) {
       const geo::TileKey key = geo::Neighbour(first, x, y);
-      if (!source.IsAvailable(key)) continue;
-      auto read = source.Read(key);
+      if (!model.IsAvailable(key)) continue;
+      auto read = model.Read(key);
       EXPECT_TRUE(read.has_value()) << geo::ToString(key);
       if (read) heights[static_cast<std::size_t>(x)][static_cast<std::size_t>(y)] = *std::move(read);
     }
@@ -132,15 +132,15 @@ TEST_P(RealTiles, MatchAndKeepTheirErrorsByEveryRule) {
   for (const tin::Criterion criterion : {tin::Criterion::kDelaunay, tin::Criterion::kDataDependent}) {
     for (const bool compact : {false, true}) {
       Dataset dataset = Open();
-      ASSERT_NE(dataset.source, nullptr);
+      ASSERT_NE(dataset.model, nullptr);
       dataset.mesh_options = {criterion, compact};
       std::vector<Dataset> datasets;
       datasets.push_back(std::move(dataset));
       const TilePipeline pipeline(std::move(datasets));
-      const dem::DemSource& source = *pipeline.datasets().front().source;
-      for (const int level : {source.max_level() - 1, source.max_level()}) {
-        const geo::TileKey first = FirstTile(source, level);
-        const BlockHeights heights = ReadHeights(source, first);
+      const dem::ElevationModel& model = *pipeline.datasets().front().model;
+      for (const int level : {model.max_level() - 1, model.max_level()}) {
+        const geo::TileKey first = FirstTile(model, level);
+        const BlockHeights heights = ReadHeights(model, first);
         for (const auto& [step, block] : FetchBlocks(pipeline, first)) {
           SCOPED_TRACE(testing::Message() << "level " << level << ", step " << step << ", criterion "
                                           << static_cast<int>(criterion) << (compact ? ", compact" : ""));

@@ -54,14 +54,14 @@ TEST_P(StatedError, IsThatOfTheBytesAlongPlumbLines) {
   std::vector<Dataset> datasets;
   datasets.push_back(OpenDataset("real", *path));
   const TilePipeline pipeline(std::move(datasets));
-  const dem::DemSource& source = *pipeline.datasets().front().source;
+  const dem::ElevationModel& model = *pipeline.datasets().front().model;
   std::mt19937 random(11);
   const int count = std::getenv("TERRACE_LONG_TESTS") != nullptr ? 300 : 4;
   int above = 0, beyond = 0, as_drawn = 0;
   for (int i = 0; i < count; ++i) {
     TileRequest request;
-    const int level = static_cast<int>(random() % static_cast<unsigned>(source.max_level() + 1));
-    const auto& ranges = source.Available(level);
+    const int level = static_cast<int>(random() % static_cast<unsigned>(model.max_level() + 1));
+    const auto& ranges = model.Available(level);
     const geo::TileRange& range = ranges[random() % ranges.size()];
     const auto within = [&](std::int64_t first, std::int64_t last) {
       return first + static_cast<std::int64_t>(random() % static_cast<unsigned>(last - first + 1));
@@ -69,7 +69,7 @@ TEST_P(StatedError, IsThatOfTheBytesAlongPlumbLines) {
     request.key = {level, within(range.start_x, range.end_x), within(range.start_y, range.end_y)};
     request.error_step = static_cast<int>(random() % 20) - 4;
     const FetchedTile tile = FetchTile(pipeline, request);
-    const auto heights = source.Read(request.key);
+    const auto heights = model.Read(request.key);
     ASSERT_TRUE(heights.has_value());
     const double planar = DecodedError(tile.mesh, *heights);
     const proto::FlatError drawn = proto::LargestFlatError({request.key, heights->lattice, heights->heights},

@@ -30,22 +30,22 @@ FetchedTile Fetch(std::uint32_t dataset, geo::TileKey key, int step) {
 }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
-  const geo::TileRange& range = SamplePipeline().datasets()[dataset].source->Available(level).front();
+  const geo::TileRange& range = SamplePipeline().datasets()[dataset].model->Available(level).front();
   return {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
 }
 
 TEST(TilePipeline, NeighboursDecodeTheSameEdges) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 6, 12, 24}) {
-      for (int level = 1; level <= SamplePipeline().datasets()[dataset].source->max_level(); level += 2) {
+      for (int level = 1; level <= SamplePipeline().datasets()[dataset].model->max_level(); level += 2) {
         const geo::TileKey key = MiddleTile(dataset, level);
         const FetchedTile tile = Fetch(dataset, key, step);
         const geo::TileKey east = geo::Neighbour(key, 1, 0), north = geo::Neighbour(key, 0, 1);
-        if (SamplePipeline().datasets()[dataset].source->IsAvailable(east)) {
+        if (SamplePipeline().datasets()[dataset].model->IsAvailable(east)) {
           EXPECT_EQ(EdgeOf(tile, true, 32767), EdgeOf(Fetch(dataset, east, step), true, 0))
               << geo::ToString(key) << " step " << step;
         }
-        if (SamplePipeline().datasets()[dataset].source->IsAvailable(north)) {
+        if (SamplePipeline().datasets()[dataset].model->IsAvailable(north)) {
           EXPECT_EQ(EdgeOf(tile, false, 32767), EdgeOf(Fetch(dataset, north, step), false, 0))
               << geo::ToString(key) << " step " << step;
         }
@@ -66,7 +66,7 @@ TEST(TilePipeline, MatchesAcrossTheAntimeridianAndAtThePoles) {
 TEST(TilePipeline, ReachesTheLadderError) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 8}) {
-      for (int level = 0; level <= SamplePipeline().datasets()[dataset].source->max_level(); ++level) {
+      for (int level = 0; level <= SamplePipeline().datasets()[dataset].model->max_level(); ++level) {
         const FetchedTile tile = Fetch(dataset, MiddleTile(dataset, level), step);
         // Heights are rounded to 2^-10 m, so the error may be half of that larger.
         EXPECT_LE(tile.encoded.max_error_m + 0x1p-11, geo::LadderError(level, step))
@@ -129,7 +129,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   };
   const auto scratch = open(0), cached = open(std::size_t{64} << 20);
   for (const std::uint32_t dataset : {0u, 1u}) {
-    for (int level = 0; level <= SamplePipeline().datasets()[dataset].source->max_level(); level += 3) {
+    for (int level = 0; level <= SamplePipeline().datasets()[dataset].model->max_level(); level += 3) {
       TileRequest request;
       request.dataset = dataset;
       request.key = MiddleTile(dataset, level);
@@ -151,7 +151,7 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
 }
 
 // A raster on the lattice of level 5: cliffs in tile 32/16, flat ground east of it.
-std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) {
+std::unique_ptr<dem::ElevationModel> OpenCliffs(const std::filesystem::path& folder) {
   constexpr double kStep = 5.625 / 256;
   constexpr int kColumns = 516, kRows = 260;
   const std::string path = folder / "cliffs.img";
@@ -171,7 +171,7 @@ std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) 
       << "\nbands = 1\ndata type = 4\ninterleave = bsq\nbyte order = 0\nmap info = {Geographic Lat/Lon, 1, 1, "
       << std::setprecision(17) << -1.5 * kStep << ", " << 5.625 + 1.5 * kStep << ", " << kStep << ", " << kStep
       << ", WGS-84}\n";
-  auto source = dem::DemSource::Open(path);
+  auto source = dem::ElevationModel::Open(path);
   EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
   return source ? *std::move(source) : nullptr;
 }
@@ -180,8 +180,8 @@ std::unique_ptr<dem::DemSource> OpenCliffs(const std::filesystem::path& folder) 
 TEST(TilePipeline, MatchesEdgesOfTilesThatTheFormatCannotHold) {
   const test_support::ScratchDirectory scratch;
   std::vector<Dataset> datasets(1);
-  datasets[0].source = OpenCliffs(scratch.path());
-  ASSERT_NE(datasets[0].source, nullptr);
+  datasets[0].model = OpenCliffs(scratch.path());
+  ASSERT_NE(datasets[0].model, nullptr);
   const TilePipeline pipeline(std::move(datasets));
   TileRequest request;
   request.error_step = 24;

@@ -43,7 +43,7 @@ const TilePipeline& Earth() {
   static const TilePipeline* const pipeline = [] {
     std::vector<Dataset> datasets;
     datasets.push_back(OpenSample("etopo5"));
-    auto image = dem::Imagery::Open(WriteHalves(), datasets[0].source->info().bounds);
+    auto image = dem::Imagery::Open(WriteHalves(), datasets[0].model->info().bounds);
     EXPECT_TRUE(image.has_value()) << (image ? "" : image.error().message);
     if (image) datasets[0].imagery.image = *std::move(image);
     datasets[0].attribution = "a survey";

@@ -81,9 +81,9 @@ std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
 }
 
 // `level`: the requested level. Names the smallest error for which the area can be meshed, if there is one.
-tl::unexpected<Error> TooLarge(const dem::DemSource& source, double error_fraction, const AreaRequest& area, int level,
-                               std::size_t max_samples) {
-  const auto nodes_at = [&](int at) { return NodesAt(source.LatticeOf(at), area); };
+tl::unexpected<Error> TooLarge(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
+                               int level, std::size_t max_samples) {
+  const auto nodes_at = [&](int at) { return NodesAt(model.LatticeOf(at), area); };
   int fitting = level - 1;
   while (fitting >= 0 && !ExceededLimits(nodes_at(fitting), max_samples).empty()) --fitting;
   const NodeCounts nodes = nodes_at(fitting >= 0 ? level : 0);
@@ -184,7 +184,7 @@ void DropHoles(const dem::MeshDemands& demands, int width, tin::TinMesh& mesh,
 }
 
 // Whether all tiles of a level that touch the area exist.
-bool IsCovered(const dem::DemSource& source, const AreaRequest& area, int level) {
+bool IsCovered(const dem::ElevationModel& model, const AreaRequest& area, int level) {
   constexpr std::int64_t kMaxTiles = 1 << 16;  // tiles; levels that edits have added are small
   const double side = 180.0 / static_cast<double>(geo::TileRows(level));
   const auto at = [&](double degrees) { return static_cast<std::int64_t>(std::floor(degrees / side)); };
@@ -193,7 +193,7 @@ bool IsCovered(const dem::DemSource& source, const AreaRequest& area, int level)
   if ((east - west + 1) * (north - south + 1) > kMaxTiles) return false;
   for (std::int64_t y = south; y <= north; ++y) {
     for (std::int64_t x = west; x <= east; ++x) {
-      if (!source.IsAvailable({level, (x % around + around) % around, y})) return false;
+      if (!model.IsAvailable({level, (x % around + around) % around, y})) return false;
     }
   }
   return true;
@@ -201,9 +201,9 @@ bool IsCovered(const dem::DemSource& source, const AreaRequest& area, int level)
 
 }  // namespace
 
-Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
+Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples) {
-  const dem::GeoBounds& bounds = source.info().bounds;
+  const dem::GeoBounds& bounds = model.info().bounds;
   const std::optional<AreaRequest> clipped = Clip(area, bounds);
   if (!clipped) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -212,40 +212,40 @@ Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, c
   }
   AreaPlan plan;
   const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };
-  while (plan.level < source.max_source_level() && is_coarse()) ++plan.level;
-  const auto nodes_at = [&](int level) { return NodesAt(source.LatticeOf(level), *clipped); };
+  while (plan.level < model.max_source_level() && is_coarse()) ++plan.level;
+  const auto nodes_at = [&](int level) { return NodesAt(model.LatticeOf(level), *clipped); };
   // Deeper levels exist around edits alone. An edit must not make an area too large.
-  plan.depends_on_limit = plan.level < source.max_level() && is_coarse();
-  while (plan.level < source.max_level() && is_coarse() &&
-         ExceededLimits(nodes_at(plan.level + 1), max_samples).empty() && IsCovered(source, *clipped, plan.level + 1)) {
+  plan.depends_on_limit = plan.level < model.max_level() && is_coarse();
+  while (plan.level < model.max_level() && is_coarse() &&
+         ExceededLimits(nodes_at(plan.level + 1), max_samples).empty() && IsCovered(model, *clipped, plan.level + 1)) {
     ++plan.level;
   }
   const NodeCounts nodes = nodes_at(plan.level);
   if (!ExceededLimits(nodes, max_samples).empty()) {
-    return TooLarge(source, error_fraction, *clipped, plan.level, max_samples);
+    return TooLarge(model, error_fraction, *clipped, plan.level, max_samples);
   }
   plan.window = nodes.Window();
   plan.centre = {(clipped->west + clipped->east) / 2, (clipped->south + clipped->north) / 2};
   return plan;
 }
 
-Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& plan, const AreaRequest& area,
+Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop) {
   const auto cancelled = [] { return MakeError(ErrorCode::kCancelled, "nobody waits for this mesh any more"); };
   EncodedTile encoded;
   encoded.refinement_use = RefinementUse::kNone;
   Clock::time_point start = Clock::now();
-  Result<std::vector<float>> heights = source.ReadNodes(plan.level, plan.window, stop);
+  Result<std::vector<float>> heights = model.ReadNodes(plan.level, plan.window, stop);
   if (!heights) return tl::unexpected(std::move(heights).error());
   encoded.times.read = MicrosecondsSince(start);
 
   start = Clock::now();
   const auto field = tin::HeightField::Make(plan.window.columns, plan.window.rows, *std::move(heights));
   TERRACE_CHECK(field.has_value());  // every height is finite, and PlanArea limits the sides
-  const AreaSurface surface(source.LatticeOf(plan.level), plan.window);
+  const AreaSurface surface(model.LatticeOf(plan.level), plan.window);
   tin::GreedyOptions options;
   if (area.coordinates != AreaCoordinates::kGeographic) surface.AddCurvature(options);
-  dem::MeshDemands demands = source.DemandsOf(plan.level, plan.window);
+  dem::MeshDemands demands = model.DemandsOf(plan.level, plan.window);
   options.limits = LimitsOf(demands);
   const tin::SampleLimits limits = options.limits;
   tin::GreedyTriangulation greedy(*field, std::move(options));

@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "proto/gltf/mesh_file.h"
 #include "tiler/tile/encoded_tile.h"
 
@@ -38,14 +38,14 @@ struct AreaPlan {
 
 // kInvalidArgument, with a message for the client: the area does not intersect the source, or needs more than
 // `max_samples`.
-Result<AreaPlan> PlanArea(const dem::DemSource& source, double error_fraction, const AreaRequest& area,
+Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 
 // Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
 // the flat triangles of the file. They are flat in the file's coordinates: in space, or for kGeographic in longitude,
-// latitude and height. Rounding to 32 bits in a GLB is not included. Errors: those of PlanArea and DemSource;
+// latitude and height. Rounding to 32 bits in a GLB is not included. Errors: those of PlanArea and ElevationModel;
 // kCancelled: stopped.
-Result<EncodedTile> BuildAreaMesh(const dem::DemSource& source, const AreaPlan& plan, const AreaRequest& area,
+Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 
 }  // namespace terrace::tiler

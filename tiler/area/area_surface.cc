@@ -131,12 +131,12 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
         error.max_m = std::max(error.max_m, off);
       }
     });
-    if (miss) error.misses.push_back(*miss);
+    if (miss) error.to_insert.push_back(*miss);
   }
   // A sample on an edge is the worst one of two triangles.
   const auto in_rows = [](tin::SamplePosition p) { return std::pair(p.y, p.x); };
-  std::ranges::sort(error.misses, {}, in_rows);
-  error.misses.erase(std::unique(error.misses.begin(), error.misses.end()), error.misses.end());
+  std::ranges::sort(error.to_insert, {}, in_rows);
+  error.to_insert.erase(std::unique(error.to_insert.begin(), error.to_insert.end()), error.to_insert.end());
   return error;
 }
 

@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/geo/lattice.h"
 #include "engine/tin/greedy.h"
@@ -30,10 +30,10 @@ class AreaSurface {
   void AddCurvature(tin::GreedyOptions& options) const;
 
   // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
-  // misses are, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border: areas
-  // have no neighbours that share it. A vertex that exceeds the bound counts with the distance from its own position.
-  // `allowed`: the bounds by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns what was
-  // measured until then.
+  // `to_insert` are, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border:
+  // areas have no neighbours that share it. A vertex that exceeds the bound counts with the distance from its own
+  // position. `allowed`: the bounds by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns
+  // what was measured until then.
   proto::TileError MeasureError(const tin::HeightField& field, const tin::TinMesh& mesh,
                                 const std::vector<geo::Vec3>& ecef, double bound_m, std::span<const float> allowed,
                                 const std::stop_token& stop) const;

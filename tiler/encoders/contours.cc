@@ -12,7 +12,7 @@ Result<void> MakeContoursTile(const EncoderInput& input, EncodedTile& encoded, c
   encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, kSidesPx[0], kContourMargin);
-  const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kSource, stop);
+  const auto heights = ReadMapHeights(*input.dataset.model, window, dem::HeightDatum::kSource, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);
   start = std::chrono::steady_clock::now();

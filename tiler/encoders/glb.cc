@@ -36,12 +36,12 @@ std::vector<geo::Vec3> RoundedNormals(std::vector<geo::Vec3> normals) {
 }
 
 struct MeshedGlb {
-  proto::GridMesh mesh;                  // with normals and skirts
-  double max_error_m = 0;                // of the flat triangles, measured on the grid points
-  double surface_error_m = 0;            // the same everywhere, not only at the lattice's samples
-  std::chrono::microseconds replayed{};  // duration of ReplayMesh
-  tin::TinMesh tin;                      // without skirts
-  std::vector<geo::Vec3> positions;      // of its vertices
+  proto::GridMesh mesh;                     // with normals and skirts
+  double max_error_m = 0;                   // of the flat triangles, measured on the grid points
+  double surface_error_m = 0;               // the same everywhere, not only at the lattice's samples
+  std::chrono::microseconds replay_time{};  // of ReplayMesh
+  tin::TinMesh tin;                         // without skirts
+  std::vector<geo::Vec3> positions;         // of its vertices
 };
 
 // Takes the mesh of the tile's quantized-mesh form at the same error, and rounds its vertices to the grid of
@@ -49,33 +49,33 @@ struct MeshedGlb {
 // do not change: they are refined to 15/16 of the error, and the grid's rounding takes less than the rest.
 // `refinement`: as for MeshTile. `skirt_error_m`: determines the depth of skirts (proto/mesh/skirt.h), as in tilesets.
 // kCancelled: stopped.
-Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& lattice, const tin::Refinement& refinement,
+Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samples, const tin::Refinement& refinement,
                           double wanted_error_m, double skirt_error_m, proto::PositionWidth width,
                           const std::stop_token& stop) {
   const Clock::time_point start = Clock::now();
   Result<ReplayedMesh> replayed =
-      ReplayMesh(*dataset.source, lattice, refinement, dataset.mesh_options, wanted_error_m, stop);
+      ReplayMesh(*dataset.model, samples, refinement, dataset.mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());
   MeshedGlb meshed;
-  meshed.replayed = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
+  meshed.replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
 
   tin::TinMesh& mesh = replayed->mesh;
-  const tin::SampleLimits limits = LimitsOf(*dataset.source, lattice.key);
+  const tin::SampleLimits limits = LimitsOf(*dataset.model, samples.key);
   std::vector<float> allowed = AllowedErrors(limits, replayed->error_m);
   double min_m = wanted_error_m;
   for (const float error_m : allowed) min_m = std::min(min_m, static_cast<double>(error_m));
-  proto::GridSteps steps(lattice.lattice, EdgeErrorsOf(*dataset.source, lattice.key, limits, wanted_error_m), min_m,
+  proto::GridSteps steps(samples.lattice, EdgeErrorsOf(*dataset.model, samples.key, limits, wanted_error_m), min_m,
                          width);
   double& step_m = steps.inside;
-  const double depth_m = proto::SkirtDepth(lattice.key.level, skirt_error_m);
-  proto::TileErrorMeter meter(lattice, replayed->error_m, std::move(allowed));
+  const double depth_m = proto::SkirtDepth(samples.key.level, skirt_error_m);
+  proto::TileErrorMeter meter(samples, replayed->error_m, std::move(allowed));
   std::vector<proto::GridPoint> points;
   std::vector<geo::Vec3> positions;
   const auto measure = [&](const tin::TinMesh& candidate) {
-    points = proto::SnapVertices(lattice, candidate, steps);
+    points = proto::SnapVertices(samples, candidate, steps);
     while (!proto::FitsFloats(points, step_m, depth_m)) {
       steps.Double();
-      points = proto::SnapVertices(lattice, candidate, steps);
+      points = proto::SnapVertices(samples, candidate, steps);
     }
     positions = proto::GridPositions(points, step_m);
     return meter.MeasureFlat(candidate, positions);
@@ -83,10 +83,10 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::LatticeView& latt
   const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
   if (!error) return tl::unexpected(error.error());
   meshed.max_error_m = error->max_m;
-  meshed.surface_error_m = proto::MeasureFlatSurfaceError(lattice, mesh, positions, error->max_m);
+  meshed.surface_error_m = proto::MeasureFlatSurfaceError(samples, mesh, positions, error->max_m);
   meshed.mesh =
-      proto::MakeGridMesh(lattice, mesh, points, RoundedNormals(proto::VertexNormals(lattice, mesh, positions)), step_m,
-                          depth_m, TrianglesInHoles(*dataset.source, lattice.key, mesh));
+      proto::MakeGridMesh(samples, mesh, points, RoundedNormals(proto::VertexNormals(samples, mesh, positions)), step_m,
+                          depth_m, TrianglesInHoles(*dataset.model, samples.key, mesh));
   meshed.tin = std::move(mesh);
   meshed.positions = std::move(positions);
   return meshed;
@@ -112,13 +112,13 @@ Result<void> AddTexture(const ImageryOptions& imagery, const TileRequest& reques
 
 Result<MeshedGlb> MeshGlb(const EncoderInput& input, const std::stop_token& stop) {
   const auto& [dataset, request, refined, error_m] = input;
-  const bool is_deepest = request.key.level >= dataset.source->max_source_level();
+  const bool is_deepest = request.key.level >= dataset.model->max_source_level();
   const double skirt_error_m =
       proto::SkirtError(request.key.level, request.error_step, is_deepest, dataset.error_fraction);
-  proto::LatticeView lattice = input.lattice();
-  const proto::LatticeAngles angles(lattice);
-  lattice.angles = &angles;
-  return MeshGlb(dataset, lattice, refined->refinement, error_m, skirt_error_m, proto::WidthOf(request.compression),
+  proto::TileSamples samples = input.samples();
+  const proto::LatticeAngles angles(samples);
+  samples.angles = &angles;
+  return MeshGlb(dataset, samples, refined->refinement, error_m, skirt_error_m, proto::WidthOf(request.compression),
                  stop);
 }
 
@@ -128,11 +128,11 @@ Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_tok
   Result<MeshedGlb> meshed = MeshGlb(input, stop);
   if (!meshed) return tl::unexpected(std::move(meshed).error());
   DrawnTriangles drawn;
-  const double cells = input.lattice().cells();
+  const double cells = input.samples().cells();
   for (const tin::SamplePosition& vertex : meshed->tin.vertices)
     drawn.places.push_back({vertex.x / cells, vertex.y / cells});
   drawn.positions = std::move(meshed->positions);
-  drawn.in_hole = TrianglesInHoles(*input.dataset.source, input.request.key, meshed->tin);
+  drawn.in_hole = TrianglesInHoles(*input.dataset.model, input.request.key, meshed->tin);
   drawn.triangles = std::move(meshed->tin.triangles);
   return drawn;
 }
@@ -153,8 +153,8 @@ Result<void> MakeGlbTile(const EncoderInput& input, EncodedTile& encoded, const 
   Result<proto::GlbTile> glb = proto::EncodeGlb(meshed->mesh, options);
   if (!glb) return tl::unexpected(std::move(glb).error());
   encoded.bytes = std::move(glb->bytes);
-  encoded.times.refine += meshed->replayed;
-  encoded.times.encode = MicrosecondsSince(start) - meshed->replayed;
+  encoded.times.refine += meshed->replay_time;
+  encoded.times.encode = MicrosecondsSince(start) - meshed->replay_time;
   encoded.max_error_m = meshed->max_error_m;
   encoded.certified_error_m = options.certified_error_m;
   encoded.vertices = glb->vertices;

@@ -30,12 +30,12 @@ Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, 
   const Dataset& dataset = input.dataset;
   const TileRequest& request = input.request;
   const MapWindow window(request.key, request.side_px, /*margin=*/0);
-  if (window.depth > dataset.source->info().max_mercator_depth) {
+  if (window.depth > dataset.model->info().max_mercator_depth) {
     return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));
   }
   encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
-  const Result<std::vector<float>> heights = dataset.source->ReadMercator(window.depth, window.nodes, stop);
+  const Result<std::vector<float>> heights = dataset.model->ReadMercator(window.depth, window.nodes, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);
 

@@ -19,7 +19,7 @@ Result<std::vector<Gradient>> ReadGradients(const EncoderInput& input, EncodedTi
   encoded.refinement_use = RefinementUse::kNone;
   const auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, input.request.side_px, kReliefMargin);
-  const auto heights = ReadMapHeights(*input.dataset.source, window, dem::HeightDatum::kEllipsoid, stop);
+  const auto heights = ReadMapHeights(*input.dataset.model, window, dem::HeightDatum::kEllipsoid, stop);
   if (!heights) return tl::unexpected(heights.error());
   encoded.times.read = MicrosecondsSince(start);
   return GradientsOf(*heights, window);

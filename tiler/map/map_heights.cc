@@ -18,10 +18,10 @@ MapWindow::MapWindow(const geo::TileKey& key, int size_of_tile, int margin_of_ti
   nodes = {key.x * size - margin, north, size + 2 * margin, static_cast<int>(south - north)};
 }
 
-Result<MapHeights> ReadMapHeights(const dem::DemSource& source, const MapWindow& window, dem::HeightDatum datum,
+Result<MapHeights> ReadMapHeights(const dem::ElevationModel& model, const MapWindow& window, dem::HeightDatum datum,
                                   const std::stop_token& stop) {
-  if (window.depth > source.info().max_mercator_depth) return MakeError(ErrorCode::kNotFound, "no such tile");
-  auto read = source.ReadKnownMercator(window.depth, window.nodes, datum, stop);
+  if (window.depth > model.info().max_mercator_depth) return MakeError(ErrorCode::kNotFound, "no such tile");
+  auto read = model.ReadKnownMercator(window.depth, window.nodes, datum, stop);
   if (!read) return tl::unexpected(read.error());
   MapHeights map;
   map.side = window.size + 2 * window.margin;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 
 namespace terrace::tiler {
@@ -32,8 +32,8 @@ struct MapHeights {
   }
 };
 
-// Errors: those of DemSource::ReadKnownMercator, and kNotFound: deeper than the dataset's max_mercator_depth.
-Result<MapHeights> ReadMapHeights(const dem::DemSource& source, const MapWindow& window, dem::HeightDatum datum,
+// Errors: those of ElevationModel::ReadKnownMercator, and kNotFound: deeper than the dataset's max_mercator_depth.
+Result<MapHeights> ReadMapHeights(const dem::ElevationModel& model, const MapWindow& window, dem::HeightDatum datum,
                                   const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -11,8 +11,8 @@
 
 namespace terrace::tiler {
 
-tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key) {
-  return LimitsOf(source.DemandsOf(key));
+tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key) {
+  return LimitsOf(model.DemandsOf(key));
 }
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
@@ -51,12 +51,12 @@ void AddOwnErrors(const tin::SampleLimits& limits, int cells, double error_m, pr
 
 }  // namespace
 
-proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
-                               double error_m) {
+proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::TileKey& key,
+                               const tin::SampleLimits& limits, double error_m) {
   proto::EdgeErrors errors(error_m);
-  if (source.EditsHash(key) == 0) return errors;
-  AddOwnErrors(limits, source.LatticeOf(key.level).cells, error_m, errors);
-  const auto beyond = source.DemandsBeyondCorners(key);
+  if (model.EditsHash(key) == 0) return errors;
+  AddOwnErrors(limits, model.LatticeOf(key.level).cells, error_m, errors);
+  const auto beyond = model.DemandsBeyondCorners(key);
   for (std::size_t corner = 0; corner < 4; ++corner) {
     // Side k runs from corner k to corner k + 1.
     double& least_m = errors.corner[corner];
@@ -72,9 +72,9 @@ proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey&
   return errors;
 }
 
-std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
+std::vector<std::uint8_t> TrianglesInHoles(const dem::ElevationModel& model, const geo::TileKey& key,
                                            const tin::TinMesh& mesh) {
-  return TrianglesInHoles(source.DemandsOf(key), source.LatticeOf(key.level).cells + 1, mesh);
+  return TrianglesInHoles(model.DemandsOf(key), model.LatticeOf(key.level).cells + 1, mesh);
 }
 
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh) {

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/sample_limits.h"
@@ -13,7 +13,7 @@
 namespace terrace::tiler {
 
 // The limits that edits set for the samples of a tile; empty: none. Depends on the edits and the key, not on heights.
-tin::SampleLimits LimitsOf(const dem::DemSource& source, const geo::TileKey& key);
+tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey& key);
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands);
 
@@ -23,12 +23,12 @@ std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m
 // The smallest allowed error on each side of a tile of this error, and on the edges that meet at each corner: the
 // height of a corner counts for the samples on all edges that end there. Neighbours have equal values for shared sides
 // and corners. On a pole they are `error_m`. `limits`: of the tile.
-proto::EdgeErrors EdgeErrorsOf(const dem::DemSource& source, const geo::TileKey& key, const tin::SampleLimits& limits,
-                               double error_m);
+proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::TileKey& key,
+                               const tin::SampleLimits& limits, double error_m);
 
 // Whether a triangle is left out, for each triangle; empty: none is. A triangle is in a hole if each node that it
 // covers, corners included, is in the hole or forced (MeshDemands), and at least one is in the hole.
-std::vector<std::uint8_t> TrianglesInHoles(const dem::DemSource& source, const geo::TileKey& key,
+std::vector<std::uint8_t> TrianglesInHoles(const dem::ElevationModel& model, const geo::TileKey& key,
                                            const tin::TinMesh& mesh);
 // The same for a field of `width` nodes a row.
 std::vector<std::uint8_t> TrianglesInHoles(const dem::MeshDemands& demands, int width, const tin::TinMesh& mesh);

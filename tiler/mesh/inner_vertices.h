@@ -2,7 +2,7 @@
 #pragma once
 
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/lattice_view.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::tiler {
 
@@ -11,6 +11,6 @@ namespace terrace::tiler {
 // edges and at least half of the normals do not fit the triangles, this function inserts about as many vertices as the
 // edges have, on a grid of lattice nodes inside. Their normals follow the triangles
 // (docs/decisions/0003-normals-inside-follow-the-mesh.md). Edges do not change.
-tin::TinMesh WithInnerVertices(const proto::LatticeView& lattice, tin::TinMesh mesh);
+tin::TinMesh WithInnerVertices(const proto::TileSamples& samples, tin::TinMesh mesh);
 
 }  // namespace terrace::tiler

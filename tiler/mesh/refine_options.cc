@@ -25,11 +25,11 @@ double GridSagitta(int level, int divisions) {
   return side * side / (4 * geo::kSmallestRadius);
 }
 
-tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
-  const double step = lattice.lattice.StepDegrees();
+tin::Curvature MakeCurvature(const proto::TileSamples& samples) {
+  const double step = samples.lattice.StepDegrees();
   tin::Curvature curvature;
   std::vector<double> latitudes;
-  for (int j = 0; j <= lattice.cells(); ++j) latitudes.push_back(lattice.Latitude(j));
+  for (int j = 0; j <= samples.cells(); ++j) latitudes.push_back(samples.Latitude(j));
   for (const geo::SinCos& latitude : geo::RoundedSinCosOf(latitudes)) {
     const double east = geo::MetresPerDegreeEast(latitude) * step;
     curvature.east_m2.push_back(east * east);
@@ -50,32 +50,32 @@ tin::Curvature MakeCurvature(const proto::LatticeView& lattice) {
 // Triangles with a sagitta above half of the error leave too little of the error for relief. Therefore the next finer
 // grid is due when the error falls below twice their sagitta. Insertion then has triangles that are small enough to
 // select samples by relief.
-std::vector<tin::SeedGrid> MakeSeedGrids(const proto::LatticeView& lattice) {
+std::vector<tin::SeedGrid> MakeSeedGrids(const proto::TileSamples& samples) {
   std::vector<tin::SeedGrid> grids;
-  for (int divisions = 2; divisions <= lattice.cells() / 2; divisions *= 2) {
-    grids.push_back({2 * GridSagitta(lattice.key.level, divisions / 2), lattice.cells() / divisions});
+  for (int divisions = 2; divisions <= samples.cells() / 2; divisions *= 2) {
+    grids.push_back({2 * GridSagitta(samples.key.level, divisions / 2), samples.cells() / divisions});
   }
   return grids;
 }
 
 // Half the second difference of the ground along an edge, per sample squared.
-double BorderSagitta(const proto::LatticeView& lattice, tin::Side side) {
-  const double step = geo::ToRadians(lattice.lattice.StepDegrees());
+double BorderSagitta(const proto::TileSamples& samples, tin::Side side) {
+  const double step = geo::ToRadians(samples.lattice.StepDegrees());
   if (side == tin::Side::kEast || side == tin::Side::kWest) return step * step * geo::kLargestRadius / 2;
-  const double latitude = lattice.Latitude(side == tin::Side::kSouth ? 0 : lattice.cells());
+  const double latitude = samples.Latitude(side == tin::Side::kSouth ? 0 : samples.cells());
   const double cosine = geo::SurfaceNormal(0, latitude).x;
   return step * step * geo::PrimeVerticalRadius(latitude) * cosine * cosine / 2;
 }
 
 // The error of an edge from the rounding of positions: half a unit times its steepest slope.
-double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
-  const int cells = lattice.cells();
+double PositionRounding(const proto::TileSamples& samples, tin::Side side) {
+  const int cells = samples.cells();
   const bool along_x = side == tin::Side::kSouth || side == tin::Side::kNorth;
   const int fixed = side == tin::Side::kSouth || side == tin::Side::kWest ? 0 : cells;
   double steepest = 0;
   for (int k = 0; k < cells; ++k) {
-    const double a = along_x ? lattice.At(k, fixed) : lattice.At(fixed, k);
-    const double b = along_x ? lattice.At(k + 1, fixed) : lattice.At(fixed, k + 1);
+    const double a = along_x ? samples.At(k, fixed) : samples.At(fixed, k);
+    const double b = along_x ? samples.At(k + 1, fixed) : samples.At(fixed, k + 1);
     steepest = std::max(steepest, std::abs(b - a));
   }
   return steepest * cells / (2.0 * proto::kQuantizedMax);
@@ -86,47 +86,48 @@ double PositionRounding(const proto::LatticeView& lattice, tin::Side side) {
 // Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
 // error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
 // second.
-tin::GreedyOptions BaseRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed) {
+tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& needed) {
   tin::GreedyOptions options;
-  options.curvature = MakeCurvature(lattice);
-  options.seeds = MakeSeedGrids(lattice);
+  options.curvature = MakeCurvature(samples);
+  options.seeds = MakeSeedGrids(samples);
   options.record = true;
   for (const tin::Side side : {tin::Side::kSouth, tin::Side::kEast, tin::Side::kNorth, tin::Side::kWest}) {
     tin::BorderOptions& border = options.borders[static_cast<std::size_t>(side)];
     border.weight = 16.0 / 15;
-    border.padding_m = PositionRounding(lattice, side);
-    border.rounding = lattice.cells() / (2.0 * proto::kQuantizedMax);
+    border.padding_m = PositionRounding(samples, side);
+    border.rounding = samples.cells() / (2.0 * proto::kQuantizedMax);
     border.step_m = needed.Coarsest(side) / 2;
-    border.sagitta_m = BorderSagitta(lattice, side);
+    border.sagitta_m = BorderSagitta(samples, side);
   }
   return options;
 }
 
-proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, const proto::EdgeErrors& errors) {
+proto::EdgeSteps EdgeStepsOf(const dem::ElevationModel& model, const geo::TileKey& key,
+                             const proto::EdgeErrors& errors) {
   const std::int64_t rows = geo::TileRows(key.level);
   std::array<std::array<double, 3>, 3> needed{};
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
       const geo::TileKey neighbour = geo::Neighbour(key, dx, dy);
       if (neighbour.y < 0 || neighbour.y >= rows) continue;
-      const dem::HeightRange range = source.RangeBound(neighbour);
+      const dem::HeightRange range = model.RangeBound(neighbour);
       needed[static_cast<std::size_t>(dy + 1)][static_cast<std::size_t>(dx + 1)] =
           proto::NeededStep(range.min, range.max);
     }
   }
-  const dem::DemInfo& info = source.info();
+  const dem::DemInfo& info = model.info();
   const double pole_step =
       proto::NeededStep(std::min(info.heights.min, info.floor), std::max(info.heights.max, info.floor));
   return proto::MakeEdgeSteps(errors, needed, pole_step, key.y == 0, key.y == rows - 1);
 }
 
-tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
+tin::GreedyOptions RefineOptionsOf(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                    tin::Criterion criterion) {
   const proto::EdgeErrors none(proto::kHeightResolution);
-  tin::GreedyOptions plan = BaseRefineOptions(lattice, EdgeStepsOf(source, lattice.key, none));
-  plan.criterion = criterion;
-  plan.limits = LimitsOf(source, lattice.key);
-  return plan;
+  tin::GreedyOptions options = BaseRefineOptions(samples, EdgeStepsOf(model, samples.key, none));
+  options.criterion = criterion;
+  options.limits = LimitsOf(model, samples.key);
+  return options;
 }
 
 }  // namespace terrace::tiler

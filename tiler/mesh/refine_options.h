@@ -4,21 +4,22 @@
 // every error (engine/tin/refinement.h).
 #pragma once
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/tin/greedy.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/edge_steps.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::tiler {
 
 // `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
-tin::GreedyOptions BaseRefineOptions(const proto::LatticeView& lattice, const proto::EdgeSteps& needed);
+tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& needed);
 
 // Height steps of a tile's edges for these errors, equal for both tiles that share an edge.
-proto::EdgeSteps EdgeStepsOf(const dem::DemSource& source, const geo::TileKey& key, const proto::EdgeErrors& errors);
+proto::EdgeSteps EdgeStepsOf(const dem::ElevationModel& model, const geo::TileKey& key,
+                             const proto::EdgeErrors& errors);
 
 // BaseRefineOptions with the criterion and the limits of edits.
-tin::GreedyOptions RefineOptionsOf(const dem::DemSource& source, const proto::LatticeView& lattice,
+tin::GreedyOptions RefineOptionsOf(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                    tin::Criterion criterion);
 
 }  // namespace terrace::tiler

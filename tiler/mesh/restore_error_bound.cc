@@ -7,14 +7,14 @@ namespace terrace::tiler {
 namespace {
 
 // Every round but the last inserts a sample.
-Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
-                                      const std::stop_token& stop) {
+Result<proto::TileError> InsertUntilBoundHolds(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
+                                               const std::stop_token& stop) {
   tin::SampleInserter inserter;
   for (;;) {
     if (stop.stop_requested()) return Cancelled();
-    proto::TileError error = measure(mesh);
-    if (error.misses.empty() || mesh.vertices.size() + error.misses.size() > max_vertices) return error;
-    inserter.InsertInto(mesh, error.misses);
+    proto::TileError measured = measure(mesh);
+    if (measured.to_insert.empty() || mesh.vertices.size() + measured.to_insert.size() > max_vertices) return measured;
+    inserter.InsertInto(mesh, measured.to_insert);
   }
 }
 
@@ -25,10 +25,10 @@ Result<proto::TileError> InsertMisses(tin::TinMesh& mesh, const MeasureMesh& mea
 // is made Delaunay.
 Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,
                                            const std::stop_token& stop) {
-  Result<proto::TileError> error = InsertMisses(mesh, measure, max_vertices, stop);
-  if (!error || !error->is_cut_through) return error;
+  Result<proto::TileError> measured = InsertUntilBoundHolds(mesh, measure, max_vertices, stop);
+  if (!measured || !measured->is_cut_through) return measured;
   mesh = tin::DelaunayOf(mesh);
-  return InsertMisses(mesh, measure, max_vertices, stop);
+  return InsertUntilBoundHolds(mesh, measure, max_vertices, stop);
 }
 
 }  // namespace terrace::tiler

@@ -14,12 +14,12 @@ namespace terrace::tiler {
 // Rounds the vertices of a mesh as its format does, and measures the decoded mesh.
 using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 
-// Inserts the misses of `measure` until all samples keep the bound. Returns the measurement of the final mesh. The
-// largest error exceeds the bound only
+// Inserts the samples that `measure` names (TileError::to_insert) until all samples keep the bound. Returns the
+// measurement of the final mesh. The largest error exceeds the bound only
 // - at vertices whose rounded positions are not those of their samples, if all neighbouring samples are vertices: by
 //   the change of the ground over that offset;
 // - by the format's rounding of heights;
-// - on the edges of tiles, where `measure` finds no misses because neighbours share them;
+// - on the edges of tiles, where `measure` names no samples because neighbours share them;
 // - if the mesh would need more than `max_vertices`.
 // kCancelled: stopped.
 Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,

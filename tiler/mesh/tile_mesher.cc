@@ -25,19 +25,19 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // Quantizes, and inserts the samples that quantization pushed over the bound.
-Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, const proto::EdgeSteps& steps,
+Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::TileSamples& samples, const proto::EdgeSteps& steps,
                           const tin::SampleLimits& limits, double error_m, const std::stop_token& stop) {
-  proto::TileErrorMeter meter(lattice, error_m, AllowedErrors(limits, error_m));
+  proto::TileErrorMeter meter(samples, error_m, AllowedErrors(limits, error_m));
   MeshedTile meshed;
   const auto measure = [&](const tin::TinMesh& candidate) {
-    meshed.tile = proto::QuantizeTile(lattice, candidate, steps);
+    meshed.tile = proto::QuantizeTile(samples, candidate, steps);
     return meter.Measure(meshed.tile);
   };
-  const Result<proto::TileError> error = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
-  if (!error) return tl::unexpected(error.error());
-  meshed.max_error_m = error->max_m;
+  const Result<proto::TileError> measured = RestoreErrorBound(mesh, measure, proto::kMaxTileVertices, stop);
+  if (!measured) return tl::unexpected(measured.error());
+  meshed.max_error_m = measured->max_m;
   meshed.positions = meter.positions();
-  meshed.surface_error_m = proto::MeasureSurfaceError(lattice, meshed.tile, meshed.positions, error->max_m);
+  meshed.surface_error_m = proto::MeasureSurfaceError(samples, meshed.tile, meshed.positions, measured->max_m);
   meshed.mesh = std::move(mesh);
   return meshed;
 }
@@ -46,10 +46,10 @@ Result<MeshedTile> Finish(tin::TinMesh mesh, const proto::LatticeView& lattice, 
 // `scale`, a power of two, doubles until the vertices suffice. Edges do not depend on the inside: they keep the
 // threshold of the requested error and its seeds exactly, because scaling by a power of two is exact. `error_m`: the
 // requested error; becomes the error that was reached inside.
-Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& plan, double scale,
+Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin::GreedyOptions& unscaled, double scale,
                                         double& error_m, const std::stop_token& stop) {
   for (;; scale *= 2) {
-    tin::GreedyOptions options = plan;
+    tin::GreedyOptions options = unscaled;
     options.record = false;
     for (tin::BorderOptions& border : options.borders) border.scale = scale;
     options.limits_scale = scale;
@@ -67,14 +67,14 @@ Result<tin::TinMesh> RefineWithinFormat(const tin::HeightField& field, const tin
 
 // The drop pass uses its whole bound, and samples that quantization pushes over it would be inserted again. Therefore a
 // 32nd of the bound is reserved for quantization.
-Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& plan,
+Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& mesh, const tin::GreedyOptions& greedy,
                              double error_m, const std::stop_token& stop) {
   std::vector<std::uint16_t> quantized;
   for (int i = 0; i < field.width(); ++i) quantized.push_back(proto::QuantizedPosition(i, field.width() - 1));
   tin::DropOptions options;
   options.max_error = error_m * 31 / 32;
-  options.curvature = plan.curvature;
-  if (!plan.limits.empty()) options.limits = &plan.limits;
+  options.curvature = greedy.curvature;
+  if (!greedy.limits.empty()) options.limits = &greedy.limits;
   options.quantized_columns = quantized;
   options.quantized_rows = quantized;
   std::optional<tin::TinMesh> dropped = tin::DropVertices(field, mesh, options, stop);
@@ -86,12 +86,12 @@ Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& 
 
 tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
 
-tin::HeightField FieldOf(const proto::LatticeView& lattice) {
-  const int side = lattice.cells() + 1;
+tin::HeightField FieldOf(const proto::TileSamples& samples) {
+  const int side = samples.cells() + 1;
   std::vector<float> heights;
   heights.reserve(static_cast<std::size_t>(side) * static_cast<std::size_t>(side));
   for (int j = 0; j < side; ++j) {
-    const float* const row = lattice.heights.data() + (j + 1) * (side + 2) + 1;  // within the halo
+    const float* const row = samples.heights.data() + (j + 1) * (side + 2) + 1;  // within the halo
     heights.insert(heights.end(), row, row + side);
   }
   auto field = tin::HeightField::Make(side, side, std::move(heights));
@@ -99,44 +99,44 @@ tin::HeightField FieldOf(const proto::LatticeView& lattice) {
   return *std::move(field);
 }
 
-Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                 const tin::Refinement& refinement, const MeshOptions& mesh_options,
                                 double wanted_error_m, const std::stop_token& stop) {
   double error_m = wanted_error_m;
   Result<tin::TinMesh> mesh =
       refinement.vertex_count() <= proto::kMaxTileVertices
           ? refinement.MeshAt(error_m)
-          : RefineWithinFormat(FieldOf(lattice), RefineOptionsOf(source, lattice, mesh_options.criterion), 2, error_m,
+          : RefineWithinFormat(FieldOf(samples), RefineOptionsOf(model, samples, mesh_options.criterion), 2, error_m,
                                stop);
   if (mesh && mesh_options.compact) {
-    mesh = Compact(FieldOf(lattice), *mesh, RefineOptionsOf(source, lattice, mesh_options.criterion), error_m, stop);
+    mesh = Compact(FieldOf(samples), *mesh, RefineOptionsOf(model, samples, mesh_options.criterion), error_m, stop);
   }
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  return ReplayedMesh{WithInnerVertices(lattice, *std::move(mesh)), error_m};
+  return ReplayedMesh{WithInnerVertices(samples, *std::move(mesh)), error_m};
 }
 
-Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
                             const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop) {
-  const tin::SampleLimits limits = LimitsOf(source, lattice.key);
+  const tin::SampleLimits limits = LimitsOf(model, samples.key);
   const proto::EdgeSteps steps =
-      EdgeStepsOf(source, lattice.key, EdgeErrorsOf(source, lattice.key, limits, wanted_error_m));
+      EdgeStepsOf(model, samples.key, EdgeErrorsOf(model, samples.key, limits, wanted_error_m));
   const Clock::time_point start = Clock::now();
-  Result<ReplayedMesh> replayed = ReplayMesh(source, lattice, refinement, mesh_options, wanted_error_m, stop);
+  Result<ReplayedMesh> replayed = ReplayMesh(model, samples, refinement, mesh_options, wanted_error_m, stop);
   if (!replayed) return tl::unexpected(std::move(replayed).error());
   double error_m = replayed->error_m;
   const auto replay_time = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - start);
-  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), lattice, steps, limits, error_m, stop);
-  if (meshed) meshed->replayed = replay_time;
+  Result<MeshedTile> meshed = Finish(std::move(replayed->mesh), samples, steps, limits, error_m, stop);
+  if (meshed) meshed->replay_time = replay_time;
   if (!meshed || proto::AllCounterClockwise(meshed->tile)) return meshed;
 
   error_m = wanted_error_m;
   Result<tin::TinMesh> mesh = RefineWithinFormat(
-      FieldOf(lattice), RefineOptionsOf(source, lattice, tin::Criterion::kDelaunay), 1, error_m, stop);
+      FieldOf(samples), RefineOptionsOf(model, samples, tin::Criterion::kDelaunay), 1, error_m, stop);
   if (!mesh) return tl::unexpected(std::move(mesh).error());
-  meshed = Finish(*std::move(mesh), lattice, steps, limits, error_m, stop);
+  meshed = Finish(*std::move(mesh), samples, steps, limits, error_m, stop);
   if (meshed && !proto::AllCounterClockwise(meshed->tile)) {
-    return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(lattice.key));
+    return MakeError(ErrorCode::kInternal, "{}: a triangle turned over", geo::ToString(samples.key));
   }
   return meshed;
 }

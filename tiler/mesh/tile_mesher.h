@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/greedy.h"
 #include "engine/tin/mesh/height_field.h"
 #include "engine/tin/mesh/tin_mesh.h"
 #include "engine/tin/refinement.h"
-#include "proto/lattice_view.h"
 #include "proto/mesh/quantized_mesh.h"
+#include "proto/tile_samples.h"
 
 namespace terrace::tiler {
 
@@ -26,10 +26,10 @@ struct MeshOptions {
 struct MeshedTile {
   tin::TinMesh mesh;
   proto::QuantizedTile tile;
-  std::vector<geo::Vec3> positions;      // of its vertices, ECEF
-  double max_error_m = 0;                // measured on the encoded integers
-  double surface_error_m = 0;            // also between the lattice's samples
-  std::chrono::microseconds replayed{};  // duration of ReplayMesh
+  std::vector<geo::Vec3> positions;         // of its vertices, ECEF
+  double max_error_m = 0;                   // measured on the encoded integers
+  double surface_error_m = 0;               // also between the lattice's samples
+  std::chrono::microseconds replay_time{};  // of ReplayMesh
 };
 
 struct ReplayedMesh {
@@ -42,13 +42,12 @@ struct ReplayedMesh {
 tl::unexpected<Error> Cancelled();
 
 // The samples of a tile without the halo.
-tin::HeightField FieldOf(const proto::LatticeView& lattice);
+tin::HeightField FieldOf(const proto::TileSamples& samples);
 
-// Makes the mesh for the error: replays the refinement, or, if that has more vertices than the format allows, inserts
-// anew at a larger error inside. Then the drop pass, if the options ask for it, and WithInnerVertices. The mesh is not
-// quantized yet.
-// `refinement` as for MeshTile. kCancelled: stopped.
-Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::LatticeView& lattice,
+// Makes the mesh for the error: replays the refinement or, if that mesh has more vertices than the format allows,
+// inserts anew with a larger error inside the tile but not on its edges. Then the drop pass, if the options ask for it,
+// and WithInnerVertices. The mesh is not quantized yet. `refinement` as for MeshTile. kCancelled: stopped.
+Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                 const tin::Refinement& refinement, const MeshOptions& mesh_options,
                                 double wanted_error_m, const std::stop_token& stop);
 
@@ -56,7 +55,7 @@ Result<ReplayedMesh> ReplayMesh(const dem::DemSource& source, const proto::Latti
 // run with RefineOptionsOf to this error or a finer one, or until the format's vertex limit; in that case the inside is
 // coarser than requested and the edges are not. If quantization would flip a triangle, the tile is refined
 // anew by the Delaunay criterion, without drop pass and WithInnerVertices. kCancelled: stopped.
-Result<MeshedTile> MeshTile(const dem::DemSource& source, const proto::LatticeView& lattice,
+Result<MeshedTile> MeshTile(const dem::ElevationModel& model, const proto::TileSamples& samples,
                             const tin::Refinement& refinement, const MeshOptions& mesh_options, double wanted_error_m,
                             const std::stop_token& stop);
 

@@ -24,7 +24,7 @@ struct BakedExtent {
   double floor_m = 0;
   bool has_datum = true;
   std::size_t sources = 0;   // number of sources of the baked dataset
-  int max_source_level = 0;  // of the baked dataset without edits (dem::DemSource::max_source_level)
+  int max_source_level = 0;  // of the baked dataset without edits (dem::ElevationModel::max_source_level)
   int min_mercator_depth = 0, max_mercator_depth = 0;  // of the height tiles in the archive
   dem::GeoBounds height_tile_bounds;                   // of these tiles, within `bounds`
   bool normals = false, water_mask = false;            // extensions of quantized-mesh tiles
@@ -46,7 +46,7 @@ class BakedTiles {
   // damaged or cannot be read; the message names it.
   virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
 
-  // DemSource::RangeBound of a baked tile; for other tiles the range of the dataset.
+  // ElevationModel::RangeBound of a baked tile; for other tiles the range of the dataset.
   virtual dem::HeightRange RangeBound(const geo::TileKey& key) const = 0;
 
   // Why Find finds nothing for a request: kNotFound.

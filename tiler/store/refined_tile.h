@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <memory>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/refinement.h"
 #include "tiler/store/byte_cache.h"
@@ -28,7 +28,7 @@ using RefinedTilePtr = std::shared_ptr<const RefinedTile>;
 struct RefinedTileKey {
   std::uint64_t generation = 0;  // Dataset::cache_generation: identifies the dataset
   geo::TileKey key;
-  std::uint64_t edits = 0;  // DemSource::EditsHash
+  std::uint64_t edits = 0;  // ElevationModel::EditsHash
 
   friend bool operator==(const RefinedTileKey&, const RefinedTileKey&) = default;
 };

@@ -1,8 +1,8 @@
 // Serialization for stores that outlive the process: keys, encoded tiles, refined tiles.
 //
-// A key holds everything that its value depends on within one build of the program: the dataset's cache
-// generation, which identifies the dataset and leaves out its edits, the request, and the hash of the edits that the
-// tile depends on. The checksum detects damage, not forgery: trust the store.
+// A key holds everything that its value depends on within one build of the program: the request, the hash of the edits
+// that the tile depends on, and the dataset's cache generation, which identifies the dataset without its edits.
+// The checksum detects damage, not forgery: trust the store.
 #pragma once
 
 #include <optional>

@@ -5,7 +5,7 @@
 #include <stop_token>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tiler/surface/drawn_tiles.h"
 #include "tiler/surface/point_heights.h"
 

@@ -255,9 +255,9 @@ double TotalLength(std::span<const dem::SightRay> rays) {
 
 }  // namespace
 
-Result<void> CheckSamplesAlong(const dem::DemSource& source, std::span<const dem::SightRay> rays) {
+Result<void> CheckSamplesAlong(const dem::ElevationModel& model, std::span<const dem::SightRay> rays) {
   double spacing_m = std::numeric_limits<double>::infinity();
-  for (const dem::RasterInfo& raster : source.info().sources) spacing_m = std::min(spacing_m, raster.spacing_m);
+  for (const dem::RasterInfo& raster : model.info().sources) spacing_m = std::min(spacing_m, raster.spacing_m);
   const double samples = TotalLength(rays) / spacing_m;
   if (samples <= kMaxSamplesAlong) return {};
   return MakeError(

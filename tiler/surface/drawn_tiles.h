@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 #include "tiler/surface/drawn_mesh.h"
 

@@ -17,11 +17,11 @@ double Slope(double before, double here, double after, double reach_m) {
 
 }  // namespace
 
-Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& source,
+Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::ElevationModel& model,
                                                         std::span<const dem::GeoPosition> points,
                                                         const std::stop_token& stop) {
   double reach_m = std::numeric_limits<double>::infinity();
-  for (const dem::RasterInfo& raster : source.info().sources) reach_m = std::min(reach_m, raster.spacing_m / 2);
+  for (const dem::RasterInfo& raster : model.info().sources) reach_m = std::min(reach_m, raster.spacing_m / 2);
   constexpr std::size_t kSides = 4;  // west, east, south, north
   std::vector<dem::GeoPosition> around;
   around.reserve(points.size() * kSides);
@@ -35,9 +35,9 @@ Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::DemSource& so
     around.push_back({longitude, std::max(latitude - north, -90.0)});
     around.push_back({longitude, std::min(latitude + north, 90.0)});
   }
-  const Result<std::vector<float>> sides = source.ReadPoints(around, dem::HeightDatum::kEllipsoid, stop);
+  const Result<std::vector<float>> sides = model.ReadPoints(around, dem::HeightDatum::kEllipsoid, stop);
   if (!sides) return tl::unexpected(sides.error());
-  const Result<std::vector<float>> here = source.ReadPoints(points, dem::HeightDatum::kEllipsoid, stop);
+  const Result<std::vector<float>> here = model.ReadPoints(points, dem::HeightDatum::kEllipsoid, stop);
   if (!here) return tl::unexpected(here.error());
   std::vector<std::array<float, 3>> normals;
   normals.reserve(points.size());

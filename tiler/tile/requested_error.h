@@ -18,9 +18,9 @@ struct RequestedError {
 
 // What a dataset's steps depend on besides the request.
 struct ErrorScale {
-  double fraction = geo::kDefaultErrorFraction;  // the default error of a level over geo::LevelError
-  // The deepest level of the sources; edits may add deeper ones. From it on tiles have all detail of the sources, so
-  // RequestedError::at_least does not keep their error at the default one.
+  double fraction = geo::kDefaultErrorFraction;  // ratio of a level's default error to geo::LevelError
+  // The deepest level of the sources; edits may add deeper ones. RequestedError::at_least has no effect on this level
+  // and deeper ones, whose tiles have all detail of the sources.
   int max_source_level = geo::kMaxLevel;
   std::span<const int> default_steps = {};  // by level, if no error is requested; 0 beyond; Dataset::baked owns them
 };

@@ -40,7 +40,7 @@ struct Seed {
 
   // The key under which a server looks the tile up.
   CacheKey KeyOf(const tiler::TileRequest& request) const {
-    return {request, dataset.cache_generation(), tiler::TileEditsHash(*dataset.source, request)};
+    return {request, dataset.cache_generation(), tiler::TileEditsHash(*dataset.model, request)};
   }
   // Counts a tile before it is inserted. False: it does not fit. The margin is for what `bytes` does not count: indexes
   // and filters of record files.

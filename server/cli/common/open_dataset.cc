@@ -87,9 +87,11 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
 
 }  // namespace
 
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
-                                                   const std::function<void(double)>& progress, std::stop_token stop,
-                                                   std::function<void(const Error&)> fault, bool only_cached) {
+Result<std::unique_ptr<dem::ElevationModel>> OpenSource(const config::DatasetConfig& wanted,
+                                                        const dem::RasterCache& cache,
+                                                        const std::function<void(double)>& progress,
+                                                        std::stop_token stop, std::function<void(const Error&)> fault,
+                                                        bool only_cached) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
@@ -102,13 +104,14 @@ Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& 
   options.progress = progress;
   options.stop = std::move(stop);
   options.fault = std::move(fault);
-  return only_cached ? dem::DemSource::OpenFromCache(FilesOf(wanted), options)
-                     : dem::DemSource::Open(FilesOf(wanted), options);
+  return only_cached ? dem::ElevationModel::OpenFromCache(FilesOf(wanted), options)
+                     : dem::ElevationModel::Open(FilesOf(wanted), options);
 }
 
-Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
-                                   const dem::RasterCache& cache, const std::string& version, std::stop_token stop) {
-  const dem::GeoBounds bounds = source->info().bounds;
+Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
+                                   std::shared_ptr<const dem::ElevationModel> model, const dem::RasterCache& cache,
+                                   const std::string& version, std::stop_token stop) {
+  const dem::GeoBounds bounds = model->info().bounds;
   const dem::FileContentOptions content{cache.folder ? cache.folder->path() : std::string(), std::move(stop)};
   auto water = OpenWater(wanted.water, bounds, content);
   if (!water) return tl::unexpected(water.error());
@@ -122,13 +125,13 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::sha
   dataset.glb.compression = wanted.glb_compression;
   dataset.glb.draco = {wanted.draco_speed, wanted.draco_normal_bits};
   dataset.glb.generator = "terrace " + version;
-  dataset.source = std::move(source);
+  dataset.model = std::move(model);
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_levels = wanted.metadata_availability;
-  dataset.generation = GenerationOf(wanted, dataset, version, dataset.source->fingerprint());
-  if (dataset.source->info().edits > 0) {
-    dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.source->unedited_fingerprint());
+  dataset.generation = GenerationOf(wanted, dataset, version, dataset.model->fingerprint());
+  if (dataset.model->info().edits > 0) {
+    dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.model->unedited_fingerprint());
   }
   dataset.options_hash = GenerationOf(wanted, dataset, version, 0);
   return dataset;

@@ -9,24 +9,22 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::cli {
 
 // Opens all files of the dataset and reads their statistics, which are stored in `cache`. Errors name the file and the
-// remedy. `fault`: dem::DemOptions. `only_cached`: dem::DemSource::OpenFromCache.
-Result<std::unique_ptr<dem::DemSource>> OpenSource(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
-                                                   const std::function<void(double)>& progress,
-                                                   std::stop_token stop = {},
-                                                   std::function<void(const Error&)> fault = {},
-                                                   bool only_cached = false);
+// remedy. `fault`: dem::DemOptions. `only_cached`: dem::ElevationModel::OpenFromCache.
+Result<std::unique_ptr<dem::ElevationModel>> OpenSource(
+    const config::DatasetConfig& wanted, const dem::RasterCache& cache, const std::function<void(double)>& progress,
+    std::stop_token stop = {}, std::function<void(const Error&)> fault = {}, bool only_cached = false);
 
 // Makes a dataset from an open source, with its water mask and imagery. `version`: of this program. Tiles contain it,
 // so a new version is a new generation.
-Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted, std::shared_ptr<const dem::DemSource> source,
-                                   const dem::RasterCache& cache, const std::string& version,
-                                   std::stop_token stop = {});
+Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
+                                   std::shared_ptr<const dem::ElevationModel> model, const dem::RasterCache& cache,
+                                   const std::string& version, std::stop_token stop = {});
 
 // OpenSource, then MakeDataset, with its archive. Without sources: the archive alone.
 Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const dem::RasterCache& cache,

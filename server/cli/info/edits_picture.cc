@@ -84,15 +84,15 @@ class Picture {
 
 }  // namespace
 
-Result<std::string> DrawEdits(const dem::DemSource& source) {
-  const std::vector<dem::EditOutline> edits = source.Edits();
+Result<std::string> DrawEdits(const dem::ElevationModel& model) {
+  const std::vector<dem::EditOutline> edits = model.Edits();
   const Frame frame = FrameOf(edits);
   std::vector<dem::GeoPosition> positions;
   for (int y = 0; y <= kSide; ++y) {
     const double latitude = std::clamp(frame.north - (y + 0.5) * frame.step_y, -90.0, 90.0);
     for (int x = 0; x <= kSide; ++x) positions.push_back({frame.west + (x + 0.5) * frame.step_x, latitude});
   }
-  const auto heights = source.ReadPoints(positions);
+  const auto heights = model.ReadPoints(positions);
   if (!heights) return tl::unexpected(heights.error());
   const double metres = frame.step_y * geo::MetresPerDegreeNorth(frame.north);
   Picture picture;
@@ -121,13 +121,13 @@ Result<std::string> DrawEdits(const dem::DemSource& source) {
   return picture.Encode();
 }
 
-std::string CountEdits(const dem::DemSource& source) {
+std::string CountEdits(const dem::ElevationModel& model) {
   std::map<std::string, std::size_t> counts;
-  for (const dem::EditOutline& edit : source.Edits()) ++counts[edit.op];
+  for (const dem::EditOutline& edit : model.Edits()) ++counts[edit.op];
   std::string text;
   for (const auto& [op, count] : counts) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, op);
   if (text.empty()) return "none: no feature has \"terrain\" in its properties";
-  return fmt::format("{}: {}", source.info().edits, text);
+  return fmt::format("{}: {}", model.info().edits, text);
 }
 
 }  // namespace terrace::cli

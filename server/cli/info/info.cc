@@ -18,7 +18,7 @@
 #include "config/file/parse.h"
 #include "config/options/options.h"
 #include "engine/core/plain_number.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/gdal/source_policy.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/statistics/cache_folder.h"
@@ -181,9 +181,9 @@ struct InfoArguments {
 };
 
 // Writes the picture of a dataset's edits.
-int Draw(const dem::DemSource& source, const std::string& path) {
-  if (source.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
-  const Result<std::string> png = DrawEdits(source);
+int Draw(const dem::ElevationModel& model, const std::string& path) {
+  if (model.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
+  const Result<std::string> png = DrawEdits(model);
   if (!png) return Fail(png.error().message, kExitFailure);
   Result<ReplacedFile> file = ReplacedFile::Open(path);
   if (!file) return Fail(file.error().message, kExitFailure);
@@ -240,10 +240,10 @@ int Info(const InfoArguments& arguments) {
       continue;
     }
     if (cache.folder && problem.empty()) problem = cache.folder->problem();
-    const std::shared_ptr<const dem::DemSource> source = *std::move(opened);
-    const dem::DemInfo& info = source->info();
+    const std::shared_ptr<const dem::ElevationModel> model = *std::move(opened);
+    const dem::DemInfo& info = model->info();
     const bool is_one = info.sources.size() == 1;
-    const auto served = MakeDataset(dataset, source, cache, TERRACE_VERSION);
+    const auto served = MakeDataset(dataset, model, cache, TERRACE_VERSION);
     if (!served) {
       exit_code = Fail(served.error().message, kExitFailure);
       continue;
@@ -257,10 +257,10 @@ int Info(const InfoArguments& arguments) {
     } else {
       is_one ? PrintText(info) : PrintMosaic(name, info);
       fmt::print("  {:<14}{}\n", "version", version);
-      if (!dataset.edits.empty()) fmt::print("  {:<14}{}\n", "edits", CountEdits(*source));
+      if (!dataset.edits.empty()) fmt::print("  {:<14}{}\n", "edits", CountEdits(*model));
       for (const std::string& file : info.left_out) fmt::print("  {:<14}{}\n", "left out", file);
     }
-    if (!draw.empty()) exit_code = std::max(exit_code, Draw(*source, draw));
+    if (!draw.empty()) exit_code = std::max(exit_code, Draw(*model, draw));
   }
   if (!problem.empty()) {
     std::fprintf(stderr, "terrace: cache_dir %s: %s; new statistics are not saved\n", cache.folder->path().c_str(),

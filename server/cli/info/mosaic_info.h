@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 
 namespace terrace::cli {
 

@@ -21,7 +21,7 @@
 #include "engine/common/parallel_for.h"
 #include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/gdal/source_policy.h"
 #include "engine/sources/read_raster.h"
 #include "engine/tin/decimate/drop_pass.h"

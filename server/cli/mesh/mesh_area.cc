@@ -19,7 +19,7 @@
 #include "config/options/options.h"
 #include "engine/core/elapsed_time.h"
 #include "engine/core/plain_number.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
 #include "server/cli/common/open_dataset.h"
@@ -77,7 +77,7 @@ Result<tiler::AreaRequest> RequestOf(const AreaMeshArguments& arguments, const d
   return request;
 }
 
-void Print(const AreaMeshArguments& arguments, const dem::DemSource& source, const tiler::AreaRequest& request,
+void Print(const AreaMeshArguments& arguments, const dem::ElevationModel& model, const tiler::AreaRequest& request,
            const tiler::AreaPlan& plan, const tiler::EncodedTile& mesh, const MeshSeconds& seconds) {
   const bool is_local = request.coordinates == tiler::AreaCoordinates::kEnu;
   const double longitude = plan.centre.longitude > 180 ? plan.centre.longitude - 360 : plan.centre.longitude;
@@ -85,7 +85,7 @@ void Print(const AreaMeshArguments& arguments, const dem::DemSource& source, con
   if (arguments.json) {
     nlohmann::ordered_json statistics = {
         {"input", {{"path", arguments.dem}, {"width", plan.window.columns}, {"height", plan.window.rows}}},
-        {"edits", source.info().edits},
+        {"edits", model.info().edits},
         {"level", plan.level},
         {"coordinates", kCoordinates[static_cast<std::size_t>(request.coordinates)]},
         {"points", mesh.vertices},
@@ -98,8 +98,8 @@ void Print(const AreaMeshArguments& arguments, const dem::DemSource& source, con
   }
   fmt::print(
       "{}: {} vertices, {} triangles of {} x {} samples of level {}, {} edit{}; largest error {} m{}\n", arguments.out,
-      mesh.vertices, mesh.triangles, plan.window.columns, plan.window.rows, plan.level, source.info().edits,
-      source.info().edits == 1 ? "" : "s", PlainNumber(mesh.max_error_m, 4),
+      mesh.vertices, mesh.triangles, plan.window.columns, plan.window.rows, plan.level, model.info().edits,
+      model.info().edits == 1 ? "" : "s", PlainNumber(mesh.max_error_m, 4),
       is_local ? fmt::format("; metres east, north and up of latitude {}, longitude {}", origin[0], origin[1]) : "");
 }
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/sources/read_raster.h"
 
 namespace CLI {

@@ -33,8 +33,8 @@ constexpr int kNiceness = 10;
 
 void LogOpened(const config::DatasetConfig& wanted, const tiler::Dataset& dataset) {
   const int max_level =
-      dataset.source ? dataset.source->max_level() : static_cast<int>(dataset.baked->extent().available.size()) - 1;
-  const std::string archive = dataset.source && dataset.baked ? ", archive " + wanted.baked : "";
+      dataset.model ? dataset.model->max_level() : static_cast<int>(dataset.baked->extent().available.size()) - 1;
+  const std::string archive = dataset.model && dataset.baked ? ", archive " + wanted.baked : "";
   spdlog::info("dataset {}: {}{}, levels 0 to {}, version {}", dataset.name, NameOf(wanted), archive, max_level,
                tiler::VersionText(dataset.generation));
 }

@@ -12,11 +12,11 @@ namespace {
 std::uint32_t Bits(float value) { return std::bit_cast<std::uint32_t>(value); }
 
 // Compares the three rows or columns that a tile shares with its eastern and its northern neighbour.
-void ExpectSameBorders(const DemSource& source, const geo::TileKey& key) {
-  const auto tile = source.Read(key);
+void ExpectSameBorders(const ElevationModel& model, const geo::TileKey& key) {
+  const auto tile = model.Read(key);
   ASSERT_TRUE(tile) << tile.error().message;
   const int n = tile->lattice.cells;
-  const auto east = source.Read(geo::Neighbour(key, 1, 0));
+  const auto east = model.Read(geo::Neighbour(key, 1, 0));
   ASSERT_TRUE(east) << east.error().message;
   int different = 0;
   for (int j = -1; j <= n + 1; ++j) {
@@ -25,7 +25,7 @@ void ExpectSameBorders(const DemSource& source, const geo::TileKey& key) {
   EXPECT_EQ(different, 0) << "east of " << geo::ToString(key);
   const geo::TileKey above = geo::Neighbour(key, 0, 1);
   if (!geo::IsValid(above)) return;
-  const auto north = source.Read(above);
+  const auto north = model.Read(above);
   ASSERT_TRUE(north) << north.error().message;
   different = 0;
   for (int i = -1; i <= n + 1; ++i) {

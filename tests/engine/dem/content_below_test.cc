@@ -1,4 +1,5 @@
-// DemSource::ContentBelow: where it is equal, tiles are. A bake that is brought up to date keeps the others' files.
+// ElevationModel::ContentBelow: where it is equal, tiles are. A bake that is brought up to date keeps the others'
+// files.
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -35,7 +36,7 @@ class Landscape {
     WriteRaster(dir_, base, "base.tif");
   }
 
-  std::unique_ptr<DemSource> Open() const {
+  std::unique_ptr<ElevationModel> Open() const {
     std::vector<DemFile> files;
     for (int i = 0; i < kColumns * kRows; ++i) files.push_back({dir_.File(NameOf(i))});
     files.push_back({dir_.File("base.tif"), 1});
@@ -104,22 +105,22 @@ std::vector<geo::TileKey> Tops() {
   return tops;
 }
 
-Below ReadBelow(const DemSource& source, const geo::TileKey& top) {
+Below ReadBelow(const ElevationModel& model, const geo::TileKey& top) {
   const int deepest = top.level + 2;
-  Below below{source.ContentBelow(top, deepest), {}, {}};
+  Below below{model.ContentBelow(top, deepest), {}, {}};
   for (int level = top.level; level <= deepest; level += 2) {
     const int down = level - top.level;
     const std::int64_t last = (std::int64_t{1} << down) - 1;
     for (const auto& [dx, dy] : {std::pair{std::int64_t{0}, std::int64_t{0}}, {last, last}, {last, std::int64_t{0}}}) {
       const geo::TileKey key{level, (top.x << down) + dx, (top.y << down) + dy};
-      const auto tile = source.Read(key);
+      const auto tile = model.Read(key);
       EXPECT_TRUE(tile.has_value());
       if (!tile) continue;
       below.heights.insert(below.heights.end(), tile->heights.begin(), tile->heights.end());
       below.bounds.push_back(tile->source_error_m);
       for (int nx = -1; nx <= 1; ++nx) {
         for (int ny = -1; ny <= 1; ++ny) {
-          const HeightRange range = source.RangeBound(geo::Neighbour(key, nx, ny));
+          const HeightRange range = model.RangeBound(geo::Neighbour(key, nx, ny));
           below.bounds.push_back(range.min);
           below.bounds.push_back(range.max);
         }

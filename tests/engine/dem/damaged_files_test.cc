@@ -56,7 +56,7 @@ std::string Damaged(std::string bytes, std::mt19937& random) {
 // Never returns.
 void OpenAndRead(const std::string& path) {
   ::alarm(kSeconds);
-  const auto source = DemSource::Open(path);
+  const auto source = ElevationModel::Open(path);
   if (source) {
     for (const int level : {0, (*source)->max_level() / 2, (*source)->max_level()}) {
       for (const geo::TileKey& key : SomeTiles(**source, level, 2)) static_cast<void>((*source)->Read(key));
@@ -117,7 +117,7 @@ TEST(DamagedFiles, WhatBelongsToAGeoTiffMayBeCutToo) {
   RasterSpec spec{.width = 600, .height = 400, .type = "Byte", .geo_transform = {8, .001, 0, 47, 0, -.001}};
   spec.value = [](int col, int row) { return (col * 7 + row) % 200; };
   const std::string plain = WriteRaster(dir, spec);
-  const GeoBounds around = (*DemSource::Open(plain))->info().bounds;
+  const GeoBounds around = (*ElevationModel::Open(plain))->info().bounds;
   const auto copy = [&](const std::string& name, bool has_mask) {
     const std::string path = dir.File(name);
     std::filesystem::copy_file(plain, path);
@@ -163,7 +163,7 @@ TEST(DamagedFiles, AStripMayStateMoreThanItHas) {
   ASSERT_NE(at, std::string::npos);
   bytes.replace(at + 12, 4, reinterpret_cast<const char*>(&of_whole), 4);
   std::ofstream(strips, std::ios::binary) << bytes;
-  const auto source = DemSource::Open(strips);
+  const auto source = ElevationModel::Open(strips);
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().heights.max, 798);
 }
@@ -174,11 +174,11 @@ TEST(DamagedFiles, AGeoTiffThatIsCutShortIsToldWhenItIsOpened) {
   RasterSpec spec{.width = 300, .height = 200, .geo_transform = {8, .001, 0, 47, 0, -.001}};
   spec.value = [](int col, int row) { return col % 90 + row; };
   const std::string path = WriteRaster(dir, spec), bytes = ReadFile(path);
-  const GeoBounds around = (*DemSource::Open(path))->info().bounds;
+  const GeoBounds around = (*ElevationModel::Open(path))->info().bounds;
   ASSERT_TRUE(WaterRaster::Open(path, around));
   for (const std::size_t lost : {bytes.size() / 2, std::size_t{1}}) {
     std::ofstream(path, std::ios::binary) << bytes.substr(0, bytes.size() - lost);
-    const auto source = DemSource::Open(path);
+    const auto source = ElevationModel::Open(path);
     const auto mask = WaterRaster::Open(path, around);
     ASSERT_FALSE(source);
     ASSERT_FALSE(mask);
@@ -197,7 +197,7 @@ TEST(DamagedFiles, BlocksCountWithTheBandsTheyAreStoredWith) {
                                  "BLOCKYSIZE=1024", "INTERLEAVE=PIXEL", nullptr};
   GDALDatasetUniquePtr(
       driver->Create(dir.File("bands.tif").c_str(), 1024, 1024, 60, GDT_Float32, const_cast<char**>(options)));
-  const auto refused = DemSource::Open(dir.File("bands.tif"));
+  const auto refused = ElevationModel::Open(dir.File("bands.tif"));
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("too large to read tiles from"), std::string::npos) << refused.error().message;
 }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/tile_cover.h"
 #include "tests/engine/dem/edits_fixture.h"

@@ -82,34 +82,34 @@ std::optional<std::string> TestDataFile(const std::string& name) {
   return std::nullopt;
 }
 
-std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options) {
-  auto source = DemSource::Open(path, options);
+std::unique_ptr<ElevationModel> OpenOrFail(const std::string& path, const DemOptions& options) {
+  auto source = ElevationModel::Open(path, options);
   EXPECT_TRUE(source.has_value()) << source.error().message;
   return source ? *std::move(source) : nullptr;
 }
 
-std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options) {
-  auto source = DemSource::Open(files, options);
+std::unique_ptr<ElevationModel> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options) {
+  auto source = ElevationModel::Open(files, options);
   EXPECT_TRUE(source.has_value()) << source.error().message;
   return source ? *std::move(source) : nullptr;
 }
 
-std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level) {
-  const GeoBounds& bounds = source.info().bounds;
-  if (bounds.west > bounds.east) return source.Available(level);
+std::vector<geo::TileRange> TilesWithData(const ElevationModel& model, int level) {
+  const GeoBounds& bounds = model.info().bounds;
+  if (bounds.west > bounds.east) return model.Available(level);
   const auto tile = [level](double degrees) { return static_cast<std::int64_t>(std::ldexp(degrees / 180, level)); };
   const geo::TileRange box{tile(bounds.west + 180), tile(bounds.south + 90), tile(bounds.east + 180),
                            tile(bounds.north + 90)};
   std::vector<geo::TileRange> ranges;
-  for (const geo::TileRange& range : source.Available(level)) {
+  for (const geo::TileRange& range : model.Available(level)) {
     if (const auto common = geo::Intersection(range, box); !geo::IsEmpty(common)) ranges.push_back(common);
   }
   return ranges;
 }
 
-std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count) {
+std::vector<geo::TileKey> SomeTiles(const ElevationModel& model, int level, int count) {
   std::vector<geo::TileKey> keys;
-  for (const geo::TileRange& range : TilesWithData(source, level)) {
+  for (const geo::TileRange& range : TilesWithData(model, level)) {
     const std::int64_t columns = range.end_x - range.start_x + 1, rows = range.end_y - range.start_y + 1;
     const std::int64_t wanted = std::min<std::int64_t>(columns * rows, count);
     for (std::int64_t i = 0; i < wanted; ++i) {

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 
 namespace terrace::dem {
 
@@ -56,18 +56,18 @@ void WriteVrt(const std::string& part, const std::string& path);
 std::optional<std::string> TestDataFile(const std::string& name);
 
 // Opens the source. On failure the test fails and the result is null.
-std::unique_ptr<DemSource> OpenOrFail(const std::string& path, const DemOptions& options = {});
-std::unique_ptr<DemSource> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
+std::unique_ptr<ElevationModel> OpenOrFail(const std::string& path, const DemOptions& options = {});
+std::unique_ptr<ElevationModel> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
 
 // The available ranges of a level that touch the source's bounds; the others exist only because a tile has four
 // children. All of them if the bounds cross the antimeridian.
-std::vector<geo::TileRange> TilesWithData(const DemSource& source, int level);
+std::vector<geo::TileRange> TilesWithData(const ElevationModel& model, int level);
 
 // A cache with statistics in this folder without a bound, and no averages in memory.
 RasterCache CacheIn(const std::string& folder);
 
 // About `count` tiles, distributed over the available ones.
-std::vector<geo::TileKey> SomeTiles(const DemSource& source, int level, int count);
+std::vector<geo::TileKey> SomeTiles(const ElevationModel& model, int level, int count);
 
 // File names of one real raster for every kind of CRS.
 std::vector<std::string> RealRasters();

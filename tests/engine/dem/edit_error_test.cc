@@ -22,14 +22,14 @@ double DistanceAt(const TileHeights& tile, const geo::TileKey& key, const GeoPos
 class EditErrors : public TerrainEdits {
  protected:
   // Expects that the error of the tiles at a position covers the sample there. Returns the largest distance found.
-  static double ExpectCovered(const DemSource& source, const GeoPosition& at, int first, int last) {
-    const double height = At(source, at.longitude, at.latitude);
+  static double ExpectCovered(const ElevationModel& model, const GeoPosition& at, int first, int last) {
+    const double height = At(model, at.longitude, at.latitude);
     double largest = 0;
     for (int level = first; level <= last; ++level) {
       const double side = 180.0 / static_cast<double>(geo::TileRows(level));
       const geo::TileKey key{level, static_cast<std::int64_t>((at.longitude + 180) / side),
                              static_cast<std::int64_t>((at.latitude + 90) / side)};
-      const auto tile = source.Read(key);
+      const auto tile = model.Read(key);
       EXPECT_TRUE(tile.has_value());
       if (!tile) return 0;
       const double distance = DistanceAt(*tile, key, at, height);

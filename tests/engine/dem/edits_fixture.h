@@ -9,7 +9,7 @@
 #include <memory>
 #include <string>
 
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "tests/engine/dem/dem_fixture.h"
 
 namespace terrace::dem {
@@ -38,7 +38,7 @@ inline std::string Middle(const std::string& terrain) { return Rectangle(terrain
 
 class TerrainEdits : public testing::Test {
  protected:
-  std::unique_ptr<DemSource> Open(const std::string& features) {
+  std::unique_ptr<ElevationModel> Open(const std::string& features) {
     DemOptions options;
     options.edits = {WriteEdits(dir_, features)};
     return OpenOrFail(slope_, options);
@@ -46,12 +46,12 @@ class TerrainEdits : public testing::Test {
   std::string MessageOf(const std::string& features) {
     DemOptions options;
     options.edits = {WriteEdits(dir_, features)};
-    const auto opened = DemSource::Open(slope_, options);
+    const auto opened = ElevationModel::Open(slope_, options);
     EXPECT_FALSE(opened.has_value());
     return opened ? "" : opened.error().message;
   }
-  static double At(const DemSource& source, double longitude, double latitude) {
-    const auto heights = source.ReadPoints(std::array{GeoPosition{longitude, latitude}});
+  static double At(const ElevationModel& model, double longitude, double latitude) {
+    const auto heights = model.ReadPoints(std::array{GeoPosition{longitude, latitude}});
     EXPECT_TRUE(heights.has_value());
     return heights ? static_cast<double>(heights->front()) : 0;
   }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/crs/geoid.h"
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 #include "engine/geo/error_ladder.h"
 #include "engine/geo/mercator_grid.h"
 #include "tests/engine/dem/dem_fixture.h"
@@ -353,7 +353,7 @@ TEST_F(TerrainEdits, RefuseFilesThatAreNoGeoJson) {
     std::ofstream(dir_.File("bad.geojson")) << text;
     DemOptions options;
     options.edits = {dir_.File("bad.geojson")};
-    const auto opened = DemSource::Open(slope_, options);
+    const auto opened = ElevationModel::Open(slope_, options);
     ASSERT_FALSE(opened.has_value()) << text.substr(0, 200);
     EXPECT_NE(opened.error().message.find("bad.geojson"), std::string::npos);
     EXPECT_TRUE(std::ranges::all_of(opened.error().message, [](char c) { return c > 0; })) << "no UTF-8";

@@ -39,13 +39,13 @@ RasterSpec Slope() {
 
 void ExpectRefusedWhenCut(const std::string& path) {
   const std::string bytes = AllBytes(path);
-  const auto whole = DemSource::Open(path);
+  const auto whole = ElevationModel::Open(path);
   ASSERT_TRUE(whole) << whole.error().message;
   EXPECT_EQ((*whole)->info().heights.min, 100);
   EXPECT_EQ((*whole)->info().heights.max, 148);
   for (const std::size_t lost : {std::size_t{4}, bytes.size() / 8}) {
     std::ofstream(path, std::ios::binary) << bytes.substr(0, bytes.size() - lost);
-    const auto served = DemSource::Open(path);
+    const auto served = ElevationModel::Open(path);
     const auto meshed = ReadRaster(path);
     ASSERT_FALSE(served) << path << " without " << lost << " bytes";
     ASSERT_FALSE(meshed) << path << " without " << lost << " bytes";
@@ -94,9 +94,9 @@ TEST(FileEnd, TruncatedPartsOfAMosaicAreRefused) {
   const std::string part = Written(dir, Slope(), "ENVI", "dem.img"), mosaic = dir.File("mosaic.vrt");
   ASSERT_TRUE(AllowVrts());
   WriteVrt(part, mosaic);
-  EXPECT_TRUE(DemSource::Open(mosaic));
+  EXPECT_TRUE(ElevationModel::Open(mosaic));
   std::filesystem::resize_file(part, std::filesystem::file_size(part) - 4);
-  const auto opened = DemSource::Open(mosaic);
+  const auto opened = ElevationModel::Open(mosaic);
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::kUnavailable);
   EXPECT_NE(opened.error().message.find(part + ": is cut short"), std::string::npos) << opened.error().message;
@@ -114,7 +114,7 @@ TEST(FileEnd, OtherFormatsOfNetCdfAreNotExamined) {
   const TempDir dir;
   const std::string path = Written(dir, Slope(), "netCDF", "dem.nc", "FORMAT=NC4");
   EXPECT_EQ(EndOfClassicNetCdf(AllBytes(path)), 0);
-  EXPECT_TRUE(DemSource::Open(path));
+  EXPECT_TRUE(ElevationModel::Open(path));
 }
 
 TEST(FileEnd, OfAJpegIsItsMarker) {
@@ -126,7 +126,7 @@ TEST(FileEnd, OfAJpegIsItsMarker) {
   const std::string path = Written(dir, spec, "JPEG", "dem.jpg"), bytes = AllBytes(path);
   const auto opens = [&](const std::string& content) {
     std::ofstream(path, std::ios::binary) << content;
-    const auto source = DemSource::Open(path);
+    const auto source = ElevationModel::Open(path);
     if (!source) {
       EXPECT_NE(source.error().message.find("is cut short"), std::string::npos) << source.error().message;
     }

@@ -43,7 +43,7 @@ TEST(FolderListing, IsNotMadeToOpenAFile) {
   const TempDir dir;
   for (const char* name : {"one.unknown", "two.unknown"}) std::ofstream(dir.File(name)) << std::string(2000, 'x');
   const ListingProbe probe;
-  EXPECT_FALSE(DemSource::Open(dir.File("one.unknown")));
+  EXPECT_FALSE(ElevationModel::Open(dir.File("one.unknown")));
   EXPECT_FALSE(IsRaster(dir.File("two.unknown")));
   EXPECT_GE(ListingProbe::asked(), 2);
   EXPECT_EQ(ListingProbe::listed(), 0);

@@ -7,20 +7,20 @@ namespace terrace::dem {
 namespace {
 
 // Laws of availability: both roots; every ancestor of an available tile; four children or none; no overlaps.
-void ExpectLawful(const DemSource& source) {
-  EXPECT_TRUE(source.IsAvailable({0, 0, 0}) && source.IsAvailable({0, 1, 0}));
-  EXPECT_TRUE(source.Available(source.max_level() + 1).empty());
-  for (int level = 1; level <= source.max_level(); ++level) {
-    for (const geo::TileRange& range : source.Available(level)) {
+void ExpectLawful(const ElevationModel& model) {
+  EXPECT_TRUE(model.IsAvailable({0, 0, 0}) && model.IsAvailable({0, 1, 0}));
+  EXPECT_TRUE(model.Available(model.max_level() + 1).empty());
+  for (int level = 1; level <= model.max_level(); ++level) {
+    for (const geo::TileRange& range : model.Available(level)) {
       for (const geo::TileKey& corner :
            {geo::TileKey{level, range.start_x, range.start_y}, {level, range.end_x, range.end_y}}) {
         EXPECT_TRUE(geo::IsValid(corner));
-        EXPECT_TRUE(source.IsAvailable({level - 1, corner.x / 2, corner.y / 2}));
+        EXPECT_TRUE(model.IsAvailable({level - 1, corner.x / 2, corner.y / 2}));
         // 3D Tiles clients replace a tile by its children: a missing one is a hole.
         for (const std::int64_t child : {0, 1, 2, 3}) {
-          EXPECT_TRUE(source.IsAvailable({level, corner.x / 2 * 2 + child % 2, corner.y / 2 * 2 + child / 2}));
+          EXPECT_TRUE(model.IsAvailable({level, corner.x / 2 * 2 + child % 2, corner.y / 2 * 2 + child / 2}));
         }
-        EXPECT_EQ(std::ranges::count_if(source.Available(level), [&](const auto& r) { return r.Contains(corner); }), 1);
+        EXPECT_EQ(std::ranges::count_if(model.Available(level), [&](const auto& r) { return r.Contains(corner); }), 1);
       }
     }
   }

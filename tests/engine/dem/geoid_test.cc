@@ -7,7 +7,6 @@
 #include <fstream>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "tests/engine/dem/geoid_grids.h"
 
@@ -125,21 +124,6 @@ TEST(Geoid, RefusesGridFilesWithTheReason) {
   EXPECT_NE(Geoid::OfGrid(dir.File("text.gtx"), {8, 46}).error().message.find("cannot read"), std::string::npos);
   std::ofstream(dir.File("a,b.gtx")) << "x";
   EXPECT_NE(Geoid::OfGrid(dir.File("a,b.gtx"), {8, 46}).error().message.find("rename"), std::string::npos);
-}
-
-TEST(Geoid, IsTheSameFromManyThreads) {
-  const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
-  ASSERT_TRUE(geoid);
-  const double expected = (*geoid)->Undulation({-70.0112, -32.6532});
-  std::vector<std::jthread> threads;
-  std::atomic<int> wrong = 0;
-  for (int t = 0; t < 4; ++t) {
-    threads.emplace_back([&] {
-      for (int i = 0; i < 200; ++i) wrong += (*geoid)->Undulation({-70.0112, -32.6532}) != expected;
-    });
-  }
-  threads.clear();
-  EXPECT_EQ(wrong, 0);
 }
 
 }  // namespace

@@ -60,9 +60,9 @@ constexpr int kLevel = 11;
 
 // Calls visit(tile, i, j, place) for all nodes of a level's tiles.
 template <typename Visit>
-void ForNodes(const DemSource& source, int level, const Visit& visit) {
-  for (const geo::TileKey& key : SomeTiles(source, level, 1 << 20)) {
-    const auto tile = source.Read(key);
+void ForNodes(const ElevationModel& model, int level, const Visit& visit) {
+  for (const geo::TileKey& key : SomeTiles(model, level, 1 << 20)) {
+    const auto tile = model.Read(key);
     ASSERT_TRUE(tile) << tile.error().message;
     for (int j = 0; j <= tile->lattice.cells; ++j) {
       for (int i = 0; i <= tile->lattice.cells; ++i) visit(*tile, i, j, PlaceOf(*tile, key, i, j));
@@ -172,14 +172,14 @@ TEST(Holes, ShowTheFloorWhereTheOwnerWantsThat) {
 bool IsSame(float a, float b) { return std::bit_cast<std::uint32_t>(a) == std::bit_cast<std::uint32_t>(b); }
 
 // Windows at other positions and of other sizes read other parts of the raster, but must give the same heights.
-void ExpectNoTileMatters(const DemSource& source, int level, const geo::TileKey& key) {
-  const auto tile = source.Read(key);
+void ExpectNoTileMatters(const ElevationModel& model, int level, const geo::TileKey& key) {
+  const auto tile = model.Read(key);
   ASSERT_TRUE(tile);
   const geo::Lattice& lattice = tile->lattice;
   const int half = lattice.cells / 2;
   for (const int shift : {-half - 3, half + 7}) {
     const NodeWindow window{lattice.FirstColumn(key) + shift, lattice.FirstRow(key) + 5, lattice.cells, half};
-    const auto nodes = source.ReadNodes(level, window);
+    const auto nodes = model.ReadNodes(level, window);
     ASSERT_TRUE(nodes);
     for (int j = 0; j < window.rows; ++j) {
       for (int i = 0; i < window.columns; ++i) {
@@ -192,7 +192,7 @@ void ExpectNoTileMatters(const DemSource& source, int level, const geo::TileKey&
   for (const auto& [dx, dy] : {std::pair{1, 0}, {0, 1}}) {
     const geo::TileKey next = geo::Neighbour(key, dx, dy);
     if (!geo::IsValid(next)) continue;
-    const auto beside = source.Read(next);
+    const auto beside = model.Read(next);
     ASSERT_TRUE(beside);
     for (int k = 0; k <= lattice.cells; ++k) {
       ASSERT_TRUE(IsSame(tile->At(dx ? lattice.cells : k, dy ? lattice.cells : k), beside->At(dx ? 0 : k, dy ? 0 : k)))
@@ -391,9 +391,9 @@ TEST(Holes, AreKnownFromTheCache) {
   const auto first = OpenOrFail(path, options), second = OpenOrFail(path, options),
              none = OpenOrFail(path, {.floor = kFloor});
   ASSERT_TRUE(first && second && none);
-  for (const DemSource* source : {first.get(), second.get(), none.get()}) {
-    EXPECT_EQ(source->info().sources[0].hole_samples, 300u * 90u);
-    EXPECT_EQ(source->info().sources[0].void_samples, 300u * 90u + 1000u);
+  for (const ElevationModel* model : {first.get(), second.get(), none.get()}) {
+    EXPECT_EQ(model->info().sources[0].hole_samples, 300u * 90u);
+    EXPECT_EQ(model->info().sources[0].void_samples, 300u * 90u + 1000u);
   }
   for (const geo::TileKey& key : SomeTiles(*none, kLevel, 20)) {
     const auto a = none->Read(key), b = second->Read(key);

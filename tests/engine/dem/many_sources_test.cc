@@ -45,7 +45,7 @@ GridTrace TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo
   std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                              SampleRules::kVoid);
   GridTrace trace;
-  EXPECT_TRUE(grid.SetHeights(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
+  EXPECT_TRUE(grid.FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
   return trace;
 }
 
@@ -369,14 +369,14 @@ TEST(ManySources, TheFirstFaultIsToldAndWithAListenerAllInOrder) {
     std::filesystem::resize_file(files[bad].path, std::filesystem::file_size(files[bad].path) - 300);
   }
   for (int round = 0; round < 5; ++round) {
-    const auto failed = DemSource::Open(files);
+    const auto failed = ElevationModel::Open(files);
     ASSERT_FALSE(failed.has_value());
     EXPECT_NE(failed.error().message.find("1011.tif"), std::string::npos) << failed.error().message;
   }
   std::vector<std::string> told;
   DemOptions options;
   options.fault = [&told](const Error& error) { told.push_back(error.message); };
-  ASSERT_FALSE(DemSource::Open(files, options).has_value());
+  ASSERT_FALSE(ElevationModel::Open(files, options).has_value());
   ASSERT_EQ(told.size(), 3U);
   EXPECT_NE(told[0].find("1011.tif"), std::string::npos);
   EXPECT_NE(told[2].find("1030.tif"), std::string::npos);
@@ -388,7 +388,7 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   DemOptions options;
   std::vector<double> shares;
   options.progress = [&shares](double share) { shares.push_back(share); };
-  ASSERT_TRUE(DemSource::Open(files, options).has_value());
+  ASSERT_TRUE(ElevationModel::Open(files, options).has_value());
   EXPECT_TRUE(std::ranges::is_sorted(shares));
   EXPECT_NEAR(shares.back(), 1, 1e-9);
   EXPECT_GE(shares.size(), 30U);
@@ -397,7 +397,7 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
   options.progress = [&stop](double share) {
     if (share > 0.3) stop.request_stop();
   };
-  const auto stopped = DemSource::Open(files, options);
+  const auto stopped = ElevationModel::Open(files, options);
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
@@ -405,7 +405,7 @@ TEST(ManySources, OpeningTellsItsProgressAndStops) {
 TEST(ManySources, TheLogSaysTheSameOfManySourcesAFewTimes) {
   const TempDir dir;
   const auto files = WriteFolder(dir, 30);
-  const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(files).has_value()); });
+  const std::string log = LogOf([&] { EXPECT_TRUE(ElevationModel::Open(files).has_value()); });
   EXPECT_EQ(std::ranges::count(log, '\n'), 6) << log;
   EXPECT_NE(log.find("25 more sources have lines like this one: no vertical datum stated"), std::string::npos) << log;
 }
@@ -416,12 +416,12 @@ TEST(ManySources, TheLogSaysTheSameOfAFileOnce) {
   DemOptions options;
   options.cache = CacheIn(dir.File("cache"));
   const auto files = WriteFolder(dir, 2);
-  EXPECT_TRUE(DemSource::Open({files.front()}, options).has_value());
-  EXPECT_EQ(LogOf([&] { EXPECT_FALSE(DemSource::OpenFromCache(files, options).has_value()); }), "");
+  EXPECT_TRUE(ElevationModel::Open({files.front()}, options).has_value());
+  EXPECT_EQ(LogOf([&] { EXPECT_FALSE(ElevationModel::OpenFromCache(files, options).has_value()); }), "");
   for (const bool only_cached : {false, true}) {
     const std::string log = LogOf([&] {
-      EXPECT_TRUE(
-          (only_cached ? DemSource::OpenFromCache(files, options) : DemSource::Open(files, options)).has_value());
+      EXPECT_TRUE((only_cached ? ElevationModel::OpenFromCache(files, options) : ElevationModel::Open(files, options))
+                      .has_value());
     });
     EXPECT_EQ(std::ranges::count(log, '\n'), 2) << log;
   }

@@ -19,8 +19,8 @@ Spot PixelAt(int depth, double longitude, double latitude) {
   return {static_cast<std::int64_t>((longitude + 180) / 360 * size), static_cast<std::int64_t>(y * size)};
 }
 
-Spot CentreOf(const DemSource& source, int depth) {
-  const GeoBounds& b = source.info().bounds;
+Spot CentreOf(const ElevationModel& model, int depth) {
+  const GeoBounds& b = model.info().bounds;
   return PixelAt(depth, (b.west + (b.east < b.west ? b.east + 360 : b.east)) / 2, (b.south + b.north) / 2);
 }
 

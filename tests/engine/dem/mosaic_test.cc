@@ -172,19 +172,19 @@ TEST(Mosaic, PiecesGiveTheRastersPointsAndMercatorPixels) {
   }
 }
 
-float HeightAt(const DemSource& source, double longitude, double latitude) {
+float HeightAt(const ElevationModel& model, double longitude, double latitude) {
   const GeoPosition point{longitude, latitude};
-  const auto height = source.ReadPoints({&point, 1});
+  const auto height = model.ReadPoints({&point, 1});
   EXPECT_TRUE(height);
   return height ? height->front() : -1e9f;
 }
 
 // Height of the node nearest to a position, in tiles of the level.
-float NodeAt(const DemSource& source, int level, double longitude, double latitude) {
-  const geo::Lattice lattice = source.LatticeOf(level);
+float NodeAt(const ElevationModel& model, int level, double longitude, double latitude) {
+  const geo::Lattice lattice = model.LatticeOf(level);
   const NodeWindow window{std::llround((longitude + 180) / lattice.StepDegrees()),
                           std::llround((latitude + 90) / lattice.StepDegrees()), 1, 1};
-  const auto heights = source.ReadNodes(level, window);
+  const auto heights = model.ReadNodes(level, window);
   EXPECT_TRUE(heights);
   return heights ? heights->front() : -1e9f;
 }
@@ -424,13 +424,13 @@ TEST(Mosaic, FilesOfAFolderThatAreNoRastersAreLeftOut) {
   const std::string raster = WriteRaster(dir, FlatSquare(0, 10, 10, 1, 1), "a.tif");
   std::ofstream(dir.File("readme.txt")) << "no raster\n";
   std::ofstream(dir.File("broken.tif")) << "II*";
-  const auto source = DemSource::Open({{raster, 0, true}, {dir.File("readme.txt"), 0, true}});
+  const auto source = ElevationModel::Open({{raster, 0, true}, {dir.File("readme.txt"), 0, true}});
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().sources.size(), 1u);
-  const auto named = DemSource::Open({{raster, 0, false}, {dir.File("readme.txt"), 0, false}});
+  const auto named = ElevationModel::Open({{raster, 0, false}, {dir.File("readme.txt"), 0, false}});
   ASSERT_FALSE(named);
   EXPECT_NE(named.error().message.find("readme.txt"), std::string::npos);
-  const auto none = DemSource::Open({{dir.File("readme.txt"), 0, true}});
+  const auto none = ElevationModel::Open({{dir.File("readme.txt"), 0, true}});
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::kNotFound);
 }

@@ -16,13 +16,14 @@ namespace {
 thread_local bool fails_next = false;
 }  // namespace
 
-void* operator new(std::size_t size) {
+// Not inlined, because g++ 12 then reports that std::free gets what operator new returned.
+[[gnu::noinline]] void* operator new(std::size_t size) {
   void* const memory = std::exchange(fails_next, false) ? nullptr : std::malloc(size);
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
+[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
 namespace terrace::dem {
 namespace {

@@ -43,7 +43,7 @@ TEST(OneSource, TheLogTellsOfColumnsBeyondAFullTurn) {
         dir, {.width = width, .height = 180, .geo_transform = {-180, 1, 0, 90, 0, -1}, .value = [](int col, int row) {
                 return col + row;
               }});
-    const std::string log = LogOf([&] { EXPECT_TRUE(DemSource::Open(path).has_value()); });
+    const std::string log = LogOf([&] { EXPECT_TRUE(ElevationModel::Open(path).has_value()); });
     EXPECT_EQ(log.find("its last 180 columns") != std::string::npos, width == 540) << log;
     EXPECT_EQ(log.find("more than once around the Earth") != std::string::npos, width == 540) << log;
   }
@@ -75,8 +75,8 @@ TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
     std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                SampleRules::kVoid);
     GridTrace trace;
-    auto filled = grid->SetHeights(lattice, window, HeightDatum::kEllipsoid,
-                                   {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
+    auto filled = grid->FillNodes(lattice, window, HeightDatum::kEllipsoid,
+                                  {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
     EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
     return filled ? Result<GridTrace>(std::move(trace)) : tl::unexpected(filled.error());
   };

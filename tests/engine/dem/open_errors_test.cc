@@ -13,7 +13,7 @@ namespace terrace::dem {
 namespace {
 
 void ExpectRefused(const std::string& path, const std::vector<std::string>& parts, const DemOptions& options = {}) {
-  const auto source = DemSource::Open(path, options);
+  const auto source = ElevationModel::Open(path, options);
   ASSERT_FALSE(source) << path;
   EXPECT_NE(source.error().message.find(path), std::string::npos) << source.error().message;
   for (const std::string& part : parts) {
@@ -27,7 +27,7 @@ TEST(OpenErrors, NameWhatIsNoFile) {
   ExpectRefused(dir.File("none.tif"), {"No such file"});
   ExpectRefused(dir.path().string(), {"not a regular file"});
   ExpectRefused("<VRTDataset rasterXSize=\"2\" rasterYSize=\"2\"></VRTDataset>", {"No such file"});
-  EXPECT_EQ(DemSource::Open(dir.File("none.tif")).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(ElevationModel::Open(dir.File("none.tif")).error().code, ErrorCode::kNotFound);
 }
 
 TEST(OpenErrors, NameWhatIsNoRaster) {
@@ -180,12 +180,12 @@ class OpenErrorsOfMosaics : public testing::Test {
 
 TEST_F(OpenErrorsOfMosaics, NameDamagedSidecarsOfParts) {
   WriteVrt(part_, mosaic_);
-  EXPECT_TRUE(DemSource::Open(mosaic_).has_value());
+  EXPECT_TRUE(ElevationModel::Open(mosaic_).has_value());
   std::ofstream(part_ + ".msk") << "garbage";
   ExpectRefused(mosaic_, {part_ + ".msk: is not used by GDAL"});
   std::filesystem::remove(part_ + ".msk");
   WriteMask(part_);
-  EXPECT_TRUE(DemSource::Open(mosaic_).has_value());
+  EXPECT_TRUE(ElevationModel::Open(mosaic_).has_value());
 }
 
 TEST_F(OpenErrorsOfMosaics, NameDamagedSidecarsOfNestedMosaics) {
@@ -197,7 +197,7 @@ TEST_F(OpenErrorsOfMosaics, NameDamagedSidecarsOfNestedMosaics) {
     <GeoTransform>0, 1, 0, 0, 0, -1</GeoTransform><VRTRasterBand dataType="Float32" band="1"><ComplexSource>
     <SourceFilename relativeToVRT="1">inner.vrt</SourceFilename><SourceBand>1</SourceBand><UseMaskBand>true</UseMaskBand>
     </ComplexSource></VRTRasterBand></VRTDataset>)";
-  const auto opened = DemSource::Open(mosaic_);
+  const auto opened = ElevationModel::Open(mosaic_);
   EXPECT_TRUE(opened.has_value()) << opened.error().message;
   std::filesystem::resize_file(inner + ".msk", 8);
   ExpectRefused(mosaic_, {inner + ".msk: is not used by GDAL"});

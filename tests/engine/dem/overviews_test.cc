@@ -201,15 +201,15 @@ TEST(Overviews, OfOtherSidesAreLeftAlone) {
 }
 
 // The largest distance of heights from the ramp, at nodes at least `margin` pixels inside.
-double LargestOff(const DemSource& source, int level, int width, int height, double margin) {
-  const geo::Lattice lattice = source.LatticeOf(level);
+double LargestOff(const ElevationModel& model, int level, int width, int height, double margin) {
+  const geo::Lattice lattice = model.LatticeOf(level);
   const double step = lattice.StepDegrees();
   const auto west = static_cast<std::int64_t>(std::ceil((10 + 180) / step)),
              east = static_cast<std::int64_t>(std::floor((10 + width * kPixel + 180) / step));
   const auto south = static_cast<std::int64_t>(std::ceil((47 - height * kPixel + 90) / step)),
              north = static_cast<std::int64_t>(std::floor((47 + 90) / step));
   const NodeWindow window{west, south, static_cast<int>(east - west + 1), static_cast<int>(north - south + 1)};
-  const auto heights = source.ReadNodes(level, window);
+  const auto heights = model.ReadNodes(level, window);
   EXPECT_TRUE(heights);
   double worst = 0;
   for (std::int64_t j = south; j <= north; ++j) {
@@ -289,7 +289,7 @@ TEST(Overviews, OfAMosaicHaveNoStepAtTheJoint) {
   const TempDir dir;
   const std::string west = WriteRaster(dir, RampSpec(361, 241), "west.tif"),
                     east = WriteRaster(dir, RampSpec(361, 241, 360), "east.tif");
-  const auto source = DemSource::Open(std::vector<DemFile>{{west}, {east}}, {});
+  const auto source = ElevationModel::Open(std::vector<DemFile>{{west}, {east}}, {});
   ASSERT_TRUE(source);
   for (int level = 1; level <= 7; ++level) {
     EXPECT_LT(LargestOff(**source, level, 721, 241, level < 3 ? 34 : 17), kSlack) << level;

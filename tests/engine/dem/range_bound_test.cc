@@ -3,10 +3,10 @@
 namespace terrace::dem {
 namespace {
 
-void ExpectContained(const DemSource& source, const geo::TileKey& key) {
-  const auto tile = source.Read(key);
+void ExpectContained(const ElevationModel& model, const geo::TileKey& key) {
+  const auto tile = model.Read(key);
   ASSERT_TRUE(tile) << tile.error().message;
-  const HeightRange bound = source.RangeBound(key);
+  const HeightRange bound = model.RangeBound(key);
   for (int j = 0; j <= tile->lattice.cells; ++j) {
     for (int i = 0; i <= tile->lattice.cells; ++i) {
       const float height = tile->At(i, j);

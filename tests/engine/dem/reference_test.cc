@@ -54,8 +54,8 @@ std::vector<float> Warp(const std::string& path, const geo::Lattice& lattice, co
   return heights;
 }
 
-void ExpectAgreement(const std::string& path, const DemSource& source, const geo::TileKey& key) {
-  const auto tile = source.Read(key);
+void ExpectAgreement(const std::string& path, const ElevationModel& model, const geo::TileKey& key) {
+  const auto tile = model.Read(key);
   ASSERT_TRUE(tile) << tile.error().message;
   const std::vector<float> reference = Warp(path, tile->lattice, key);
   double worst = 0;

@@ -22,7 +22,7 @@ struct Marched {
 };
 
 // Reads the ground under `steps` + 1 places of each ray.
-std::vector<Marched> March(const DemSource& source, const std::vector<SightRay>& rays, double step_m,
+std::vector<Marched> March(const ElevationModel& model, const std::vector<SightRay>& rays, double step_m,
                            const SightOptions& options) {
   std::vector<Marched> marched;
   for (const SightRay& ray : rays) {
@@ -34,7 +34,7 @@ std::vector<Marched> March(const DemSource& source, const std::vector<SightRay>&
       places.push_back({at.longitude, at.latitude});
       heights_m.push_back(at.height_m);
     }
-    const auto ground = source.ReadPoints(places);
+    const auto ground = model.ReadPoints(places);
     EXPECT_TRUE(ground);
     Marched& one = marched.emplace_back();
     for (int i = 0; i <= steps; ++i) {
@@ -57,7 +57,7 @@ struct Region {
 };
 
 // Rays that begin and end some metres above the ground, some of them below it.
-std::vector<SightRay> RaysIn(const DemSource& source, const Region& area, std::size_t count, unsigned seed) {
+std::vector<SightRay> RaysIn(const ElevationModel& model, const Region& area, std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   const auto between = [&](double low, double high) {
     return low + (high - low) * std::uniform_real_distribution<double>()(random);
@@ -68,7 +68,7 @@ std::vector<SightRay> RaysIn(const DemSource& source, const Region& area, std::s
     ends.push_back({std::clamp(ends.back().longitude + between(-1, 1) * area.reach_degrees, area.west, area.east),
                     std::clamp(ends.back().latitude + between(-1, 1) * area.reach_degrees, area.south, area.north)});
   }
-  const auto ground = source.ReadPoints(ends);
+  const auto ground = model.ReadPoints(ends);
   EXPECT_TRUE(ground);
   std::vector<SightRay> rays;
   for (std::size_t i = 0; i < count; ++i) {
@@ -87,11 +87,12 @@ std::size_t Rays(std::size_t count) {
   return is_long != nullptr && *is_long == '1' ? 10 * count : count;
 }
 
-void ExpectAsMarched(const DemSource& source, const Region& area, std::size_t count, const SightOptions& options = {}) {
-  const std::vector<SightRay> rays = RaysIn(source, area, count, 7);
-  const auto answers = source.LookAlong(rays, options);
+void ExpectAsMarched(const ElevationModel& model, const Region& area, std::size_t count,
+                     const SightOptions& options = {}) {
+  const std::vector<SightRay> rays = RaysIn(model, area, count, 7);
+  const auto answers = model.LookAlong(rays, options);
   ASSERT_TRUE(answers) << answers.error().message;
-  const std::vector<Marched> marched = March(source, rays, area.step_m, options);
+  const std::vector<Marched> marched = March(model, rays, area.step_m, options);
   std::size_t blocked = 0, close = 0;
   for (std::size_t i = 0; i < rays.size(); ++i) {
     const SightAnswer& answer = (*answers)[i];

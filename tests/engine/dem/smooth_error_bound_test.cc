@@ -44,7 +44,7 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
       std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                  SampleRules::kVoid);
       GridTrace trace;
-      ASSERT_TRUE(grid->SetHeights(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
+      ASSERT_TRUE(grid->FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
       const TileNodes nodes{lattice, window, heights};
       const GridStatistics statistics(*grid, trace);
       const GeoidErrorBound geoid(nodes, nullptr, {});

@@ -14,8 +14,8 @@ namespace {
 
 constexpr geo::TileKey kInside{5, 34, 13};
 
-void ExpectChanged(const DemSource& source) {
-  const auto tile = source.Read(kInside);
+void ExpectChanged(const ElevationModel& model) {
+  const auto tile = model.Read(kInside);
   ASSERT_FALSE(tile);
   EXPECT_EQ(tile.error().code, ErrorCode::kChanged);
   EXPECT_NE(tile.error().message.find("dem.tif"), std::string::npos);
@@ -185,7 +185,7 @@ TEST(SourceChanges, OpeningCanBeStopped) {
   stop.request_stop();
   DemOptions options;
   options.stop = stop.get_token();
-  const auto source = DemSource::Open(WriteRaster(dir, {}), options);
+  const auto source = ElevationModel::Open(WriteRaster(dir, {}), options);
   ASSERT_FALSE(source);
   EXPECT_EQ(source.error().code, ErrorCode::kCancelled);
 }

@@ -211,7 +211,7 @@ TEST_F(SourcePolicyTest, RefusesNamesThatAreMoreThanFiles) {
   for (const std::string& name : names) {
     const auto opened = OpenRaster(name);
     EXPECT_FALSE(opened) << name;
-    EXPECT_FALSE(DemSource::Open(name)) << name;
+    EXPECT_FALSE(ElevationModel::Open(name)) << name;
   }
   ASSERT_TRUE(OpenRaster(inside)) << "the table is refused for the wrong reason";
   EXPECT_EQ(watch.Opened(), std::set<std::string>());

@@ -23,13 +23,13 @@ RasterSpec Synthetic(std::function<double(int, int)> value) {
       .width = 200, .height = 200, .geo_transform = {8, .01, 0, 47, 0, -.01}, .nodata = -1, .value = std::move(value)};
 }
 
-const RasterInfo& InfoOf(const DemSource& source) { return source.info().sources.front(); }
+const RasterInfo& InfoOf(const ElevationModel& model) { return model.info().sources.front(); }
 
 // All heights of all tiles that touch the source are within the range.
-void ExpectHeightsWithin(const DemSource& source, double lowest, double highest) {
-  for (int level = 0; level <= source.max_level(); ++level) {
-    for (const geo::TileKey& key : SomeTiles(source, level, 12)) {
-      const auto tile = source.Read(key);
+void ExpectHeightsWithin(const ElevationModel& model, double lowest, double highest) {
+  for (int level = 0; level <= model.max_level(); ++level) {
+    for (const geo::TileKey& key : SomeTiles(model, level, 12)) {
+      const auto tile = model.Read(key);
       ASSERT_TRUE(tile) << tile.error().message;
       for (const float height : tile->heights) {
         ASSERT_GE(height, lowest) << geo::ToString(key);

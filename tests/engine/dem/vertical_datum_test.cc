@@ -33,7 +33,7 @@ std::vector<GeoPosition> SomePoints() {
   return points;
 }
 
-void ExpectShifted(const DemSource& raw, const DemSource& converted) {
+void ExpectShifted(const ElevationModel& raw, const ElevationModel& converted) {
   const auto points = SomePoints();
   const auto before = raw.ReadPoints(points), after = converted.ReadPoints(points);
   ASSERT_TRUE(before && after);
@@ -300,13 +300,13 @@ TEST(VerticalDatum, RefusesWithTheFileAndTheWayOut) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, Hills("EPSG:4326"));
   if (!Geoid::OfCrs("EPSG:3855", {0, 0})) {
-    const auto refused = DemSource::Open(path, With("egm2008"));
+    const auto refused = ElevationModel::Open(path, With("egm2008"));
     ASSERT_FALSE(refused);
     for (const std::string& part : {path, std::string("us_nga_egm08_25.tif"), std::string("cdn.proj.org")}) {
       EXPECT_NE(refused.error().message.find(part), std::string::npos) << refused.error().message;
     }
   }
-  const auto missing = DemSource::Open(path, With(dir.File("none.gtx")));
+  const auto missing = ElevationModel::Open(path, With(dir.File("none.gtx")));
   ASSERT_FALSE(missing);
   EXPECT_NE(missing.error().message.find("none.gtx is no file"), std::string::npos) << missing.error().message;
 }

@@ -30,11 +30,11 @@ using proto::HeightSpan;
 // The globe at 5', and 30 m of Tennessee in it.
 CatalogPtr Mosaic() {
   const std::string folder = test_support::SourceDir() / "config/samples";
-  auto source = dem::DemSource::Open({{folder + "/jacksboro.tif", 0}, {folder + "/etopo5.tif", 0}});
+  auto source = dem::ElevationModel::Open({{folder + "/jacksboro.tif", 0}, {folder + "/etopo5.tif", 0}});
   if (!source) return nullptr;
   tiler::Dataset dataset;
   dataset.name = "earth";
-  dataset.source = *std::move(source);
+  dataset.model = *std::move(source);
   return MakeCatalog(std::make_shared<const tiler::TilePipeline>(std::vector<tiler::Dataset>{std::move(dataset)}));
 }
 

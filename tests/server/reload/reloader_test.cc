@@ -66,13 +66,13 @@ class ReloaderTest : public testing::Test {
       return MakeError(ErrorCode::kCancelled, "stopped");
     }
     if (fails_) return MakeError(ErrorCode::kInvalidArgument, "no raster");
-    auto source = dem::DemSource::Open(wanted.sources.front().files.front(), {});
+    auto source = dem::ElevationModel::Open(wanted.sources.front().files.front(), {});
     if (!source) return tl::unexpected(source.error());
     tiler::Dataset dataset;
     dataset.name = wanted.name;
-    dataset.source = *std::move(source);
+    dataset.model = *std::move(source);
     dataset.generation =
-        dataset.source->files().fingerprint();  // depends on the files and their opening, not on their content
+        dataset.model->files().fingerprint();  // depends on the files and their opening, not on their content
     return dataset;
   }
 
@@ -194,7 +194,7 @@ TEST_F(ReloaderTest, SeesAnArchiveThatChangedWhileItWasOpened) {
     const std::string file = (folder_ / "a.tif").string();
     dataset.baked_files = {{file, is_there ? dem::StampOf(file) : std::nullopt}};
     if (is_there) Put("a");
-    dataset.source = nullptr;
+    dataset.model = nullptr;
     DatasetSlot slot(config_.datasets[0], dataset);
     EXPECT_EQ(slot.CheckFiles(10), 1u);
     EXPECT_FALSE(slot.is_current());

@@ -24,7 +24,7 @@ constexpr std::size_t kMany = 1'000'000;
 class AreaMeshTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
+    auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
     ASSERT_TRUE(opened) << opened.error().message;
     source_ = *std::move(opened);
     area_ = {-84.25, 36.25, -84.2, 36.29, 5, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
@@ -44,7 +44,7 @@ class AreaMeshTest : public testing::Test {
     return plan.error().message;
   }
 
-  std::unique_ptr<dem::DemSource> source_;
+  std::unique_ptr<dem::ElevationModel> source_;
   AreaRequest area_;
 };
 
@@ -155,7 +155,7 @@ TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
 
 // Without the Earth's curvature two triangles would be enough for a plain, but they would be far below it.
 TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   AreaRequest area{-20, 20, 30, 56, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
@@ -168,7 +168,7 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
 
 // Triangles that go half around the Earth collapse into a line, and must not be measured as exact.
 TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   for (const AreaCoordinates coordinates : {AreaCoordinates::kEcef, AreaCoordinates::kEnu}) {
@@ -181,7 +181,7 @@ TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
 
 // Near a pole parallels are small circles, so triangles in space are not where they are in longitude and latitude.
 TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   for (const double error_m : {10.0, 50.0}) {
@@ -197,7 +197,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorOnItsEdges) {
     AreaRequest area{-84.4, 36.2, -84.1, 36.4, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEnu};
     EXPECT_LE(Build(area).max_error_m, error_m + 0.01);
   }
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   for (const double error_m : {5.0, 20.0, 200.0}) {
@@ -215,7 +215,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
   constexpr const char* kFile = "bigtujunga_30m_utm11.tif";
   const auto path = test_support::TestDataPath(kFile);
   if (!path) GTEST_SKIP() << test_support::MissingTestData(kFile);
-  auto opened = dem::DemSource::Open(*path);
+  auto opened = dem::ElevationModel::Open(*path);
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   const AreaRequest area{-180, -90, 180, 90, 5, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
@@ -228,7 +228,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
 
 // An area closer to the pole than the rounding of a node still has one row of cells.
 TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   AreaRequest area{0, 89.99999999999, 1, 90, 100, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
@@ -245,7 +245,7 @@ TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
 }
 
 TEST_F(AreaMeshTest, CrossesTheAntimeridian) {
-  auto opened = dem::DemSource::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
+  auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
   source_ = *std::move(opened);
   const AreaRequest area{175, -20, 190, -10, 100, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
@@ -315,7 +315,7 @@ TEST_F(AreaMeshTest, ARefusalNamesTheLimitThatIsExceeded) {
 TEST_F(AreaMeshTest, ARefusalForALongSideIsNotAboutSamples) {
   dem::DemOptions deep;
   deep.finest_error = 0.01;
-  const auto source = dem::DemSource::Open(test_support::SourceDir() / "config/samples/jacksboro.tif", deep);
+  const auto source = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/jacksboro.tif", deep);
   ASSERT_TRUE(source) << source.error().message;
   AreaRequest area = area_;
   area.west = -84.2;
@@ -369,7 +369,7 @@ class EditedAreaMesh : public AreaMeshTest {
                         << terrain << R"(},"geometry":)" << geometry << "}]}";
     dem::DemOptions options;
     options.edits = {path};
-    auto opened = dem::DemSource::Open({{test_support::SourceDir() / "config/samples/jacksboro.tif"}}, options);
+    auto opened = dem::ElevationModel::Open({{test_support::SourceDir() / "config/samples/jacksboro.tif"}}, options);
     ASSERT_TRUE(opened) << opened.error().message;
     source_ = *std::move(opened);
   }

@@ -332,11 +332,11 @@ TEST(Contours, StopWhenNobodyWaits) {
 }
 
 TEST(MapHeights, MarginsContinueAroundTheEarthAndEndAtTheSquare) {
-  const dem::DemSource& source = *SamplePipeline().datasets()[0].source;  // the whole Earth
+  const dem::ElevationModel& model = *SamplePipeline().datasets()[0].model;  // the whole Earth
   const MapWindow window({1, 0, 0}, 256, 3);
-  const auto heights = ReadMapHeights(source, window, dem::HeightDatum::kEllipsoid, {});
+  const auto heights = ReadMapHeights(model, window, dem::HeightDatum::kEllipsoid, {});
   ASSERT_TRUE(heights) << heights.error().message;
-  const auto west = source.ReadMercator(1, {509, 0, 3, 259}), own = source.ReadMercator(1, {0, 0, 259, 259});
+  const auto west = model.ReadMercator(1, {509, 0, 3, 259}), own = model.ReadMercator(1, {0, 0, 259, 259});
   ASSERT_TRUE(west);
   ASSERT_TRUE(own);
   for (int row = 0; row < 259; ++row) {

@@ -23,14 +23,14 @@ struct Ground {
       for (int i = -1; i <= kCells + 1; ++i) heights.push_back(height(i, j));
     }
   }
-  proto::LatticeView view() const { return {key, {key.level, kCells}, heights}; }
+  proto::TileSamples view() const { return {key, {key.level, kCells}, heights}; }
 
   const geo::TileKey key{12, 4096, 3072};
   std::vector<float> heights;
 };
 
-tin::TinMesh MeshOf(const proto::LatticeView& lattice, double error) {
-  const tin::HeightField field = FieldOf(lattice);
+tin::TinMesh MeshOf(const proto::TileSamples& samples, double error) {
+  const tin::HeightField field = FieldOf(samples);
   tin::GreedyTriangulation greedy(field, {});
   tin::GreedyGoal goal;
   goal.max_error = error;
@@ -38,22 +38,22 @@ tin::TinMesh MeshOf(const proto::LatticeView& lattice, double error) {
   return greedy.Mesh();
 }
 
-std::size_t Misfits(const proto::LatticeView& lattice, const tin::TinMesh& mesh) {
+std::size_t Misfits(const proto::TileSamples& samples, const tin::TinMesh& mesh) {
   std::vector<geo::Vec3> positions;
   for (const tin::SamplePosition p : mesh.vertices) {
-    positions.push_back(geo::ToEcef(lattice.Longitude(p.x), lattice.Latitude(p.y), lattice.At(p.x, p.y)));
+    positions.push_back(geo::ToEcef(samples.Longitude(p.x), samples.Latitude(p.y), samples.At(p.x, p.y)));
   }
-  return proto::CountMisfits(mesh, positions, proto::VertexNormals(lattice, mesh, positions));
+  return proto::CountMisfits(mesh, positions, proto::VertexNormals(samples, mesh, positions));
 }
 
 // The last column of the tile is the end of a survey, level and 1,300 m above the rest.
 TEST(InnerVertices, LightFitsATileThatHasTheRimOfARasterAlone) {
   const Ground ground([](int i, int) { return i >= kCells ? 1300.0F : 0.0F; });
-  const proto::LatticeView lattice = ground.view();
-  const tin::TinMesh mesh = MeshOf(lattice, 1400);
-  ASSERT_GE(2 * Misfits(lattice, mesh), mesh.vertices.size()) << "what this is for";
-  const tin::TinMesh more = WithInnerVertices(lattice, mesh);
-  EXPECT_LT(2 * Misfits(lattice, more), more.vertices.size());
+  const proto::TileSamples samples = ground.view();
+  const tin::TinMesh mesh = MeshOf(samples, 1400);
+  ASSERT_GE(2 * Misfits(samples, mesh), mesh.vertices.size()) << "what this is for";
+  const tin::TinMesh more = WithInnerVertices(samples, mesh);
+  EXPECT_LT(2 * Misfits(samples, more), more.vertices.size());
   ASSERT_GE(more.vertices.size(), mesh.vertices.size());
   EXPECT_TRUE(std::equal(mesh.vertices.begin(), mesh.vertices.end(), more.vertices.begin())) << "they come first";
   const auto is_inside = [](tin::SamplePosition p) { return p.x > 0 && p.y > 0 && p.x < kCells && p.y < kCells; };

@@ -19,8 +19,8 @@ TEST(RefinePlan, HasOneWidestRow) {
       const std::int64_t rows = geo::TileRows(level), middle = rows / 2;
       for (std::int64_t y = std::max(middle - 100, std::int64_t{0}); y < std::min(middle + 100, rows); ++y) {
         const std::vector<float> heights(static_cast<std::size_t>((cells + 3) * (cells + 3)), 0.0F);
-        const proto::LatticeView lattice{{level, 0, y}, {level, cells}, heights};
-        const std::vector<double> east_m2 = BaseRefineOptions(lattice, {}).curvature.east_m2;
+        const proto::TileSamples samples{{level, 0, y}, {level, cells}, heights};
+        const std::vector<double> east_m2 = BaseRefineOptions(samples, {}).curvature.east_m2;
         const auto widest = std::max_element(east_m2.begin(), east_m2.end());
         ASSERT_TRUE(std::is_sorted(east_m2.begin(), widest)) << level << "/" << y;
         ASSERT_TRUE(std::is_sorted(east_m2.rbegin(), std::reverse_iterator(widest))) << level << "/" << y;

@@ -42,13 +42,14 @@ TilePipeline OpenWithHole(double reach) {
         west, south, east, north);
     options.edits = {path};
   }
-  auto source = dem::DemSource::Open((test_support::SourceDir() / "config/samples/jacksboro.tif").string(), options);
+  auto source =
+      dem::ElevationModel::Open((test_support::SourceDir() / "config/samples/jacksboro.tif").string(), options);
   EXPECT_TRUE(source.has_value()) << (source ? "" : source.error().message);
   Dataset dataset;
   dataset.name = "holed";
-  dataset.source = *std::move(source);
-  dataset.generation = dataset.source->fingerprint();
-  dataset.unedited_generation = dataset.source->unedited_fingerprint();
+  dataset.model = *std::move(source);
+  dataset.generation = dataset.model->fingerprint();
+  dataset.unedited_generation = dataset.model->unedited_fingerprint();
   std::vector<Dataset> datasets;
   datasets.push_back(std::move(dataset));
   return TilePipeline(std::move(datasets));

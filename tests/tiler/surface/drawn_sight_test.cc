@@ -17,8 +17,8 @@ namespace {
 TilePipeline OpenOne(const dem::TempDir& dir, const dem::RasterSpec& spec) {
   Dataset dataset;
   dataset.name = "one";
-  dataset.source = dem::OpenOrFail(dem::WriteRaster(dir, spec));
-  dataset.generation = dataset.unedited_generation = dataset.source->fingerprint();
+  dataset.model = dem::OpenOrFail(dem::WriteRaster(dir, spec));
+  dataset.generation = dataset.unedited_generation = dataset.model->fingerprint();
   std::vector<Dataset> datasets;
   datasets.push_back(std::move(dataset));
   return TilePipeline(std::move(datasets));

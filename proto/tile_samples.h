@@ -1,4 +1,4 @@
-// The height samples of one tile with a halo of one, as the encoders see them.
+// The height samples of one tile with a halo of one sample, as the encoders see them.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,7 @@ namespace terrace::proto {
 
 struct LatticeAngles;
 
-struct LatticeView {
+struct TileSamples {
   geo::TileKey key;
   geo::Lattice lattice;
   std::span<const float> heights;  // (cells + 3)^2, row by row from the south-western halo sample

@@ -1,10 +1,9 @@
 // Results of Open, and promises of Read on real rasters.
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <future>
 #include <map>
 
 #include "tests/engine/dem/dem_fixture.h"
@@ -12,7 +11,7 @@
 namespace terrace::dem {
 namespace {
 
-TEST(DemSource, DepthFollowsTheSpacing) {
+TEST(ElevationModel, DepthFollowsTheSpacing) {
   const std::map<std::string, int> depths = {
       {"srtm3_N46E008_swiss_alps.tif", 13}, {"srtm3_S33W071_andes.tif", 13},
       {"bigtujunga_30m_utm11.tif", 14},     {"webmercator_sf_float32.tif", 17},
@@ -26,7 +25,7 @@ TEST(DemSource, DepthFollowsTheSpacing) {
   }
 }
 
-TEST(DemSource, FinestErrorSetsTheDepth) {
+TEST(ElevationModel, FinestErrorSetsTheDepth) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 47, 0, -.01}});
   EXPECT_EQ(OpenOrFail(path, {.finest_error = 1000})->max_level(), 6);
@@ -34,7 +33,7 @@ TEST(DemSource, FinestErrorSetsTheDepth) {
   EXPECT_EQ(OpenOrFail(path, {.error_fraction = 1, .finest_error = 1000})->max_level(), 7);
 }
 
-TEST(DemSource, LatticeIsTheCoarsestThatIsAsFineAsTheSource) {
+TEST(ElevationModel, LatticeIsTheCoarsestThatIsAsFineAsTheSource) {
   TERRACE_REQUIRE_DATA(path, "srtm3_S33W071_andes.tif");
   const auto source = OpenOrFail(path);
   ASSERT_NE(source, nullptr);
@@ -43,7 +42,7 @@ TEST(DemSource, LatticeIsTheCoarsestThatIsAsFineAsTheSource) {
   EXPECT_EQ(source->LatticeOf(11).cells, 128);
 }
 
-TEST(DemSource, LatticesOfTheTwoDeepestLevelsAreTwiceAsFineAsTheSource) {
+TEST(ElevationModel, LatticesOfTheTwoDeepestLevelsAreTwiceAsFineAsTheSource) {
   TERRACE_REQUIRE_DATA(path, "srtm3_S33W071_andes.tif");
   const auto source = OpenOrFail(path);
   ASSERT_NE(source, nullptr);
@@ -58,7 +57,7 @@ TEST(DemSource, LatticesOfTheTwoDeepestLevelsAreTwiceAsFineAsTheSource) {
 }
 
 // For each of two sources and for all combinations of their depths.
-TEST(DemSource, EverySourceOfAMosaicHasALatticeTwiceAsFineAtItsOwnDeepestLevel) {
+TEST(ElevationModel, EverySourceOfAMosaicHasALatticeTwiceAsFineAtItsOwnDeepestLevel) {
   const TempDir dir;
   constexpr double kFine = 0.65 / 3600;  // nodes are 0.62" apart where nothing is added
   const std::string fine = WriteRaster(dir, FlatSquare(10, 50, 20, kFine, 5), "fine.tif");
@@ -72,7 +71,7 @@ TEST(DemSource, EverySourceOfAMosaicHasALatticeTwiceAsFineAtItsOwnDeepestLevel) 
   }
 }
 
-TEST(DemSource, InfoTellsWhatTheFileSays) {
+TEST(ElevationModel, InfoTellsWhatTheFileSays) {
   TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
   const auto source = OpenOrFail(path);
   ASSERT_NE(source, nullptr);
@@ -97,7 +96,7 @@ TEST(DemSource, InfoTellsWhatTheFileSays) {
   EXPECT_FALSE(info.transform.empty());
 }
 
-TEST(DemSource, CompoundCrsStatesItsVerticalDatum) {
+TEST(ElevationModel, CompoundCrsStatesItsVerticalDatum) {
   const TempDir dir;
   const auto source =
       OpenOrFail(WriteRaster(dir, {.geo_transform = {500000, 30, 0, 5000000, 0, -30}, .crs = "EPSG:32611+5773"}));
@@ -106,7 +105,7 @@ TEST(DemSource, CompoundCrsStatesItsVerticalDatum) {
   EXPECT_NE(source->info().sources[0].crs.find("UTM zone 11N"), std::string::npos);
 }
 
-TEST(DemSource, VoidsNeverAppearAsHeights) {
+TEST(ElevationModel, VoidsNeverAppearAsHeights) {
   for (const std::string name : {"srtm3_N46E008_swiss_alps.tif", "lidar_slovenia_1m_nodata.tif",
                                  "srtm1_N48W125_cape_flattery_half_void.tif", "pole_antarctica_bedmap_5km.tif"}) {
     SCOPED_TRACE(name);
@@ -128,23 +127,7 @@ TEST(DemSource, VoidsNeverAppearAsHeights) {
   }
 }
 
-TEST(DemSource, ThreadsReadWhatOneThreadReads) {
-  TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
-  const auto source = OpenOrFail(path);
-  ASSERT_NE(source, nullptr);
-  const std::vector<geo::TileKey> keys = SomeTiles(*source, 13, 40);
-  const auto read_all = [&] {
-    std::vector<std::vector<float>> tiles;
-    for (const geo::TileKey& key : keys) tiles.push_back(source->Read(key).value().heights);
-    return tiles;
-  };
-  const auto serial = read_all();
-  std::vector<std::future<std::vector<std::vector<float>>>> threads;
-  for (int i = 0; i < 4; ++i) threads.push_back(std::async(std::launch::async, read_all));
-  for (auto& thread : threads) EXPECT_EQ(thread.get(), serial);
-}
-
-TEST(DemSource, StopsWhenAsked) {
+TEST(ElevationModel, StopsWhenAsked) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, {}));
   ASSERT_NE(source, nullptr);
@@ -155,7 +138,7 @@ TEST(DemSource, StopsWhenAsked) {
   EXPECT_EQ(tile.error().code, ErrorCode::kCancelled);
 }
 
-TEST(DemSource, ReportsProgressToTheEnd) {
+TEST(ElevationModel, ReportsProgressToTheEnd) {
   const TempDir dir;
   double last = 0;
   DemOptions options;
@@ -167,7 +150,7 @@ TEST(DemSource, ReportsProgressToTheEnd) {
   EXPECT_EQ(last, 1);
 }
 
-TEST(DemSource, FingerprintFollowsOptions) {
+TEST(ElevationModel, FingerprintFollowsOptions) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {});
   const std::uint64_t before = OpenOrFail(path)->fingerprint();
@@ -180,7 +163,7 @@ TEST(DemSource, FingerprintFollowsOptions) {
   EXPECT_NE(OpenOrFail(path, {.feather = 30})->fingerprint(), before);
 }
 
-TEST(DemSource, LeavesNoFilesBesideTheSource) {
+TEST(ElevationModel, LeavesNoFilesBesideTheSource) {
   const TempDir dir;
   const auto source = OpenOrFail(WriteRaster(dir, {}));
   ASSERT_TRUE(source->Read({3, 8, 3}));
@@ -188,36 +171,36 @@ TEST(DemSource, LeavesNoFilesBesideTheSource) {
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
 }
 
-TEST(DemSource, LeavesFilesWithoutAHeightOutOfAFolder) {
+TEST(ElevationModel, LeavesFilesWithoutAHeightOutOfAFolder) {
   const TempDir dir;
   RasterSpec empty{.nodata = -1};
   empty.value = [](int, int) { return -1.0; };
   const std::string good = WriteRaster(dir, {}, "good.tif"), none = WriteRaster(dir, empty, "none.tif");
-  const auto source = DemSource::Open({{none, 0, true}, {good, 0, true}, {none, 0, true}});
+  const auto source = ElevationModel::Open({{none, 0, true}, {good, 0, true}, {none, 0, true}});
   ASSERT_TRUE(source) << source.error().message;
   ASSERT_EQ((*source)->info().sources.size(), 1u);
   EXPECT_EQ((*source)->info().sources.front().path, good);
   for (const bool in_folder : {false, true}) {  // named files, or all files of the folder
-    const auto alone = DemSource::Open({{none, 0, in_folder}});
+    const auto alone = ElevationModel::Open({{none, 0, in_folder}});
     ASSERT_FALSE(alone);
     EXPECT_NE(alone.error().message.find("none.tif: has no valid sample"), std::string::npos);
   }
-  EXPECT_FALSE(DemSource::Open({{good, 0, false}, {none, 1, false}}));
+  EXPECT_FALSE(ElevationModel::Open({{good, 0, false}, {none, 1, false}}));
 }
 
 // Such a name does not fit into one line of a log or of a configuration.
-TEST(DemSource, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
+TEST(ElevationModel, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
   const TempDir dir;
   const std::string good = WriteRaster(dir, {}, "good.tif"), other = WriteRaster(dir, {}, "plain.tif");
   const std::string broken = dir.path().string() + "/a\nb.tif";
   std::filesystem::rename(other, broken);
-  const auto source = DemSource::Open({{good, 0, true}, {broken, 0, true}});
+  const auto source = ElevationModel::Open({{good, 0, true}, {broken, 0, true}});
   ASSERT_TRUE(source) << source.error().message;
   EXPECT_EQ((*source)->info().sources.size(), 1u);
   ASSERT_EQ((*source)->info().left_out.size(), 1u);
   EXPECT_NE((*source)->info().left_out.front().find("a\\x0ab.tif"), std::string::npos)
       << (*source)->info().left_out.front();
-  const auto named = DemSource::Open({{broken, 0, false}});
+  const auto named = ElevationModel::Open({{broken, 0, false}});
   ASSERT_FALSE(named);
   EXPECT_EQ(named.error().message.find('\n'), std::string::npos);
   EXPECT_NE(named.error().message.find("a\\x0ab.tif: a file name with a control character"), std::string::npos)
@@ -225,7 +208,7 @@ TEST(DemSource, LeavesFilesWithALineBreakInTheirNameOutOfAFolder) {
 }
 
 // A raster with colours is served, with a warning.
-TEST(DemSource, TellsPicturesFromHeights) {
+TEST(ElevationModel, TellsPicturesFromHeights) {
   TERRACE_REQUIRE_DATA(photo, "ortho_pair_rgb_2m.tif");
   TERRACE_REQUIRE_DATA(palette, "bluemarble_1920x960.tif");
   TERRACE_REQUIRE_DATA(bytes, "ortho_pair_dtm_2m_byte.tif");
@@ -238,28 +221,28 @@ TEST(DemSource, TellsPicturesFromHeights) {
   EXPECT_EQ(part_of(bytes), "");
 }
 
-TEST(DemSource, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
+TEST(ElevationModel, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 47, 0, -.01}}), cache = dir.File("cache"),
                     wrong = dir.File("wrong.tif");
   std::ofstream(wrong) << "no raster";
   DemOptions options;
   options.cache = CacheIn(cache);
-  const auto lacks = DemSource::OpenFromCache({{path}}, options);
+  const auto lacks = ElevationModel::OpenFromCache({{path}}, options);
   ASSERT_FALSE(lacks);
   EXPECT_EQ(lacks.error().code, ErrorCode::kCancelled);
-  const auto is_checked = DemSource::OpenFromCache({{path}, {wrong}}, options);
+  const auto is_checked = ElevationModel::OpenFromCache({{path}, {wrong}}, options);
   ASSERT_FALSE(is_checked);
   EXPECT_NE(is_checked.error().code, ErrorCode::kCancelled);
   EXPECT_NE(is_checked.error().message.find(wrong), std::string::npos) << is_checked.error().message;
   EXPECT_FALSE(std::filesystem::exists(cache) && !std::filesystem::is_empty(cache)) << "nothing was begun";
 
   const auto prepared = OpenOrFail(path, options);
-  const auto kept = DemSource::OpenFromCache({{path}}, options);
+  const auto kept = ElevationModel::OpenFromCache({{path}}, options);
   ASSERT_TRUE(kept) << kept.error().message;
   EXPECT_EQ((*kept)->fingerprint(), prepared->fingerprint());
   options.cache = {};
-  EXPECT_FALSE(DemSource::OpenFromCache({{path}}, options)) << "without a cache nothing is kept";
+  EXPECT_FALSE(ElevationModel::OpenFromCache({{path}}, options)) << "without a cache nothing is kept";
 }
 
 }  // namespace

@@ -25,15 +25,15 @@
 
 namespace terrace::dem {
 
-class DemSource {
+class ElevationModel {
  public:
   // Opens and checks rasters, and reads each once for its statistics. Errors name the file, the fault and the remedy.
-  static Result<std::unique_ptr<DemSource>> Open(std::vector<DemFile> files, const DemOptions& options = {});
-  static Result<std::unique_ptr<DemSource>> Open(const std::string& path, const DemOptions& options = {});
+  static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
+  static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks some, and all files
   // have passed the other checks; or stopped.
-  static Result<std::unique_ptr<DemSource>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
-  ~DemSource();
+  static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
+  ~ElevationModel();
 
   const DemInfo& info() const;
 
@@ -45,7 +45,7 @@ class DemSource {
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
-  // fine enough for the level, and the ancestors of available tiles with their siblings. Level 0 has both roots
+  // fine enough for the level, their ancestors, and the siblings of both. Level 0 has both roots
   // (mosaic/availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
@@ -104,7 +104,7 @@ class DemSource {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for the edges beyond a tile's corners (corner_edges.h).
+  // The same for the edges of other tiles that end at this tile's corners (corner_edges.h).
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.
@@ -141,9 +141,9 @@ class DemSource {
 
  private:
   class Impl;
-  explicit DemSource(std::unique_ptr<Impl> impl);
-  static Result<std::unique_ptr<DemSource>> OpenAs(std::vector<DemFile> files, const DemOptions& options,
-                                                   bool only_cached);
+  explicit ElevationModel(std::unique_ptr<Impl> impl);
+  static Result<std::unique_ptr<ElevationModel>> OpenAs(std::vector<DemFile> files, const DemOptions& options,
+                                                        bool only_cached);
   std::unique_ptr<Impl> impl_;
 };
 

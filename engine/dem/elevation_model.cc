@@ -1,4 +1,4 @@
-#include "engine/dem/dem_source.h"
+#include "engine/dem/elevation_model.h"
 
 #include <fmt/format.h>
 
@@ -215,23 +215,24 @@ std::vector<SourceExtent> SourceExtentsOf(const std::vector<RasterGrid>& grids, 
 
 }  // namespace
 
-DemSource::DemSource(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
-DemSource::~DemSource() = default;
+ElevationModel::ElevationModel(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+ElevationModel::~ElevationModel() = default;
 
-Result<std::unique_ptr<DemSource>> DemSource::Open(const std::string& path, const DemOptions& options) {
+Result<std::unique_ptr<ElevationModel>> ElevationModel::Open(const std::string& path, const DemOptions& options) {
   return Open(std::vector<DemFile>{{path}}, options);
 }
 
-Result<std::unique_ptr<DemSource>> DemSource::Open(std::vector<DemFile> files, const DemOptions& options) {
+Result<std::unique_ptr<ElevationModel>> ElevationModel::Open(std::vector<DemFile> files, const DemOptions& options) {
   return OpenAs(std::move(files), options, /*only_cached=*/false);
 }
 
-Result<std::unique_ptr<DemSource>> DemSource::OpenFromCache(std::vector<DemFile> files, const DemOptions& options) {
+Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenFromCache(std::vector<DemFile> files,
+                                                                      const DemOptions& options) {
   return OpenAs(std::move(files), options, /*only_cached=*/true);
 }
 
-Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files, const DemOptions& options,
-                                                     bool only_cached) {
+Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFile> files, const DemOptions& options,
+                                                               bool only_cached) {
   TERRACE_CHECK(!files.empty());
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
@@ -267,23 +268,23 @@ Result<std::unique_ptr<DemSource>> DemSource::OpenAs(std::vector<DemFile> files,
   if (!contents) return tl::unexpected(contents.error());
   impl->contents = *std::move(contents);
   if (auto opened = impl->OpenEdits(options); !opened) return tl::unexpected(std::move(opened).error());
-  return std::unique_ptr<DemSource>(new DemSource(std::move(impl)));
+  return std::unique_ptr<ElevationModel>(new ElevationModel(std::move(impl)));
 }
 
-const DemInfo& DemSource::info() const { return impl_->info; }
-int DemSource::max_level() const { return impl_->info.max_level; }
-int DemSource::max_source_level() const { return impl_->info.max_source_level; }
-geo::Lattice DemSource::LatticeOf(int level) const { return impl_->LatticeOf(level); }
-std::uint64_t DemSource::fingerprint() const { return impl_->fingerprint; }
+const DemInfo& ElevationModel::info() const { return impl_->info; }
+int ElevationModel::max_level() const { return impl_->info.max_level; }
+int ElevationModel::max_source_level() const { return impl_->info.max_source_level; }
+geo::Lattice ElevationModel::LatticeOf(int level) const { return impl_->LatticeOf(level); }
+std::uint64_t ElevationModel::fingerprint() const { return impl_->fingerprint; }
 
-bool DemSource::has_lost_cache() const {
+bool ElevationModel::has_lost_cache() const {
   return std::ranges::any_of(impl_->grids, [](const RasterGrid& grid) {
     return std::ranges::any_of(grid.members(),
                                [](const GridMember& member) { return member.raster->has_lost_cache(); });
   });
 }
 
-StampedFiles DemSource::files() const {
+StampedFiles ElevationModel::files() const {
   StampedFiles all;
   std::set<const Geoid*> geoids;
   for (const RasterGrid& grid : impl_->grids) {
@@ -296,27 +297,27 @@ StampedFiles DemSource::files() const {
   return all;
 }
 
-const std::vector<geo::TileRange>& DemSource::Available(int level) const {
+const std::vector<geo::TileRange>& ElevationModel::Available(int level) const {
   static const std::vector<geo::TileRange> none;
   if (level < 0 || level > max_level()) return none;
   return impl_->available[static_cast<std::size_t>(level)];
 }
 
-const std::vector<std::vector<geo::TileRange>>& DemSource::Availability() const { return impl_->available; }
+const std::vector<std::vector<geo::TileRange>>& ElevationModel::Availability() const { return impl_->available; }
 
-bool DemSource::IsAvailable(const geo::TileKey& key) const { return geo::IsAvailable(impl_->available, key); }
+bool ElevationModel::IsAvailable(const geo::TileKey& key) const { return geo::IsAvailable(impl_->available, key); }
 
-Result<TileHeights> DemSource::Read(const geo::TileKey& key, std::stop_token stop) const {
+Result<TileHeights> ElevationModel::Read(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
   return impl_->Read(key, HeightDatum::kEllipsoid, stop);
 }
 
-Result<TileHeights> DemSource::ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop) const {
+Result<TileHeights> ElevationModel::ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop) const {
   TERRACE_CHECK(geo::IsValid(key));
   return impl_->Read(key, HeightDatum::kSource, stop);
 }
 
-SampleCounts DemSource::CountSamples() const {
+SampleCounts ElevationModel::CountSamples() const {
   SampleCounts sum;
   for (const RasterGrid& grid : impl_->grids) {
     const SampleCounts counts = grid.CountSamples();
@@ -327,19 +328,19 @@ SampleCounts DemSource::CountSamples() const {
   return sum;
 }
 
-KeptBlocks DemSource::CountKeptBlocks() {
+KeptBlocks ElevationModel::CountKeptBlocks() {
   const PointBlockCache& cache = PointBlockCache::Shared();
   return {cache.count(), cache.bytes()};
 }
 
-bool DemSource::has_datum() const {
+bool ElevationModel::has_datum() const {
   return std::ranges::none_of(impl_->info.sources,
                               [](const RasterInfo& raster) { return raster.datum_in_use.empty(); });
 }
 
-bool DemSource::converts() const { return impl_->floor_undulations != nullptr; }
+bool ElevationModel::converts() const { return impl_->floor_undulations != nullptr; }
 
-Result<std::vector<float>> DemSource::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
+Result<std::vector<float>> ElevationModel::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
   TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
   return impl_->ReadNodes(level, window, HeightDatum::kEllipsoid, fmt::format("an area of level {}", level), stop);
