@@ -11,11 +11,12 @@ namespace terrace::proto {
 
 struct LatticeAngles;
 
+// A view: does not own the heights.
 struct TileSamples {
   geo::TileKey key;
   geo::Lattice lattice;
   std::span<const float> heights;  // (cells + 3)^2, row by row from the south-western halo sample
-  // Of this lattice (lattice_angles.h), outliving the view. Null: each function that needs them computes them.
+  // Of this lattice (lattice_angles.h); must outlive this object. Null: each function that needs them computes them.
   const LatticeAngles* angles = nullptr;
 
   int cells() const { return lattice.cells; }

@@ -22,7 +22,7 @@ namespace terrace::tiler {
 // The source of a dataset's water: a mask, a sea level, or none. At most one is set.
 struct WaterOptions {
   std::shared_ptr<const dem::WaterRaster> mask;
-  std::optional<double> sea_level_m;  // in the source's vertical datum
+  std::optional<double> sea_level_m;  // in the vertical datum of each source
 
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };

@@ -33,7 +33,7 @@ struct Encoder {
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 
-// encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: the source, the
+// encoders/quantized_mesh.cc, glb.cc, height_png.cc, relief.cc, contours.cc, imagery.cc. kUnavailable: a source, the
 // water raster or the image cannot be read now. kCancelled: stopped. kNotFound (height tiles and those for maps):
 // deeper than max_mercator_depth; imagery: the dataset has none.
 Result<void> MakeQuantizedMeshTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);

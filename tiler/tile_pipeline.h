@@ -45,7 +45,7 @@ class TilePipeline {
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
   // kNotFound: no such dataset, a tile outside availability, or, in a dataset without sources, a tile that its archive
-  // lacks. kUnavailable: the source cannot be read now. kChanged: a file of the source was replaced, so the dataset has
+  // lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced, so the dataset has
   // to be opened again. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 

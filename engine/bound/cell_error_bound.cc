@@ -37,7 +37,7 @@ class CellSurface {
   }
 
   // `heights`: of the corners. `widened`: uncertainty of the samples' heights. In metres.
-  void FillNodes(const std::array<double, 4>& heights, double widened) {
+  void SetHeights(const std::array<double, 4>& heights, double widened) {
     heights_ = heights;
     widened_ = widened;
     const auto [lowest, highest] = std::ranges::minmax(heights);
@@ -334,7 +334,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
     const double geoid = is_added ? geoid_.AddedAt(cell.nodes[k]) : (range.min + range.max) / 2;
     heights[k] = double{tile_.heights[cell.nodes[k]]} - geoid;
   }
-  surface.FillNodes(heights, is_known ? geoid_error : (range.max - range.min) / 2);
+  surface.SetHeights(heights, is_known ? geoid_error : (range.max - range.min) / 2);
   double error = 0, lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = in.north; row <= in.south; ++row) {
     const float* const line = samples.data() + (row - window.row) * window.columns + (column_offset - window.column);

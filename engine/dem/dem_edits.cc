@@ -110,12 +110,12 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
     of_replacement.source = options.source;
     of_replacement.cache = options.cache;
     of_replacement.stop = options.stop;
-    auto source = ElevationModel::Open(edit.source, of_replacement);
-    if (!source) {
+    auto model = ElevationModel::Open(edit.source, of_replacement);
+    if (!model) {
       opened.erase(known);
-      return fmt::format("its source: {}", source.error().message);
+      return fmt::format("its source: {}", model.error().message);
     }
-    replacements.push_back(*std::move(source));
+    replacements.push_back(*std::move(model));
   }
   edit.replacement = known->second;
   const ElevationModel& model = *replacements[edit.replacement];
@@ -146,7 +146,7 @@ Result<void> ElevationModel::Impl::OpenEdits(const DemOptions& options) {
   }
   if (const auto changed = edit_files.FirstChanged()) return tl::unexpected(ChangedError(*changed));
   if (!faults.empty()) return MakeError(ErrorCode::kInvalidArgument, "edits: {}", TextOf(faults));
-  for (const auto& source : replacements) edit_files.Append(source->files());
+  for (const auto& model : replacements) edit_files.Append(model->files());
   ContentHasher hasher;
   hasher.Add(unedited_fingerprint);
   hasher.Add(std::uint64_t{read.size()});

@@ -1,4 +1,4 @@
-// The state of a ElevationModel. Immutable after Open.
+// The state of an ElevationModel. Immutable after Open.
 #pragma once
 
 #include <algorithm>
@@ -73,7 +73,7 @@ class ElevationModel::Impl {
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
-  // ReplacedHeights::void_cells. `traces`: of this source, for the window. void_cells.cc.
+  // ReplacedHeights::void_cells. `traces`: of this model, for the window. void_cells.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
                                       std::span<const PartTrace> traces) const;
   // The edits that may reach the nodes of a window.
@@ -81,6 +81,7 @@ class ElevationModel::Impl {
   std::vector<std::size_t> EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const;
   Result<void> EditPoints(std::span<const GeoPosition> points, HeightDatum datum, std::span<float> heights,
                           const std::stop_token& stop) const;
+  // dem_read.cc.
   Result<std::vector<float>> PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
                                             const std::stop_token& stop, std::span<std::uint8_t> filled = {}) const;
   HeightRange UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const;

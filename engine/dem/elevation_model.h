@@ -45,7 +45,7 @@ class ElevationModel {
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
-  // fine enough for the level, their ancestors, and the siblings of both. Level 0 has both roots
+  // fine enough for the level or that edits add, their ancestors, and the siblings of both. Level 0 has both roots
   // (mosaic/availability.h).
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
@@ -57,7 +57,7 @@ class ElevationModel {
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid.
-  // kUnavailable: the source cannot be read now. kChanged: the file was replaced. kCancelled: stopped.
+  // kUnavailable: a source cannot be read now. kChanged: a file was replaced. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
@@ -71,7 +71,7 @@ class ElevationModel {
   // Heights at pixel centres of a Web Mercator grid, row by row from the north-western pixel. The rules of tiles apply:
   // samples are averaged to the grid's resolution, voids are filled as DemOptions says, and the floor is used
   // elsewhere. A height depends on depth and pixel alone. Depths 0 .. geo::kMaxLevel; info().max_mercator_depth is the
-  // first as fine as the source.
+  // first as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:

@@ -92,7 +92,7 @@ struct Edit {
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
   int min_level = 0;                                         // of precision
   std::string source;                                        // of replace: a path
-  std::size_t replacement = 0;  // of replace: index of the opened source, set by ElevationModel
+  std::size_t replacement = 0;  // of replace: index of the model opened from `source`; ElevationModel sets it
 
   // Derived by Complete.
   Box reach;                     // degrees, with the blend; around plane.longitude, so that its ends may be beyond 180

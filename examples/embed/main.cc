@@ -18,14 +18,14 @@ int main(int count, char** arguments) {
     std::fputs("usage: embed DEM LEVEL X Y ERROR_M OUT.terrain\n", stderr);
     return 2;
   }
-  auto source = dem::ElevationModel::Open(arguments[1]);
-  if (!source) {
-    std::fprintf(stderr, "embed: %s\n", source.error().message.c_str());
+  auto model = dem::ElevationModel::Open(arguments[1]);
+  if (!model) {
+    std::fprintf(stderr, "embed: %s\n", model.error().message.c_str());
     return 1;
   }
   tiler::Dataset dataset;
   dataset.name = "dem";
-  dataset.model = *std::move(source);
+  dataset.model = *std::move(model);
   const double error_fraction = dataset.error_fraction;
   const tiler::TilePipeline pipeline({std::move(dataset)});
 

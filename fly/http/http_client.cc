@@ -62,8 +62,9 @@ void Fail(HttpReply& reply, Failure failure, const error_code& error) {
 }
 
 bool IsUntrusted(const error_code& error) {
-  return error.category() == asio::error::get_ssl_category() &&
-         ERR_GET_REASON(static_cast<unsigned long>(error.value())) == SSL_R_CERTIFICATE_VERIFY_FAILED;
+  const auto code = static_cast<unsigned long>(error.value());
+  return error.category() == asio::error::get_ssl_category() && ERR_GET_LIB(code) == ERR_LIB_SSL &&
+         ERR_GET_REASON(code) == SSL_R_CERTIFICATE_VERIFY_FAILED;
 }
 
 }  // namespace
@@ -139,7 +140,9 @@ class HttpClient::Impl {
       if (tls_error) {
         if (IsUntrusted(tls_error)) {
           Fail(reply, Failure::kUntrusted, tls_error);
-          reply.detail += "; SSL_CERT_FILE names a file of trusted certificates, --insecure accepts every certificate";
+          reply.detail +=
+              "; if the host is right, let SSL_CERT_FILE name a file with its certificate, or accept every certificate "
+              "with --insecure";
         } else {
           Fail(reply, Failure::kConnect, tls_error);
         }

@@ -21,7 +21,7 @@ struct HttpOptions {
 
 enum class Failure {
   kNone,       // a complete reply, with any status
-  kConnect,    // no connection: refused, unknown host, TLS
+  kConnect,    // no connection: refused, unknown host, another failure of TLS
   kUntrusted,  // the server's certificate is not trusted, or is that of another host
   kTimeout,    // no complete reply in time
   kCut,        // closed before the reply was complete

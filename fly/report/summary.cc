@@ -67,7 +67,8 @@ void FindFaults(const FlightOptions& options, const std::vector<Second>& seconds
   }
   for (std::size_t i = 1; i < kOutcomes; ++i) {
     if (totals.outcomes[i] == 0) continue;
-    findings.push_back(fmt::format("{} requests: {}.", Grouped(totals.outcomes[i]), NameOf(static_cast<Outcome>(i))));
+    findings.push_back(fmt::format("{} request{}: {}.", Grouped(totals.outcomes[i]), totals.outcomes[i] == 1 ? "" : "s",
+                                   NameOf(static_cast<Outcome>(i))));
   }
   if (totals.version_changes > 0) {
     findings.push_back(fmt::format("The dataset changed its version {} times; {} frames showed tiles of two versions.",

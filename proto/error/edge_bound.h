@@ -53,8 +53,8 @@ class EdgeBound {
  private:
   const TileSamples& samples_;
   float steepest_east_ = 0, steepest_north_ = 0;
-  // By node, as the lattice's heights: the largest |twist| of a cell at the node. A cell's twist is the coefficient of
-  // xy of its surface.
+  // By node, in the order of TileSamples::heights: the largest |twist| of a cell at the node. A cell's twist is the
+  // coefficient of xy of its surface.
   std::unique_ptr<float[]> twists_;
 };
 

@@ -34,8 +34,8 @@ bool IsOutside(const Grant& grant, const Route& route) {
 
 bool HasName(const RequestContext& context) { return context.grant && !context.grant->name.empty(); }
 
-// The key of a client for rate limits: a token's name after a slash, with which no address begins, or the block of the
-// address.
+// The key of a client for rate limits: a token's name after a slash, with which no address begins, or what its
+// address counts as.
 std::string Who(const RequestContext& context, const ClientIdentity& client) {
   return HasName(context) ? "/" + context.grant->name : client.counted_as;
 }

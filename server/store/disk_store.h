@@ -2,8 +2,8 @@
 //
 // Thread-safe. Find and Erase block. Keep puts the value into a queue, from which a thread of the store writes it; it
 // blocks only if the queue is full and waits_for_room is set. Only Erase returns errors. After a failed
-// write the store only reads, after a failed read it does neither; it tries again every `retry_after`. Log and
-// statistics report this.
+// write the store only reads; after a failed read it neither reads nor writes. It tries again every `retry_after`.
+// Log and statistics report this.
 #pragma once
 
 #include <atomic>

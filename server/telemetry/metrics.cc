@@ -162,7 +162,7 @@ struct Metrics::Families {
   prometheus::Family<prometheus::Counter>& refinements =
       prometheus::BuildCounter()
           .Name("terrace_refinements_total")
-          .Help("Tiles built, by what was found of their refinement: replayed, continued, or made from the source")
+          .Help("Tiles built, by what was found of their refinement: replayed, continued, or made from the sources")
           .Register(registry);
   prometheus::Counter& made = refinements.Add({{"use", "made"}});
   prometheus::Counter& continued = refinements.Add({{"use", "continued"}});

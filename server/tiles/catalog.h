@@ -67,8 +67,8 @@ struct Catalog {
 };
 using CatalogPtr = std::shared_ptr<const Catalog>;
 
-// The problem of a dataset whose reopening takes long. Clients see only this text: other problems name files and stay
-// in the log.
+// The problem of a dataset whose reopening takes long. /readyz shows this text. For other
+// problems, which name files, it says only that the log has the reason.
 inline constexpr const char* kReopening = "is being reopened; cached tiles are still served";
 
 CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending = {});
@@ -76,8 +76,8 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// On the deepest level of the sources, returns the bounds of the largest range and of the ranges connected with it,
-// clipped to the dataset's bounds. Degrees; west > east: across the antimeridian.
+// On the deepest level that has tiles without edits, returns the bounds of the largest range and of the ranges
+// connected with it, clipped to the dataset's bounds. Degrees; west > east: across the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
 // Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.

@@ -47,14 +47,14 @@ export async function servePages({ libraries = false } = {}) {
   };
 }
 
-// Waits until `ready`, an expression of the page, has been true for half a second.
-export async function settle(page, ready) {
+// Waits until `ready`, an expression of the page, has been true for `calmMs`.
+export async function settle(page, ready, calmMs = 500) {
   await page.evaluate(() => { window.calmSince = undefined; });
-  await page.waitForFunction((expression) => {
+  await page.waitForFunction(([expression, least]) => {
     const fine = !document.getElementById('line').textContent.startsWith('Loading') && (0, eval)(expression);
     window.calmSince = fine ? window.calmSince ?? performance.now() : undefined;
-    return fine && performance.now() - window.calmSince > 500;
-  }, ready, { timeout: kSettleMs, polling: 100 }).catch(async (error) => {
+    return fine && performance.now() - window.calmSince >= least;
+  }, [ready, calmMs], { timeout: kSettleMs, polling: 100 }).catch(async (error) => {
     throw new Error(`${error.message.split('\n')[0]}: ${await page.locator('#line').innerText()} ${page.wrongs.join('; ')}`);
   });
 }

@@ -264,8 +264,8 @@ describe('the pages of examples/', () => {
       it(`${name} draws ${dataset}, opened ${how}`, async () => {
         const folder = dataset === 'earth' ? files.url : `file://${kExamples}`;
         const page = await openPage(browser, `${folder}/${name}.html?server=${server.url}&dataset=${dataset}`);
-        await settle(page, 'true');
-        await page.evaluate(() => { if (window.widget) widget.scene.msaaSamples = 1; });  // a software renderer
+        await settle(page, 'true', 0);
+        await page.evaluate(() => { if (window.widget) Object.assign(widget.scene, { msaaSamples: 1, requestRenderMode: true }); });  // a software renderer
         await settle(page, ready);
         assert.match(await line(page), new RegExp(`^${dataset} of ${server.url} as `));
         const count = await colours(page);
@@ -304,7 +304,7 @@ describe('the pages of examples/', () => {
     for (const [query, said] of [[`server=${server.url}&dataset=mars`, /no dataset mars; it has earth, jacksboro/],
                                  ['server=http://127.0.0.1:9', /^http:\/\/127.0.0.1:9: Failed to fetch/]]) {
       const page = await openPage(browser, `file://${kExamples}/maplibre.html?${query}`);
-      await settle(page, 'true');
+      await settle(page, 'true', 0);
       assert.match(await line(page), said);
       await page.close();
     }

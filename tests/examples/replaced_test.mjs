@@ -181,6 +181,8 @@ describe('a replaced source', () => {
     const note = (request) => wanted.push(request.url());
     page.on('request', note);
     await action();
+    await settle(page, 'true', 0);
+    await page.evaluate(() => { if (window.widget) widget.scene.requestRenderMode = true; });  // a software renderer
     await settle(page, client.ready);
     if (client.view) {
       await page.evaluate(client.view);

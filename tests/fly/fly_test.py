@@ -278,11 +278,13 @@ class Https(unittest.TestCase):
                     self.assertEqual(status, 0, summary)
                     self.assertGreater(summary["tiles"], 60)
                     self.assertLessEqual(summary["connections"], 20)
-                # Not trusted, or another name than the certificate's: nothing is loaded.
+                # Not trusted, or another name than the certificate's: nothing is loaded, and nothing is tried again.
                 for wrong, environment in ((url, {"SSL_CERT_FILE": "/dev/null"}), (url.replace("localhost", "127.0.0.1"), trusted)):
                     status, answer = fly_to(wrong, environment=environment)
                     self.assertEqual(status, 1, answer)
                     self.assertIn("certificate verify failed", str(answer))
+                    self.assertIn("SSL_CERT_FILE", str(answer))
+                    self.assertEqual(answer["outcomes"]["no_connection"], 1, "asking again does not help")
                 status, summary = fly_to(url.replace("localhost", "127.0.0.1"), "--insecure", "--require", "full-view=60s,errors=0")
                 self.assertEqual(status, 0, summary)
 

@@ -59,8 +59,8 @@ TEST(TileError, ListsForEachTriangleASampleThatMissesTheBound) {
   const TileError error = TileErrorMeter(ground.view(), 60).Measure(tile);
   ASSERT_FALSE(error.to_insert.empty());
   EXPECT_LE(error.to_insert.size(), tile.triangles.size());
-  for (const tin::SamplePosition miss : error.to_insert) {
-    EXPECT_TRUE(miss.x > 0 && miss.y > 0 && miss.x < 64 && miss.y < 64);
+  for (const tin::SamplePosition sample : error.to_insert) {
+    EXPECT_TRUE(sample.x > 0 && sample.y > 0 && sample.x < 64 && sample.y < 64);
   }
 }
 
@@ -126,13 +126,13 @@ TEST(TileErrorMeter, MeasuresAsIfItWereTheFirstTime) {
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
   QuantizedTile tile;
   int rounds = 0;
-  for (bool misses = true; misses; ++rounds) {
+  for (bool to_insert = true; to_insert; ++rounds) {
     ASSERT_LT(rounds, 100);
     tile = QuantizeTile(ground.view(), mesh, FineSteps());
     const TileError error = meter.Measure(tile);
     ExpectEqual(error, TileErrorMeter(ground.view(), 60).Measure(tile));
-    misses = !error.to_insert.empty();
-    if (misses) mesh = tin::InsertSamples(mesh, {error.to_insert.data(), 1 + error.to_insert.size() / 3});
+    to_insert = !error.to_insert.empty();
+    if (to_insert) mesh = tin::InsertSamples(mesh, {error.to_insert.data(), 1 + error.to_insert.size() / 3});
   }
   EXPECT_GT(rounds, 5);
   const QuantizedTile other = QuantizeTile(ground.view(), GreedyMesh(ground.view(), {.max_error = 100}), FineSteps());
@@ -149,15 +149,15 @@ TEST(TileErrorMeter, MeasuresFlatTrianglesAsIfItWereTheFirstTime) {
   const RandomGround ground({9, 300, 400}, 64, 256, 4);
   TileErrorMeter meter(ground.view(), 60);
   tin::TinMesh mesh = GreedyMesh(ground.view(), {.max_error = 150});
-  std::size_t misses = 1;
+  std::size_t to_insert = 1;
   for (const double step : {1.0 / 16, 1.0 / 16, 1.0 / 16, 1.0 / 16, 8.0, 8.0, 1.0 / 64}) {
     const std::vector<geo::Vec3> positions = GridPositions(SnapVertices(ground.view(), mesh, step), step);
     const TileError error = meter.MeasureFlat(mesh, positions);
     ExpectEqual(error, TileErrorMeter(ground.view(), 60).MeasureFlat(mesh, positions));
-    misses = error.to_insert.size();
-    mesh = tin::InsertSamples(mesh, {error.to_insert.data(), misses / 3});
+    to_insert = error.to_insert.size();
+    mesh = tin::InsertSamples(mesh, {error.to_insert.data(), to_insert / 3});
   }
-  EXPECT_GT(misses, 0u) << "nothing was left to be told again";
+  EXPECT_GT(to_insert, 0u) << "nothing was left to be told again";
 }
 
 }  // namespace

@@ -65,7 +65,7 @@ std::optional<TilePipeline> Open(const CertifiedSource& source) {
 class RandomTiles {
  public:
   RandomTiles(const dem::ElevationModel& model, const SampleIndex& samples)
-      : source_(model), samples_(samples), tries_(static_cast<std::size_t>(model.max_level() + 1)) {}
+      : model_(model), samples_(samples), tries_(static_cast<std::size_t>(model.max_level() + 1)) {}
 
   // A tile of the next level that needs more tiles. `deep_and_fine`: of the two deepest levels, with the smallest
   // error.
@@ -81,7 +81,7 @@ class RandomTiles {
       };
       request.key = {level, tile(at.longitude + 180, 2 * geo::TileRows(level)),
                      tile(at.latitude + 90, geo::TileRows(level))};
-    } while (!source_.IsAvailable(request.key) || !IsWanted(request.key));
+    } while (!model_.IsAvailable(request.key) || !IsWanted(request.key));
     request.error_step = deep_and_fine ? geo::kFinestStep : static_cast<int>(random_() % 25) - 8;
     return request;
   }
@@ -98,7 +98,7 @@ class RandomTiles {
     return count <= kManySamples;
   }
 
-  const dem::ElevationModel& source_;
+  const dem::ElevationModel& model_;
   const SampleIndex& samples_;
   std::vector<int> tries_;  // by level
   std::size_t turn_ = 0;

@@ -75,7 +75,7 @@ TileRequest RequestFor(const geo::TileKey& key, int step) {
   return request;
 }
 
-const dem::ElevationModel& SourceOf(const TilePipeline& pipeline) { return *pipeline.datasets().front().model; }
+const dem::ElevationModel& ModelOf(const TilePipeline& pipeline) { return *pipeline.datasets().front().model; }
 
 constexpr std::array kSteps = {-8, 0, 8, 20};
 constexpr std::array kLevels = {9, 11, 12};
@@ -109,7 +109,7 @@ TEST_F(Edits, LeaveEdgesOfNeighboursEqual) {
           for (int dy = -2; dy <= 1; ++dy) {
             for (int dx = -2; dx <= 1; ++dx) {
               const geo::TileKey key = TileAt(level, dx, dy);
-              if (SourceOf(pipeline).IsAvailable(key)) tiles[{dx, dy}] = FetchTile(pipeline, RequestFor(key, step));
+              if (ModelOf(pipeline).IsAvailable(key)) tiles[{dx, dy}] = FetchTile(pipeline, RequestFor(key, step));
             }
           }
           ASSERT_TRUE(ExpectEqualEdges(tiles, fmt::format("{} {} {}", kind, level, step)) >= 4 && !HasFailure());
@@ -159,9 +159,9 @@ TEST_F(Edits, KeepThePrecisionAtEverySample) {
           for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {-1, -1}}) {
             const geo::TileKey key = TileAt(level, dx, dy);
             const FetchedTile tile = FetchTile(pipeline, RequestFor(key, step));
-            const auto heights = SourceOf(pipeline).Read(key);
+            const auto heights = ModelOf(pipeline).Read(key);
             ASSERT_TRUE(heights.has_value());
-            const dem::MeshDemands demands = SourceOf(pipeline).DemandsOf(key);
+            const dem::MeshDemands demands = ModelOf(pipeline).DemandsOf(key);
             const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
             const double error_m = geo::LadderError(level, step);
             for (std::size_t k = 0; k < demands.weights.size(); ++k) {
@@ -170,7 +170,7 @@ TEST_F(Edits, KeepThePrecisionAtEverySample) {
               if (allowed >= error_m) continue;
               ++limited;
               const double least =
-                  std::max(allowed, LeastInFormat(SourceOf(pipeline), key, tile, *heights, k)) + 0x1p-11;
+                  std::max(allowed, LeastInFormat(ModelOf(pipeline), key, tile, *heights, k)) + 0x1p-11;
               EXPECT_LE(errors[k], least) << kind << " " << geo::ToString(key) << " step " << step;
               exceeded += errors[k] > least ? 1 : 0;
             }
@@ -192,9 +192,9 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
     for (const auto& [dx, dy] : {std::pair{0, 0}, {-1, 0}, {0, -1}, {-1, -1}}) {
       const geo::TileKey key = TileAt(level, dx, dy);
       const FetchedTile tile = FetchTile(pipeline, RequestFor(key, 0));
-      const auto heights = SourceOf(pipeline).Read(key);
+      const auto heights = ModelOf(pipeline).Read(key);
       ASSERT_TRUE(heights.has_value());
-      const dem::MeshDemands demands = SourceOf(pipeline).DemandsOf(key);
+      const dem::MeshDemands demands = ModelOf(pipeline).DemandsOf(key);
       const std::vector<double> errors = DecodedErrors(tile.mesh, *heights);
       const int cells = heights->lattice.cells;
       for (std::size_t k = 0; k < demands.caps.size(); ++k) {
@@ -203,7 +203,7 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
         ++limited;
         const int x = static_cast<int>(k) % (cells + 1), y = static_cast<int>(k) / (cells + 1);
         on_edges += x == 0 || y == 0 || x == cells || y == cells ? 1 : 0;
-        const double least = LeastInFormat(SourceOf(pipeline), key, tile, *heights, k);
+        const double least = LeastInFormat(ModelOf(pipeline), key, tile, *heights, k);
         EXPECT_LE(errors[k], std::max(allowed, least) + 0x1p-11) << geo::ToString(key) << " " << x << " " << y;
       }
     }
@@ -214,7 +214,7 @@ TEST_F(Edits, KeepCentimetresBesideCliffs) {
 
 // Of up to 60 tiles of a level below the sources' deepest: common edges, and the precision at every sample.
 void ExpectEdgesAndPrecision(const TilePipeline& pipeline, int level, int step) {
-  const dem::ElevationModel& model = SourceOf(pipeline);
+  const dem::ElevationModel& model = ModelOf(pipeline);
   TilesByPlace tiles;
   for (const geo::TileRange& range : model.Available(level)) {
     for (std::int64_t y = range.start_y; y <= range.end_y && tiles.size() < 60; ++y) {
@@ -250,8 +250,8 @@ TEST_F(Edits, GoDeeperWherePrecisionAsksForIt) {
   const std::vector<std::string> features = {Feature(R"({"op":"flatten","height":"mean","blend_m":15})", small),
                                              Feature(R"({"op":"precision","error_m":0.2,"blend_m":20})", small)};
   const TilePipeline plain = Open({}), pipeline = Open(features);
-  const dem::ElevationModel& model = SourceOf(pipeline);
-  const int finest = SourceOf(plain).max_level(), deepest = model.max_level();
+  const dem::ElevationModel& model = ModelOf(pipeline);
+  const int finest = ModelOf(plain).max_level(), deepest = model.max_level();
   ASSERT_EQ(model.max_source_level(), finest);
   ASSERT_GT(deepest, finest + 1);
   for (const MeshOptions& mesh : kMeshes) {
@@ -283,17 +283,17 @@ TEST_F(Edits, LeaveTheBytesOfTilesThatTheyDoNotTouch) {
   for (const auto& [kind, feature] : Kinds()) {
     const TilePipeline edited = Open({feature});
     int same = 0, touched = 0, differ = 0;
-    for (int level = 0; level <= SourceOf(plain).max_level(); ++level) {
+    for (int level = 0; level <= ModelOf(plain).max_level(); ++level) {
       for (int dy = -3; dy <= 3; ++dy) {
         for (int dx = -3; dx <= 3; ++dx) {
           const geo::TileKey key = TileAt(level, dx, dy);
-          if (!SourceOf(plain).IsAvailable(key)) continue;
+          if (!ModelOf(plain).IsAvailable(key)) continue;
           for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kGlb}) {
             TileRequest request = RequestFor(key, 0);
             request.format = format;
             const auto a = plain.Build(request, {}), b = edited.Build(request, {});
             ASSERT_TRUE(a.has_value() && b.has_value());
-            const bool is_touched = SourceOf(edited).EditsHash(key) != 0;
+            const bool is_touched = ModelOf(edited).EditsHash(key) != 0;
             if (is_touched) {
               ++touched;
               differ += a->bytes != b->bytes ? 1 : 0;
@@ -319,7 +319,7 @@ TEST_F(Edits, AreCertified) {
     const TilePipeline pipeline = Open({feature});
     std::vector<dem::GeoPosition> positions;
     for (const Sample& sample : samples) positions.push_back({sample.longitude, sample.latitude});
-    const auto heights = SourceOf(pipeline).ReadPoints(positions);
+    const auto heights = ModelOf(pipeline).ReadPoints(positions);
     ASSERT_TRUE(heights.has_value());
     std::vector<Sample> edited = samples;
     for (std::size_t i = 0; i < edited.size(); ++i) edited[i].height = static_cast<double>((*heights)[i]);
@@ -373,7 +373,7 @@ TEST_F(Edits, AreCertifiedBesideHolesAndOverReplacements) {
     std::vector<Sample> samples = SamplesOf(Jacksboro());
     std::vector<dem::GeoPosition> positions;
     for (const Sample& sample : samples) positions.push_back({sample.longitude, sample.latitude});
-    const auto heights = SourceOf(pipeline).ReadPoints(positions);
+    const auto heights = ModelOf(pipeline).ReadPoints(positions);
     ASSERT_TRUE(heights.has_value());
     for (std::size_t i = 0; i < samples.size(); ++i) samples[i].height = static_cast<double>((*heights)[i]);
     const auto missing = std::erase_if(samples, [](const Sample& sample) { return std::isnan(sample.height); });
@@ -423,7 +423,7 @@ TEST_F(Edits, LeaveEdgesOfGlbTilesEqual) {
       for (const int step : kSteps) {
         for (const auto& [dx, dy] : {std::pair{-1, 0}, {-1, -1}, {0, 0}}) {
           const geo::TileKey west = TileAt(level, dx, dy), east = geo::Neighbour(west, 1, 0);
-          const geo::Lattice lattice = SourceOf(pipeline).LatticeOf(level);
+          const geo::Lattice lattice = ModelOf(pipeline).LatticeOf(level);
           const geo::Vec3 meridian = geo::SurfaceNormal(lattice.Longitude(lattice.FirstColumn(east)), 0);
           const geo::Vec3 across{-meridian.y, meridian.x, 0};
           const auto a = rim(pipeline, west, step, across), b = rim(pipeline, east, step, across);
@@ -437,7 +437,7 @@ TEST_F(Edits, LeaveEdgesOfGlbTilesEqual) {
 
 TEST_F(Edits, CutHoles) {
   const TilePipeline plain = Open({}), pipeline = Open({Kinds().at("hole")});
-  const auto middle = SourceOf(pipeline).ReadPoints(std::array{dem::GeoPosition{kLongitude, kLatitude}});
+  const auto middle = ModelOf(pipeline).ReadPoints(std::array{dem::GeoPosition{kLongitude, kLatitude}});
   ASSERT_TRUE(middle.has_value());
   EXPECT_TRUE(std::isnan(middle->front()));
   for (const int step : kSteps) {

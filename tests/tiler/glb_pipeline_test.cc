@@ -23,10 +23,10 @@ namespace {
 using proto::Corner;
 using proto::GlbCompression;
 
-const dem::ElevationModel& Source(std::uint32_t dataset) { return *SamplePipeline().datasets()[dataset].model; }
+const dem::ElevationModel& ModelOf(std::uint32_t dataset) { return *SamplePipeline().datasets()[dataset].model; }
 
 geo::TileKey MiddleTile(std::uint32_t dataset, int level) {
-  const geo::TileRange& range = Source(dataset).Available(level).front();
+  const geo::TileRange& range = ModelOf(dataset).Available(level).front();
   return {level, (range.start_x + range.end_x) / 2, (range.start_y + range.end_y) / 2};
 }
 
@@ -72,14 +72,14 @@ std::set<Corner> FeetNear(const std::set<Corner>& feet, geo::Vec3 normal, double
 TEST(GlbPipeline, NeighboursShareTheirEdges) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-8, 0, 10}) {
-      for (int level = 1; level <= Source(dataset).max_level(); level += 3) {
+      for (int level = 1; level <= ModelOf(dataset).max_level(); level += 3) {
         geo::TileKey key = MiddleTile(dataset, level);
         // For the global dataset, across the antimeridian.
         if (dataset == 0) key.x = geo::TileColumns(level) - 1;
         const geo::TileKey east = geo::Neighbour(key, 1, 0);
-        if (!Source(dataset).IsAvailable(east)) continue;
+        if (!ModelOf(dataset).IsAvailable(east)) continue;
         // Points of an eastern edge are in the plane of its meridian.
-        const geo::Lattice lattice = Source(dataset).LatticeOf(level);
+        const geo::Lattice lattice = ModelOf(dataset).LatticeOf(level);
         const double longitude = lattice.Longitude(lattice.FirstColumn(east));
         const geo::Vec3 meridian = geo::SurfaceNormal(longitude, 0), across{-meridian.y, meridian.x, 0};
         const double tolerance = level > 8 ? 0.01 : geo::LadderError(level, step) / 16;
@@ -118,7 +118,7 @@ TEST(GlbPipeline, SkirtsHangAsDeepAsTheySay) {
 TEST(GlbPipeline, ReachesTheLadderError) {
   for (const std::uint32_t dataset : {0u, 1u}) {
     for (const int step : {-16, -4, 0, 8, 16}) {
-      for (int level = 0; level <= Source(dataset).max_level(); ++level) {
+      for (int level = 0; level <= ModelOf(dataset).max_level(); ++level) {
         EXPECT_LE(Build(GlbRequest(dataset, MiddleTile(dataset, level), step)).max_error_m,
                   geo::LadderError(level, step))
             << dataset << " level " << level << " step " << step;
@@ -157,7 +157,7 @@ TEST(GlbPipeline, DrawsTheTerrainWithinTheStatedError) {
     const EncodedTile encoded = Build(GlbRequest(c.dataset, key, c.step));
     const auto glb = proto::DecodeGlb(encoded.bytes);
     ASSERT_TRUE(glb.has_value());
-    const auto heights = Source(c.dataset).Read(key);
+    const auto heights = ModelOf(c.dataset).Read(key);
     ASSERT_TRUE(heights.has_value());
     const geo::Lattice& lattice = heights->lattice;
     double worst = 0;

@@ -29,7 +29,7 @@ using Clock = std::chrono::steady_clock;
 // Larger distances occur only for triangles that span half of the Earth and collapse into a line.
 constexpr double kMaxSag_m = 1e6;
 
-// The intersection of the area and the source's bounds; of two parts, the wider one. Nothing if it is empty.
+// The intersection of the area and the model's bounds; of two parts, the wider one. Nothing if it is empty.
 std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
   const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
   AreaRequest best = area;

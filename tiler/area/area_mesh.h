@@ -28,7 +28,7 @@ struct AreaRequest {
 
 // The samples that an area is meshed from: nodes of one level's lattice. The level is the first whose default error is
 // at most the requested error, or the sources' deepest. Levels that edits added are used only if they have all tiles of
-// the area and need at most `max_samples`. The area is clipped to the source's bounds, then extended to whole cells.
+// the area and need at most `max_samples`. The area is clipped to the model's bounds, then extended to whole cells.
 struct AreaPlan {
   int level = 0;
   bool depends_on_limit = false;  // the level may be another one for another `max_samples`
@@ -36,7 +36,7 @@ struct AreaPlan {
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };
 
-// kInvalidArgument, with a message for the client: the area does not intersect the source, or needs more than
+// kInvalidArgument, with a message for the client: the area does not intersect the model, or needs more than
 // `max_samples`.
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);

@@ -107,7 +107,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
     const FlatTriangle flat(ecef[triangle[0]], ecef[triangle[1]], ecef[triangle[2]]);
     const std::array<tin::SamplePosition, 3> corners = {mesh.vertices[triangle[0]], mesh.vertices[triangle[1]],
                                                         mesh.vertices[triangle[2]]};
-    std::optional<tin::SamplePosition> miss;
+    std::optional<tin::SamplePosition> worst_sample;
     double worst = allowed.empty() ? bound_m : 1;  // with bounds by sample: as a multiple of the sample's bound
     tin::ForEachRow(corners, [&](int row, int first, int last) {
       for (int column = first; column <= last; ++column) {
@@ -121,7 +121,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
           const auto corner = std::find(corners.begin(), corners.end(), sample);
           if (corner == corners.end()) {
             worst = counted;
-            miss = sample;
+            worst_sample = sample;
           } else {
             // Beside its rounded position, the plane of a triangle that stands almost upright is anywhere.
             const std::uint32_t vertex = triangle[static_cast<std::size_t>(corner - corners.begin())];
@@ -131,7 +131,7 @@ proto::TileError AreaSurface::MeasureError(const tin::HeightField& field, const 
         error.max_m = std::max(error.max_m, off);
       }
     });
-    if (miss) error.to_insert.push_back(*miss);
+    if (worst_sample) error.to_insert.push_back(*worst_sample);
   }
   // A sample on an edge is the worst one of two triangles.
   const auto in_rows = [](tin::SamplePosition p) { return std::pair(p.y, p.x); };

@@ -29,8 +29,8 @@ class AreaSurface {
   // Adds the curvature of the Earth to the options of the run that makes the mesh.
   void AddCurvature(tin::GreedyOptions& options) const;
 
-  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices. The
-  // `to_insert` are, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border:
+  // Vertical distances between the samples and the flat triangles with corners in `ecef`, the mesh's vertices.
+  // `to_insert` has, for each triangle that exceeds the bound, the worst sample that is no vertex, also on the border:
   // areas have no neighbours that share it. A vertex that exceeds the bound counts with the distance from its own
   // position. `allowed`: the bounds by sample, row by row; empty: `bound_m` everywhere. If `stop` is requested, returns
   // what was measured until then.

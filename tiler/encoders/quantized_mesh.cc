@@ -18,7 +18,7 @@ namespace {
 
 static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
 
-// A sea level is in the source's vertical datum: if tiles have another datum, heights are read again in the source's.
+// A sea level is in the vertical datum of each source: if tiles have another datum, heights are read again in it.
 Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::TileSamples& samples,
                                    const std::stop_token& stop) {
   const double sea_level_m = *dataset.water.sea_level_m;

@@ -20,8 +20,8 @@ class HeightField {
   // Coordinates stay below 2^15, which keeps the in-circle predicate inside 64 bits (predicates.h).
   static constexpr int kMaxSide = 1 << 15;
 
-  // `heights` has width * height values in metres, row by row. The vector is used in place if height >= 8 and its
-  // capacity exceeds its size by 32 * height; otherwise it is copied. NaN and infinities are voids. Voids do not
+  // `heights` has width * height values in metres, row by row. The vector is not copied if height >= 8 and its capacity
+  // is at least its size plus 32 * height; otherwise it may be. NaN and infinities are voids. Voids do not
   // contribute to errors, and no vertex has the height of a void. Refuses fields with a side below 2 or above kMaxSide,
   // with a wrong number of values, or without a valid sample.
   static Result<HeightField> Make(int width, int height, std::vector<float> heights);

@@ -87,11 +87,11 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
 
 }  // namespace
 
-Result<std::unique_ptr<dem::ElevationModel>> OpenSource(const config::DatasetConfig& wanted,
-                                                        const dem::RasterCache& cache,
-                                                        const std::function<void(double)>& progress,
-                                                        std::stop_token stop, std::function<void(const Error&)> fault,
-                                                        bool only_cached) {
+Result<std::unique_ptr<dem::ElevationModel>> OpenModel(const config::DatasetConfig& wanted,
+                                                       const dem::RasterCache& cache,
+                                                       const std::function<void(double)>& progress,
+                                                       std::stop_token stop, std::function<void(const Error&)> fault,
+                                                       bool only_cached) {
   dem::DemOptions options;
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
@@ -141,9 +141,9 @@ Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const de
                                    const std::string& version, const std::function<void(double)>& progress,
                                    std::stop_token stop) {
   if (wanted.sources.empty() && !wanted.baked.empty()) return OpenBakedAlone(wanted);
-  auto source = OpenSource(wanted, cache, progress, stop);
-  if (!source) return tl::unexpected(source.error());
-  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(source), cache, version, std::move(stop));
+  auto model = OpenModel(wanted, cache, progress, stop);
+  if (!model) return tl::unexpected(model.error());
+  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(model), cache, version, std::move(stop));
   if (dataset) AddBaked(wanted, *dataset);
   return dataset;
 }
@@ -151,11 +151,11 @@ Result<tiler::Dataset> OpenDataset(const config::DatasetConfig& wanted, const de
 Result<std::optional<tiler::Dataset>> OpenFromCache(const config::DatasetConfig& wanted, const dem::RasterCache& cache,
                                                     const std::string& version, const std::stop_token& stop) {
   if (wanted.sources.empty() && !wanted.baked.empty()) return OpenBakedAlone(wanted);
-  auto source = OpenSource(wanted, cache, /*progress=*/{}, stop, /*fault=*/{}, /*only_cached=*/true);
-  const bool lacks_statistics = !source && source.error().code == ErrorCode::kCancelled && !stop.stop_requested();
+  auto model = OpenModel(wanted, cache, /*progress=*/{}, stop, /*fault=*/{}, /*only_cached=*/true);
+  const bool lacks_statistics = !model && model.error().code == ErrorCode::kCancelled && !stop.stop_requested();
   if (lacks_statistics) return std::nullopt;
-  if (!source) return tl::unexpected(source.error());
-  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(source), cache, version, stop);
+  if (!model) return tl::unexpected(model.error());
+  Result<tiler::Dataset> dataset = MakeDataset(wanted, *std::move(model), cache, version, stop);
   if (!dataset) return tl::unexpected(dataset.error());
   AddBaked(wanted, *dataset);
   return *std::move(dataset);

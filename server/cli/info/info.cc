@@ -233,7 +233,7 @@ int Info(const InfoArguments& arguments) {
     dataset.sources = sources;
     std::vector<Error> faults;  // of all files
     auto opened =
-        OpenSource(dataset, cache, progress.Callback(), {}, [&faults](const Error& fault) { faults.push_back(fault); });
+        OpenModel(dataset, cache, progress.Callback(), {}, [&faults](const Error& fault) { faults.push_back(fault); });
     if (!opened) {
       if (faults.empty()) faults.push_back(opened.error());
       for (const Error& fault : faults) exit_code = Fail(fault.message, kExitFailure);

@@ -122,21 +122,21 @@ int MeshArea(const AreaMeshArguments& arguments) {
 
   MeshSeconds seconds;
   Clock::time_point start = Clock::now();
-  auto source = [&] {
+  auto model = [&] {
     Progress progress("reading " + arguments.dem);
-    return OpenSource(*dataset, {}, progress.Callback());
+    return OpenModel(*dataset, {}, progress.Callback());
   }();
-  if (!source) return Fail(source.error().message, kExitFailure);
-  const Result<tiler::AreaRequest> request = RequestOf(arguments, (*source)->info().bounds);
+  if (!model) return Fail(model.error().message, kExitFailure);
+  const Result<tiler::AreaRequest> request = RequestOf(arguments, (*model)->info().bounds);
   if (!request) return Fail(request.error());
   // Memory is the user's: only the sides of a mesh are limited.
-  const Result<tiler::AreaPlan> plan = tiler::PlanArea(**source, dataset->error_fraction, *request,
+  const Result<tiler::AreaPlan> plan = tiler::PlanArea(**model, dataset->error_fraction, *request,
                                                        std::size_t{std::numeric_limits<std::int64_t>::max()});
   if (!plan) return Fail(plan.error());
   seconds.read = SecondsSince(start);
 
   start = Clock::now();
-  const Result<tiler::EncodedTile> mesh = tiler::BuildAreaMesh(**source, *plan, *request, {});
+  const Result<tiler::EncodedTile> mesh = tiler::BuildAreaMesh(**model, *plan, *request, {});
   if (!mesh) return Fail(mesh.error().message, kExitFailure);
   seconds.triangulate = SecondsSince(start);
 
@@ -145,7 +145,7 @@ int MeshArea(const AreaMeshArguments& arguments) {
     return Fail(written.error().message, kExitFailure);
   }
   seconds.write = SecondsSince(start);
-  Print(arguments, **source, *request, *plan, *mesh, seconds);
+  Print(arguments, **model, *request, *plan, *mesh, seconds);
   return kExitOk;
 }
 

@@ -55,7 +55,7 @@ void WriteVrt(const std::string& part, const std::string& path);
 // A file of the test data folder; nothing and a message if it is missing.
 std::optional<std::string> TestDataFile(const std::string& name);
 
-// Opens the source. On failure the test fails and the result is null.
+// Opens a model. On failure the test fails and the result is null.
 std::unique_ptr<ElevationModel> OpenOrFail(const std::string& path, const DemOptions& options = {});
 std::unique_ptr<ElevationModel> OpenOrFail(const std::vector<DemFile>& files, const DemOptions& options = {});
 

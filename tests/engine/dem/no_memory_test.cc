@@ -16,7 +16,7 @@ namespace {
 thread_local bool fails_next = false;
 }  // namespace
 
-// Not inlined, because g++ 12 then reports that std::free gets what operator new returned.
+// Not inlined: otherwise g++ 12 warns that std::free gets what operator new returned.
 [[gnu::noinline]] void* operator new(std::size_t size) {
   void* const memory = std::exchange(fails_next, false) ? nullptr : std::malloc(size);
   if (memory == nullptr) throw std::bad_alloc();

@@ -1,10 +1,10 @@
-// Several threads read the same object, or share a task: the tests of `engine` that ThreadSanitizer runs.
+// Several threads read the same object, or compute the statistics of rasters. ThreadSanitizer runs this program.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <array>
-#include <functional>
 #include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -41,7 +41,7 @@ std::string WriteBytes(const TempDir& dir) {
   return WriteRaster(dir, spec);
 }
 
-TEST(Threads, ReadTheTilesOfOneDemSource) {
+TEST(Threads, ReadTheTilesOfOneModel) {
   TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
   const auto source = OpenOrFail(path);
   ASSERT_NE(source, nullptr);
@@ -77,6 +77,20 @@ TEST(Threads, ReadOneWaterMask) {
   ExpectSameOnFourThreads([&] { return (*mask)->Read(kTile).value(); });
 }
 
+TEST(Threads, OpenTheFilesOfAModel) {
+  const TempDir dir;
+  std::vector<DemFile> files;
+  for (int i = 0; i < 4; ++i) {
+    files.push_back({WriteRaster(dir, FlatSquare(7 + i, 47, 300, 1 / 300.0, 100 * i), fmt::format("{}.tif", i))});
+  }
+  const auto first = OpenOrFail(files), second = OpenOrFail(files);
+  ASSERT_TRUE(first != nullptr && second != nullptr);
+  EXPECT_EQ(first->fingerprint(), second->fingerprint());
+  for (const geo::TileKey& key : SomeTiles(*first, first->max_level(), 10)) {
+    EXPECT_EQ(first->Read(key).value().heights, second->Read(key).value().heights) << geo::ToString(key);
+  }
+}
+
 TEST(Threads, TakeTheStatisticsOfOneRaster) {
   const TempDir dir;
   // Of several chunks, so that each thread has one.
@@ -98,6 +112,7 @@ TEST(Threads, TakeTheStatisticsOfOneRaster) {
   EXPECT_EQ(sources[0]->info().valid_samples, sources[1]->info().valid_samples);
   EXPECT_EQ(sources[0]->info().heights.min, sources[1]->info().heights.min);
   EXPECT_EQ(sources[0]->info().heights.max, sources[1]->info().heights.max);
+  EXPECT_TRUE(sources[0]->content() == sources[1]->content());
 }
 
 }  // namespace

@@ -26,25 +26,25 @@ class AreaMeshTest : public testing::Test {
   void SetUp() override {
     auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/jacksboro.tif");
     ASSERT_TRUE(opened) << opened.error().message;
-    source_ = *std::move(opened);
+    model_ = *std::move(opened);
     area_ = {-84.25, 36.25, -84.2, 36.29, 5, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
   }
   EncodedTile Build(const AreaRequest& area) const {
-    const auto plan = PlanArea(*source_, 0.5, area, kMany);
+    const auto plan = PlanArea(*model_, 0.5, area, kMany);
     EXPECT_TRUE(plan) << plan.error().message;
-    auto mesh = BuildAreaMesh(*source_, *plan, area, {});
+    auto mesh = BuildAreaMesh(*model_, *plan, area, {});
     EXPECT_TRUE(mesh) << mesh.error().message;
     return *std::move(mesh);
   }
   std::string Refusal(const AreaRequest& area, std::size_t max_samples = kMany) const {
-    const auto plan = PlanArea(*source_, 0.5, area, max_samples);
+    const auto plan = PlanArea(*model_, 0.5, area, max_samples);
     EXPECT_FALSE(plan);
     if (plan) return {};
     EXPECT_EQ(plan.error().code, ErrorCode::kInvalidArgument);
     return plan.error().message;
   }
 
-  std::unique_ptr<dem::ElevationModel> source_;
+  std::unique_ptr<dem::ElevationModel> model_;
   AreaRequest area_;
 };
 
@@ -87,15 +87,15 @@ double HeightAt(const ObjMesh& mesh, double x, double y) {
 }
 
 TEST_F(AreaMeshTest, KeepsTheErrorAtEverySample) {
-  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  const auto plan = PlanArea(*model_, 0.5, area_, kMany);
   ASSERT_TRUE(plan);
-  const auto heights = source_->ReadNodes(plan->level, plan->window);
+  const auto heights = model_->ReadNodes(plan->level, plan->window);
   ASSERT_TRUE(heights);
   const EncodedTile encoded = Build(area_);
   const ObjMesh mesh = ReadObj(encoded.bytes);
   ASSERT_EQ(mesh.vertices.size(), encoded.vertices);
   EXPECT_LT(encoded.vertices, heights->size() / 2);
-  const geo::Lattice lattice = source_->LatticeOf(plan->level);
+  const geo::Lattice lattice = model_->LatticeOf(plan->level);
   double largest = 0;
   for (int j = 0; j < plan->window.rows; ++j) {
     for (int i = 0; i < plan->window.columns; ++i) {
@@ -138,7 +138,7 @@ TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
   EXPECT_LE(global_file.max_error_m, 5.002);
   const ObjMesh local = ReadObj(local_file.bytes), global = ReadObj(global_file.bytes);
   ASSERT_EQ(local.vertices.size(), global.vertices.size());
-  const auto plan = PlanArea(*source_, 0.5, area, kMany);
+  const auto plan = PlanArea(*model_, 0.5, area, kMany);
   const double lon = plan->centre.longitude, lat = plan->centre.latitude;
   EXPECT_NEAR(lon, -84.225, 1e-9);
   EXPECT_NEAR(lat, 36.27, 1e-9);
@@ -157,7 +157,7 @@ TEST_F(AreaMeshTest, LiesWhereItsCoordinatesSay) {
 TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   AreaRequest area{-20, 20, 30, 56, 2000, proto::MeshFileFormat::kGlb, AreaCoordinates::kEcef};
   const EncodedTile encoded = Build(area);
   EXPECT_LE(encoded.max_error_m, 2000.1);
@@ -170,7 +170,7 @@ TEST_F(AreaMeshTest, LargeTrianglesDoNotCutThroughTheEarth) {
 TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   for (const AreaCoordinates coordinates : {AreaCoordinates::kEcef, AreaCoordinates::kEnu}) {
     const EncodedTile encoded = Build({-180, -90, 180, 90, 1e300, proto::MeshFileFormat::kObj, coordinates});
     EXPECT_GT(encoded.max_error_m, 1e5) << "a few dozen triangles are no sphere, and are not said to be one";
@@ -183,7 +183,7 @@ TEST_F(AreaMeshTest, TheWholeEarthStaysRoundWhateverTheError) {
 TEST_F(AreaMeshTest, KeepsTheErrorUpToThePole) {
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   for (const double error_m : {10.0, 50.0}) {
     const EncodedTile encoded = Build({-20, 80, 20, 90, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef});
     EXPECT_LE(encoded.max_error_m, error_m + 0.01);
@@ -199,7 +199,7 @@ TEST_F(AreaMeshTest, KeepsTheErrorOnItsEdges) {
   }
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   for (const double error_m : {5.0, 20.0, 200.0}) {
     for (const double south : {-90.0, -89.0, 60.0, 86.0, 87.5}) {
       AreaRequest area{0, south, 40, south + 2, error_m, proto::MeshFileFormat::kObj, AreaCoordinates::kEcef};
@@ -217,11 +217,11 @@ TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
   if (!path) GTEST_SKIP() << test_support::MissingTestData(kFile);
   auto opened = dem::ElevationModel::Open(*path);
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   const AreaRequest area{-180, -90, 180, 90, 5, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
-  const auto plan = PlanArea(*source_, 0.5, area, 16 * kMany);
+  const auto plan = PlanArea(*model_, 0.5, area, 16 * kMany);
   ASSERT_TRUE(plan) << plan.error().message;
-  const auto mesh = BuildAreaMesh(*source_, *plan, area, {});
+  const auto mesh = BuildAreaMesh(*model_, *plan, area, {});
   ASSERT_TRUE(mesh) << mesh.error().message;
   EXPECT_LE(mesh->max_error_m, 5.001);
 }
@@ -230,15 +230,15 @@ TEST_F(AreaMeshTest, KeepsTheErrorAtTheCornersOfUprightTriangles) {
 TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   AreaRequest area{0, 89.99999999999, 1, 90, 100, proto::MeshFileFormat::kGlb, AreaCoordinates::kEnu};
-  const auto north = PlanArea(*source_, 0.5, area, kMany);
+  const auto north = PlanArea(*model_, 0.5, area, kMany);
   ASSERT_TRUE(north) << north.error().message;
-  EXPECT_EQ(north->window.row, source_->LatticeOf(north->level).rows() - 1);
+  EXPECT_EQ(north->window.row, model_->LatticeOf(north->level).rows() - 1);
   EXPECT_EQ(north->window.rows, 2);
   area.south = -90;
   area.north = -89.99999999999;
-  const auto south = PlanArea(*source_, 0.5, area, kMany);
+  const auto south = PlanArea(*model_, 0.5, area, kMany);
   ASSERT_TRUE(south) << south.error().message;
   EXPECT_EQ(south->window.row, 0);
   EXPECT_EQ(south->window.rows, 2);
@@ -247,7 +247,7 @@ TEST_F(AreaMeshTest, AreasAtThePoleHaveOneRowOfCells) {
 TEST_F(AreaMeshTest, CrossesTheAntimeridian) {
   auto opened = dem::ElevationModel::Open(test_support::SourceDir() / "config/samples/etopo5.tif");
   ASSERT_TRUE(opened) << opened.error().message;
-  source_ = *std::move(opened);
+  model_ = *std::move(opened);
   const AreaRequest area{175, -20, 190, -10, 100, proto::MeshFileFormat::kObj, AreaCoordinates::kGeographic};
   const ObjMesh mesh = ReadObj(Build(area).bytes);
   double west = 1e9, east = -1e9;
@@ -296,7 +296,7 @@ TEST_F(AreaMeshTest, RefusesAreasBesideTheDataset) {
 }
 
 TEST_F(AreaMeshTest, ARefusalNamesTheLimitThatIsExceeded) {
-  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  const auto plan = PlanArea(*model_, 0.5, area_, kMany);
   ASSERT_TRUE(plan);
   const int columns = plan->window.columns, rows = plan->window.rows;
   EXPECT_EQ(Refusal(area_, 500).substr(0, Refusal(area_, 500).find(';')),
@@ -348,14 +348,14 @@ TEST_F(AreaMeshTest, ItsRemedyIsOne) {
   AreaRequest area = area_;
   area.error_m = std::stod(refusal.substr(at + 16));
   EXPECT_LT(area.error_m, 500) << "not just any large one";
-  EXPECT_TRUE(PlanArea(*source_, 0.5, area, 500)) << refusal;
+  EXPECT_TRUE(PlanArea(*model_, 0.5, area, 500)) << refusal;
 }
 
 TEST_F(AreaMeshTest, StopsWhenAsked) {
-  const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+  const auto plan = PlanArea(*model_, 0.5, area_, kMany);
   std::stop_source stop;
   stop.request_stop();
-  const auto mesh = BuildAreaMesh(*source_, *plan, area_, stop.get_token());
+  const auto mesh = BuildAreaMesh(*model_, *plan, area_, stop.get_token());
   ASSERT_FALSE(mesh);
   EXPECT_EQ(mesh.error().code, ErrorCode::kCancelled);
 }
@@ -371,7 +371,7 @@ class EditedAreaMesh : public AreaMeshTest {
     options.edits = {path};
     auto opened = dem::ElevationModel::Open({{test_support::SourceDir() / "config/samples/jacksboro.tif"}}, options);
     ASSERT_TRUE(opened) << opened.error().message;
-    source_ = *std::move(opened);
+    model_ = *std::move(opened);
   }
   static constexpr const char* kPolygon =
       R"({"type":"Polygon","coordinates":[[[-84.235,36.262],[-84.215,36.264],[-84.214,36.278],[-84.236,36.276],[-84.235,36.262]]]})";
@@ -385,14 +385,14 @@ TEST_F(EditedAreaMesh, KeepsThePrecisionAtEverySample) {
   Edit(R"({"op":"precision","error_m":0.5})", kPolygon);
   for (const AreaCoordinates coordinates : {AreaCoordinates::kGeographic, AreaCoordinates::kEnu}) {
     area_.coordinates = coordinates;
-    const auto plan = PlanArea(*source_, 0.5, area_, kMany);
+    const auto plan = PlanArea(*model_, 0.5, area_, kMany);
     ASSERT_TRUE(plan);
     const ObjMesh mesh = ReadObj(Build(area_).bytes);
     EXPECT_GT(mesh.triangles.size(), 2 * plain);
     if (coordinates != AreaCoordinates::kGeographic) continue;
-    const auto heights = source_->ReadNodes(plan->level, plan->window);
+    const auto heights = model_->ReadNodes(plan->level, plan->window);
     ASSERT_TRUE(heights);
-    const geo::Lattice lattice = source_->LatticeOf(plan->level);
+    const geo::Lattice lattice = model_->LatticeOf(plan->level);
     int inside = 0;
     for (int j = 0; j < plan->window.rows; ++j) {
       for (int i = 0; i < plan->window.columns; ++i) {
@@ -410,19 +410,19 @@ TEST_F(EditedAreaMesh, KeepsThePrecisionAtEverySample) {
 TEST_F(EditedAreaMesh, GoesNoDeeperThanItsSamplesAllow) {
   area_.error_m = 0.1;
   area_.west = -84.23, area_.east = -84.22, area_.south = 36.266, area_.north = 36.272;
-  const auto plain = PlanArea(*source_, 0.5, area_, kMany);
+  const auto plain = PlanArea(*model_, 0.5, area_, kMany);
   ASSERT_TRUE(plain);
   Edit(R"({"op":"precision","error_m":0.1})", kPolygon);
-  const auto deep = PlanArea(*source_, 0.5, area_, kMany);
+  const auto deep = PlanArea(*model_, 0.5, area_, kMany);
   ASSERT_TRUE(deep);
   ASSERT_GT(deep->level, plain->level);
   const auto samples = [](const AreaPlan& plan) {
     return static_cast<std::size_t>(plan.window.columns) * static_cast<std::size_t>(plan.window.rows);
   };
-  const auto shallower = PlanArea(*source_, 0.5, area_, samples(*deep) - 1);
+  const auto shallower = PlanArea(*model_, 0.5, area_, samples(*deep) - 1);
   ASSERT_TRUE(shallower) << shallower.error().message;
   EXPECT_EQ(shallower->level, deep->level - 1);
-  const auto as_before = PlanArea(*source_, 0.5, area_, samples(*plain));
+  const auto as_before = PlanArea(*model_, 0.5, area_, samples(*plain));
   ASSERT_TRUE(as_before) << as_before.error().message;
   EXPECT_EQ(as_before->level, plain->level);
   EXPECT_FALSE(plain->depends_on_limit);
@@ -442,17 +442,17 @@ TEST_F(EditedAreaMesh, HasHolesAndBreaklines) {
   EXPECT_TRUE(std::ranges::all_of(is_used, [](bool is) { return is; }));
   AreaRequest within = area_;
   within.west = -84.23, within.east = -84.22, within.south = 36.266, within.north = 36.272;
-  const auto plan = PlanArea(*source_, 0.5, within, kMany);
+  const auto plan = PlanArea(*model_, 0.5, within, kMany);
   ASSERT_TRUE(plan);
-  const auto nothing = BuildAreaMesh(*source_, *plan, within, {});
+  const auto nothing = BuildAreaMesh(*model_, *plan, within, {});
   ASSERT_FALSE(nothing);
   EXPECT_EQ(nothing.error().code, ErrorCode::kInvalidArgument);
 
   Edit(R"({"op":"breakline"})", R"({"type":"LineString","coordinates":[[-84.24,36.265],[-84.21,36.265]]})");
-  const auto line_plan = PlanArea(*source_, 0.5, area_, kMany);
+  const auto line_plan = PlanArea(*model_, 0.5, area_, kMany);
   ASSERT_TRUE(line_plan);
   const ObjMesh lined = ReadObj(Build(area_).bytes);
-  const geo::Lattice lattice = source_->LatticeOf(line_plan->level);
+  const geo::Lattice lattice = model_->LatticeOf(line_plan->level);
   const auto on_line = std::ranges::count_if(lined.vertices, [&](const geo::Vec3& vertex) {
     return std::abs(vertex.y - 36.265) < 0.51 * lattice.StepDegrees() && vertex.x > -84.24 && vertex.x < -84.21;
   });

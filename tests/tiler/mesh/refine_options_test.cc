@@ -13,7 +13,7 @@ namespace terrace::tiler {
 namespace {
 
 // Sagitta requires this. At the equator of deep levels rows differ by less than rounding.
-TEST(RefinePlan, HasOneWidestRow) {
+TEST(RefineOptions, HasOneWidestRow) {
   for (const int cells : {32, 256}) {
     for (int level = 0; level <= geo::kMaxLevel; ++level) {
       const std::int64_t rows = geo::TileRows(level), middle = rows / 2;
