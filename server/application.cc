@@ -158,8 +158,8 @@ asio::awaitable<Response> TerrainApplication::Handler::Finish(HandlerStatePtr st
 
 void TerrainApplication::Handler::Report(const SentReply& reply) {
   ReplyRecord record = RecordOf(reply);
-  if (reply.is_admitted && client_.address != peer_.address) record.client = client_.text;
-  if (reply.is_admitted && context_.grant) record.token_name = context_.grant->name;
+  if (reply.has_valid_head && client_.address != peer_.address) record.client = client_.text;
+  if (reply.has_valid_head && context_.grant) record.token_name = context_.grant->name;
   application_.parts_.metrics.CountReply(record);
   application_.parts_.access_log.Write(record);
 }
@@ -169,7 +169,7 @@ TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalo
   state_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
 
-// Admission uses the limit of locations and the proxies of the start. Replies must agree with it.
+// Admission keeps the limit of locations and the proxies that were configured at the start. Replies must agree with it.
 TerrainApplication::HandlerStatePtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
   config.max_locations = started_.max_locations;
   config.trusted_proxies = started_.trusted_proxies;

@@ -57,7 +57,7 @@ inline constexpr Encoder kEncoders[] = {
 };
 
 // The triangles in the bytes that MakeQuantizedMeshTile and MakeGlbTile make of the same input. Same errors.
-Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop);
-Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop);
+Result<DrawnTriangles> QuantizedMeshTriangles(const EncoderInput& input, const std::stop_token& stop);
+Result<DrawnTriangles> GlbTriangles(const EncoderInput& input, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -168,7 +168,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   if (!dataset.model) {
     const Result<EncodedTile> baked = TakeBaked(dataset, request);
     if (!baked) return tl::unexpected(baked.error());
-    Result<DrawnTriangles> decoded = DrawnByBytes(baked->bytes, request.key);
+    Result<DrawnTriangles> decoded = DecodeTriangles(baked->bytes, request.key);
     if (!decoded) return tl::unexpected(std::move(decoded).error());
     auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(decoded));
     drawn_->Insert(cache_key, mesh);
@@ -180,7 +180,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
   const EncoderInput input{dataset, request, refined->get(), error_m};
-  Result<DrawnTriangles> drawn = is_glb ? DrawnByGlb(input, stop) : DrawnByQuantizedMesh(input, stop);
+  Result<DrawnTriangles> drawn = is_glb ? GlbTriangles(input, stop) : QuantizedMeshTriangles(input, stop);
   if (!drawn) return tl::unexpected(std::move(drawn).error());
   auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(drawn));
   drawn_->Insert(cache_key, mesh);

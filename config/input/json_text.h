@@ -1,6 +1,6 @@
 // Parses JSON text, more strictly than the library: duplicate keys are errors, objects have at most 1000 keys, and
 // lists and objects are nested at most 100 deep. Syntax errors state line and column. No error quotes the text. For
-// this module only.
+// the modules of config/ only.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Expands the `sources` of a dataset: paths, globs and folders, to files. For this module only.
+// Expands the `sources` of a dataset: paths, globs and folders, to files. For the modules of config/ only.
 #pragma once
 
 #include <filesystem>

@@ -1,6 +1,6 @@
 // The tables that declare every option once: key, flag, type, range, help and reference. The default is the member's in
 // config.h. The parser, the writer, the command line, the schema and the reference in docs/configuration.md are
-// generated from them; a new option is one row (CONTRIBUTING.md). For this module only.
+// generated from them; a new option is one row (CONTRIBUTING.md). For the modules of config/ only.
 #pragma once
 
 #include <span>

@@ -166,7 +166,7 @@ Result<ContentHash> HashFiles(const StampedFiles& files, const FileContentOption
     if (!*hash) return tl::unexpected(hash->error());  // those after the first that failed may be missing
     all.Add(**hash);
   }
-  for (const std::uint64_t other : files.other_fingerprints()) all.Add(other);
+  for (const std::uint64_t other : files.gdal_path_fingerprints()) all.Add(other);
   return all.Hash();
 }
 

@@ -58,7 +58,7 @@ class StampedFiles {
   // Returns a hash of all stamps and GDAL paths.
   std::uint64_t fingerprint() const;
   // Fingerprints of the GDAL paths, in order.
-  const std::vector<std::uint64_t>& other_fingerprints() const { return others_; }
+  const std::vector<std::uint64_t>& gdal_path_fingerprints() const { return others_; }
 
  private:
   std::vector<std::string> paths_;

@@ -17,7 +17,7 @@ class OperationPool {
   void set_pipeline(std::string pipeline) { pipeline_ = std::move(pipeline); }
   const std::string& pipeline() const { return pipeline_; }
 
-  // False: PROJ cannot create the operation. If it could before, memory or file descriptors have run out.
+  // An empty handle: PROJ cannot create the operation. If it could before, memory or file descriptors have run out.
   IdlePool<ProjOperation>::Handle Borrow() const;
 
  private:

@@ -140,8 +140,8 @@ class RasterGrid {
     return ReadAverages(1, window, stop);
   }
 
-  // Returns true if samples in a box of pixels may have a blend weight below 1, averaged by this factor or a smaller
-  // one: an edge or a void lies within the feather width of the box.
+  // Whether, at this factor or a smaller one, averages in a box of pixels may have a blend weight below 1: an edge or a
+  // void lies within the feather width of the box.
   bool MayBlend(const Box& pixels, int factor) const;
 
   // Returns the range of the pixels in a box. Pixels that no member covers are voids.
@@ -154,8 +154,8 @@ class RasterGrid {
   // Adds to a hash what heights depend on besides the georeference, the vertical datum, and the members' samples and
   // positions.
   void AddTo(ContentHasher& hasher) const;
-  // Returns the indices of the members that heights and RangeOf of the tile, and heights of all tiles below it down to
-  // level `deepest`, may depend on, ascending. `lattices`: by level. May return members that nothing depends on.
+  // Returns, ascending, the indices of all members that may affect RangeOf or the heights of `top`, or the heights of
+  // the tiles below it down to level `deepest`, and perhaps of others. `lattices`: by level.
   std::vector<std::size_t> MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
                                         int deepest) const;
   // Which voids of a member are holes, by region.

@@ -47,7 +47,7 @@ class NodeRows {
 // one entry per height.
 void RoundHeights(std::span<const double> heights, std::span<const double> added, std::span<float> rounded);
 
-// The places of nodes, in samples: column + weight and row + weight of GridAxes::CellAt. NaN if the node's height is
+// The places of nodes, in samples: column + x and row + y of GridAxes::CellAt. NaN if the node's height is
 // NaN. Returns false if another node got NaN, because a place is not between 0 and `limit` or is near the end of an
 // axis, or because columns wrap: use CellAt for it. Precondition: all spans have one entry per node.
 bool GridCoordinatesOf(std::span<const Position> nodes, const GridAxes& axes, std::span<const float> heights,

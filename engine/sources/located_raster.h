@@ -20,9 +20,9 @@ struct LocatedRaster {
   SourceSpacing spacing;
 };
 
-// `before`: the stamp of `path` before the dataset was opened. `bands`: the first ones, of which every block must be
-// there. kUnavailable: the file is truncated (CheckComplete). kChanged: it was replaced meanwhile. Other errors: those
-// of Georeference::Of and SourceSpacing::Of.
+// `before`: the stamp of `path` before the dataset was opened. `bands`: in so many bands, from the first on, every
+// block must be there. kUnavailable: the file is truncated (CheckComplete). kChanged: it was replaced meanwhile. Other
+// errors: those of Georeference::Of and SourceSpacing::Of.
 Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path,
                                    const std::optional<FileStamp>& before, int bands = 1);
 

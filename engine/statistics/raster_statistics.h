@@ -50,7 +50,8 @@ struct RasterStatistics {
   ContentHash content;            // of all heights, including those of overviews that are read
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
-  // An overview that is read has heights beyond those of the samples around them, as if it were made of voids too.
+  // An overview that is read has a height outside the range of the raster's samples around it, as if it were made of
+  // voids too.
   // False without voids.
   bool has_stray_overviews = false;
   std::uint64_t valid = 0, voids = 0;

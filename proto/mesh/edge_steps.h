@@ -37,8 +37,8 @@ struct EdgeSteps {
 
 // The strictest bound on the errors of samples: on each side, and on the four edges that meet at each corner. It is the
 // tile's error unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared
-// edges and corners. An edge's step for its error is at least an 8192nd of the step for the tile's error, so that in
-// the proof above S <= 8192 M, and 16384 M + S < 32767 M holds.
+// edges and corners. MakeEdgeSteps makes no edge's step smaller than an 8192nd of the step for the tile's error, so
+// that in the proof above S <= 8192 M, and 16384 M + S < 32767 M holds.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);

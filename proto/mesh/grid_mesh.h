@@ -30,7 +30,7 @@ enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 //
 // Floats allow finer steps. With floats the step is also at most 2^-7 m, so that all vertices of a tile's edge are less
 // than a centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by
-// their positions. From level 8 down to level 0 a tile is too wide for that, and the step is the smallest that fits:
+// their positions. On levels 0 to 8 a tile is too wide for that, and the step is the smallest that fits:
 // 2^-6 m at level 8, 1 m at level 2.
 double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width);
 
@@ -38,8 +38,8 @@ double GridStep(const geo::Lattice& lattice, double error_m, PositionWidth width
 using GridPoint = std::array<std::int64_t, 3>;
 
 // The vertices of `mesh` at their exact lattice positions and heights, rounded to the grid. The point of a node does
-// not depend on the tile. Sines and cosines have the same bits on every processor (engine/geo/sine.h), so the
-// points have, too.
+// not depend on the tile. Sines and cosines have the same bits on every processor (engine/geo/sine.h), and so do
+// the points.
 std::vector<GridPoint> SnapVertices(const TileSamples& samples, const tin::TinMesh& mesh, double step_m);
 
 // The steps of a tile with limits by place (EdgeErrors). `smallest_allowed_m`: the smallest error that a sample of the

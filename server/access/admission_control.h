@@ -76,8 +76,8 @@ class AdmissionControl {
   // the connection.
   ClientIdentity Identify(Request& request, const ClientIdentity& peer, RequestContext& context) const;
 
-  // Takes a turn for a request: a client that exceeds its rate waits, at most `longest_wait`. All requests count except
-  // probes, also those with unknown URLs.
+  // Takes a turn for a request: a client that exceeds its rate waits, at most `longest_wait`. All requests count,
+  // including those with unknown URLs; probes do not.
   RateLimiter::Turn TakeTurn(const RequestContext& context, const ClientIdentity& client,
                              std::chrono::milliseconds longest_wait);
   // 429, for a request whose turn was not granted.

@@ -20,7 +20,8 @@ dem::GeoBounds MapBounds(const DatasetView& dataset, tiler::TileFormat format);
 // kNotFound: the dataset has no imagery, and the format needs it.
 Result<void> CheckHasImagery(const DatasetView& dataset, tiler::TileFormat format);
 
-// For the formats for maps: what their TileFormatRow::read calls, with its errors, and their TileFormatRow::media_type.
+// ReadMapTile: TileFormatRow::read of the formats for maps calls it; the same errors. MapTileType: their
+// TileFormatRow::media_type.
 Result<void> ReadMapTile(std::string_view query, const DatasetView& dataset, tiler::TileRequest& tile);
 std::string_view MapTileType(const tiler::TileRequest& tile);
 

@@ -62,8 +62,8 @@ struct RenderedDocument {
 };
 inline std::size_t BytesOf(const RenderedDocument& made) { return made.body->size() + made.etag.size(); }
 
-// `coding`: kGzip falls back to identity if that is not larger. Bytes and ETag are equal to those of a Document with
-// the same text. kCancelled: a stop was requested.
+// `coding`: kGzip becomes identity if gzip does not make the text smaller. Bytes and ETag are equal to those of a
+// Document with the same text. kCancelled: a stop was requested.
 Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding,
                                       const std::stop_token& stop);
 

@@ -11,8 +11,8 @@ std::string_view OriginHeaders(const config::Config& config) {
                                                                         : "X-Forwarded-Host, X-Forwarded-Proto";
 }
 
-std::vector<HandlerState::OfDataset> MakeOfDatasets(const std::vector<DatasetView>& datasets) {
-  std::vector<HandlerState::OfDataset> made(datasets.size());
+std::vector<HandlerState::DatasetDocuments> MakeDatasetDocuments(const std::vector<DatasetView>& datasets) {
+  std::vector<HandlerState::DatasetDocuments> made(datasets.size());
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     made[i].layer = PlainLayer(datasets[i]);
     AddTileset(datasets[i], made[i]);
@@ -33,7 +33,7 @@ HandlerState::HandlerState(CatalogPtr c, TileService& t, std::shared_ptr<const S
       deadline(config.request_deadline),
       max_locations(config.max_locations),
       max_mesh_samples(config.max_mesh_samples),
-      of_datasets(MakeOfDatasets(catalog->datasets)),
+      dataset_documents(MakeDatasetDocuments(catalog->datasets)),
       list(Document::Make(DatasetsJson(catalog->datasets), "application/json")),
       index(Document::Make(IndexHtml(catalog->datasets), "text/html; charset=utf-8")),
       documents(catalog, tiles, deadline) {}

@@ -77,12 +77,12 @@ struct HandlerState {
   const std::size_t max_locations, max_mesh_samples;
 
   // Documents for requests without parameters.
-  struct OfDataset {
+  struct DatasetDocuments {
     Document layer, tileset;
     std::shared_ptr<const std::vector<proto::TreeRoot>> roots;  // of its implicit trees
   };
-  const std::vector<OfDataset> of_datasets;  // by index
-  const Document list, index;                // of all datasets: /datasets, and `/` without a viewer
+  const std::vector<DatasetDocuments> dataset_documents;  // by index
+  const Document list, index;                             // of all datasets: /datasets, and `/` without a viewer
 
   const DocumentMaker documents;
 };
@@ -154,7 +154,7 @@ std::string EditsGeoJson(const std::vector<dem::EditOutline>& edits, const std::
 // GET /{dataset}/tileset.json. `?error=E` and `?fraction=F` go into the templates.
 DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& context);
 // Makes the document for requests without parameters, and the roots of the dataset's trees.
-void AddTileset(const DatasetView& dataset, HandlerState::OfDataset& made);
+void AddTileset(const DatasetView& dataset, HandlerState::DatasetDocuments& made);
 // The .subtree files of the tileset. Any available tile may be the root, so that an older tileset.json that a client
 // has cached stays valid. The heights in a subtree depend on the requested error, because skirts do. 404: no subtree
 // begins at this tile.

@@ -61,7 +61,7 @@ DocumentAnswer DescribeLayer(const HandlerState& state, const RequestContext& co
   const Result<TileParameters> parameters = ParseTileParameters(context.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), context);
-  if (tile_query.empty()) return Serve(state.of_datasets[*dataset].layer, *context.request, kRevalidate);
+  if (tile_query.empty()) return Serve(state.dataset_documents[*dataset].layer, *context.request, kRevalidate);
   DocumentPlan plan;
   plan.key = fmt::format("layer {} {} {}", *dataset, TileQuery(parameters->requested), fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";

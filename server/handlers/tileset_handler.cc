@@ -52,7 +52,7 @@ std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::Tr
 
 }  // namespace
 
-void AddTileset(const DatasetView& dataset, HandlerState::OfDataset& made) {
+void AddTileset(const DatasetView& dataset, HandlerState::DatasetDocuments& made) {
   if (!CheckHasFormat(dataset, tiler::TileFormat::kGlb)) return;
   made.roots = std::make_shared<const std::vector<proto::TreeRoot>>(tiler::TreesOf(TreeOf(dataset, {})));
   made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
@@ -69,13 +69,13 @@ DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& 
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, context.route.query);
   std::string content_query = WithToken(content_parameters, context);
-  if (content_query.empty()) return Serve(state.of_datasets[*dataset].tileset, *context.request, kRevalidate);
+  if (content_query.empty()) return Serve(state.dataset_documents[*dataset].tileset, *context.request, kRevalidate);
   std::string subtree_query = WithToken(TileQuery(parameters->requested), context);
   DocumentPlan plan;
   plan.key = fmt::format("tileset {} {} {}", *dataset, content_parameters, fmt::ptr(GrantInQuery(context)));
   plan.content_type = "application/json";
   plan.cache_control = kRevalidate;
-  plan.write = [&view = state.catalog->datasets[*dataset], roots = state.of_datasets[*dataset].roots,
+  plan.write = [&view = state.catalog->datasets[*dataset], roots = state.dataset_documents[*dataset].roots,
                 requested = parameters->requested, content_query = std::move(content_query),
                 subtree_query = std::move(subtree_query)](const std::stop_token&) {
     return WriteTileset(view, *roots, requested, content_query, subtree_query);

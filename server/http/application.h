@@ -39,7 +39,7 @@ struct SentReply {
   std::size_t body_bytes = 0;
   std::chrono::microseconds duration{0};  // from the end of the request's head
   std::string_view peer;                  // address and port
-  bool is_admitted = false;               // false: the bytes were not a valid request, and Admit was not called
+  bool has_valid_head = false;            // false: the bytes were not a valid request, and Admit was not called
 };
 
 // Serves the requests of one connection, one after the other, on the connection's thread.
@@ -54,7 +54,7 @@ class ConnectionHandler {
 
   // Answers the last admitted request, whose body has arrived. Called again if the reply had to be released before it
   // could be sent. This object and `request` outlive the answer. A coroutine runs on the connection's thread, and is
-  // cancelled when the client leaves. Both may throw exceptions of the standard library.
+  // cancelled when the client leaves. Handle and the coroutine may throw exceptions of the standard library.
   virtual Answer Handle(const Request& request) = 0;
 
   virtual void Report(const SentReply& reply) = 0;

@@ -96,7 +96,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   struct Exchange {
     Request request;
     Admission admission;
-    bool is_admitted = false;
+    bool has_valid_head = false;
     Clock::time_point begun;  // time at the end of its head
   };
 
@@ -118,7 +118,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   // If its reply is being sent, or its body has no memory, there is nothing to release.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
-    displaced_ = true;  // also between the moment its body got memory and the moment it is woken
+    displaced_ = true;  // also if the body has got memory, but the session was not woken yet
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
@@ -182,7 +182,7 @@ asio::awaitable<void> Session::ServeAll() {
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
-    exchange_.is_admitted = false;
+    exchange_.has_valid_head = false;
     if (!*head) {
       co_await RefuseMessage(head->error());
       break;
@@ -208,7 +208,7 @@ asio::awaitable<bool> Session::ServeOne() {
   request.is_https = stream_.is_tls();
   Admission& admission = exchange_.admission;
   admission = handler_->Admit(request, context_->deadline->load(std::memory_order_relaxed));
-  exchange_.is_admitted = true;
+  exchange_.has_valid_head = true;
   if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
   if (admission.delays_refusal) {
     co_await DelayRefusal();
@@ -475,7 +475,7 @@ asio::awaitable<void> Session::CloseGently() {
 void Session::Report(const Response& response, std::size_t bytes) {
   replied_ = Clock::now();
   const auto duration = std::chrono::duration_cast<std::chrono::microseconds>(replied_ - exchange_.begun);
-  handler_->Report({exchange_.request, response, bytes, duration, peer_text_, exchange_.is_admitted});
+  handler_->Report({exchange_.request, response, bytes, duration, peer_text_, exchange_.has_valid_head});
 }
 
 }  // namespace

@@ -4,7 +4,7 @@
 // request with a body of at most the size that its admission allows, and one reply. The body and the reply count
 // against a budget that all sessions share. A body or reply without memory in the budget waits until the request's
 // deadline, and is then refused. A request over its client's rate waits for its turn; if the turn would come after its
-// deadline, it is refused earlier.
+// deadline, it is refused after kRefusalDelay (http_error.h).
 #pragma once
 
 #include <atomic>

@@ -2,11 +2,11 @@
 // answered yet.
 //
 // The memory is divided into separate pools: half for small replies, which are up to an eighth of their pool, a quarter
-// for larger replies, a quarter for uploads. A body that is larger than its pool is transferred outside of it, one at a
-// time, as if in a pool of its own. The same rules hold in each pool:
+// for larger replies, a quarter for uploads. Replies and uploads that are larger than their pool each have a further
+// pool, which holds one of them at a time. The same rules hold in each pool:
 // - A body that many replies share counts once.
-// - Bodies that do not fit wait (HoldWhenRoom). Next is the oldest body of the client that has used the pool least in
-//   the last seconds: bytes times seconds, with a half-life of ten seconds, including what it holds now.
+// - Bodies that do not fit wait (HoldWhenRoom). The oldest body of the client with the smallest use comes next. Use is
+//   bytes times seconds, with a half-life of ten seconds, and includes what the client holds now.
 // - The first reply of a client may have any size. A client with several replies may hold at most two thirds of the
 //   memory that other clients do not use. This leaves memory for the next client.
 // - A client has kGrace to take a reply that is being sent, and gains one second per kRate bytes that it takes. Its

@@ -7,8 +7,8 @@
 // until a connection opens and answers within the time-out: meanwhile Find returns at once, without a system call. The
 // first look-up that fails ends all others that are under way. So a failing Redis costs one time-out, whatever the
 // number of connections and callers. Connections that nobody used for `test_after` are tested, and those that Redis has
-// closed are replaced, before a look-up meets them. Log and statistics report it. All keys begin with "terrace:" in
-// Redis, so that a user's rights can be limited to them.
+// closed are replaced, before a look-up meets them. Log and statistics report when the store is switched off and on.
+// All keys begin with "terrace:" in Redis, so that a user's rights can be limited to them.
 #pragma once
 
 #include <atomic>

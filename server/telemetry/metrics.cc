@@ -191,19 +191,19 @@ struct Metrics::Families {
     bool operator()(const ReplyLabels& a, const OwnedLabels& b) const { return a < b.View(); }
   };
   // The metrics with a dataset as label.
-  struct OfDataset {
+  struct DatasetMetrics {
     std::set<prometheus::Counter*> requests;
     std::map<std::string, prometheus::Counter*, std::less<>> builds;  // by result
   };
   const Reply& AddReply(const ReplyRecord& record);
   void CountBuild(const std::string& dataset, std::string_view result);
-  void Forget(const std::string& dataset, const OfDataset& metrics);
+  void Forget(const std::string& dataset, const DatasetMetrics& metrics);
 
   // Guards the maps. Holding it shared also keeps their targets alive. Every reply takes it, so it is held exclusively
   // only to add or remove labels, which waits for a family that is being collected.
   std::shared_mutex mutex;
   std::map<OwnedLabels, Reply, ByLabels> replies;
-  std::map<std::string, OfDataset, std::less<>> of_datasets;
+  std::map<std::string, DatasetMetrics, std::less<>> dataset_metrics;
 };
 
 // `mutex` is held.
@@ -212,7 +212,7 @@ const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& r
   const std::string status = fmt::to_string(record.status);
   const Reply reply{requests.Add({{"route", labels.route}, {"dataset", labels.dataset}, {"status", status}}),
                     durations.Add({{"route", labels.route}, {"cache", labels.cache}}, Seconds())};
-  OfDataset& of_dataset = of_datasets[labels.dataset];
+  DatasetMetrics& of_dataset = dataset_metrics[labels.dataset];
   of_dataset.requests.insert(&reply.count);
   return replies.emplace(std::move(labels), reply).first->second;
 }
@@ -220,7 +220,7 @@ const Metrics::Families::Reply& Metrics::Families::AddReply(const ReplyRecord& r
 void Metrics::Families::CountBuild(const std::string& dataset, std::string_view result) {
   {
     const std::shared_lock lock(mutex);
-    if (const auto known = of_datasets.find(dataset); known != of_datasets.end()) {
+    if (const auto known = dataset_metrics.find(dataset); known != dataset_metrics.end()) {
       const auto count = known->second.builds.find(result);
       if (count != known->second.builds.end()) return count->second->Increment();
     }
@@ -228,11 +228,11 @@ void Metrics::Families::CountBuild(const std::string& dataset, std::string_view 
   const std::unique_lock lock(mutex);
   prometheus::Counter& count = builds.Add({{"dataset", dataset}, {"result", std::string(result)}});
   count.Increment();
-  of_datasets[dataset].builds.emplace(result, &count);
+  dataset_metrics[dataset].builds.emplace(result, &count);
 }
 
 // `mutex` is held.
-void Metrics::Families::Forget(const std::string& dataset, const OfDataset& metrics) {
+void Metrics::Families::Forget(const std::string& dataset, const DatasetMetrics& metrics) {
   std::erase_if(replies, [&](const auto& reply) { return reply.first.dataset == dataset; });
   for (prometheus::Counter* count : metrics.requests) requests.Remove(count);
   for (const auto& [result, count] : metrics.builds) builds.Remove(count);
@@ -292,12 +292,12 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   for (;;) {
     // Removes one at a time, because replies wait meanwhile, and each removal searches its family.
     const std::unique_lock lock(families_->mutex);
-    auto gone = families_->of_datasets.lower_bound(from);
-    while (gone != families_->of_datasets.end() && served.contains(gone->first)) ++gone;
-    if (gone == families_->of_datasets.end()) return;
+    auto gone = families_->dataset_metrics.lower_bound(from);
+    while (gone != families_->dataset_metrics.end() && served.contains(gone->first)) ++gone;
+    if (gone == families_->dataset_metrics.end()) return;
     families_->Forget(gone->first, gone->second);
     from = gone->first;
-    families_->of_datasets.erase(gone);
+    families_->dataset_metrics.erase(gone);
   }
 }
 

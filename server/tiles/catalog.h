@@ -76,8 +76,9 @@ CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std:
 // Also false for keys outside the tiling scheme.
 bool IsAvailable(const DatasetView& dataset, const geo::TileKey& key);
 
-// On the deepest level that has tiles without edits, returns the bounds of the largest range and of the ranges
-// connected with it, clipped to the dataset's bounds. Degrees; west > east: across the antimeridian.
+// On the deepest level of the sources (levels that edits added do not count) or of the archive, returns the bounds of
+// the largest range and of the ranges connected with it, clipped to the dataset's bounds. Degrees; west > east: across
+// the antimeridian.
 dem::GeoBounds FinestBounds(const DatasetView& dataset);
 
 // Whether two boxes share a point, even if only on an edge. `tile` does not cross the antimeridian.

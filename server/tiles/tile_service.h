@@ -68,8 +68,9 @@ class TileService {
     return pool_.Run<T>(std::move(work), OrderOf(length, deadline, client));
   }
 
-  // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. Tiles
-  // of other datasets are not inserted any more; a build that has begun may still insert a tile with the old edits.
+  // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. From
+  // now on tiles of datasets that are not in `catalog` are not inserted; a build that has begun may still insert a tile
+  // with the old edits.
   void RetainTilesOf(const Catalog& catalog);
 
   // TileTiers::Erase.

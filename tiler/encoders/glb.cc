@@ -124,7 +124,7 @@ Result<MeshedGlb> MeshGlb(const EncoderInput& input, const std::stop_token& stop
 
 }  // namespace
 
-Result<DrawnTriangles> DrawnByGlb(const EncoderInput& input, const std::stop_token& stop) {
+Result<DrawnTriangles> GlbTriangles(const EncoderInput& input, const std::stop_token& stop) {
   Result<MeshedGlb> meshed = MeshGlb(input, stop);
   if (!meshed) return tl::unexpected(std::move(meshed).error());
   DrawnTriangles drawn;

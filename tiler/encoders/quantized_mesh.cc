@@ -61,7 +61,7 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
 
 }  // namespace
 
-Result<DrawnTriangles> DrawnByQuantizedMesh(const EncoderInput& input, const std::stop_token& stop) {
+Result<DrawnTriangles> QuantizedMeshTriangles(const EncoderInput& input, const std::stop_token& stop) {
   const Result<MeshedTile> meshed = MeshTile(*input.dataset.model, input.samples(), input.refined->refinement,
                                              input.dataset.mesh_options, input.error_m, stop);
   if (!meshed) return tl::unexpected(meshed.error());

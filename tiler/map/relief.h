@@ -42,7 +42,7 @@ inline constexpr int kNoSlope = -1;
 // The nearest half degree of a slope; kNoSlope: NaN.
 int SlopeStep(const Gradient& gradient);
 
-// Colours of the steps: interpolated between those of docs/http-api.md. A map of any program may use them.
+// Colours of the steps: interpolated between those of docs/http-api.md.
 const std::array<std::array<std::uint8_t, 3>, kSlopeSteps>& SlopeColors();
 
 }  // namespace terrace::tiler

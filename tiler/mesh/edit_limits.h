@@ -20,8 +20,8 @@ tin::SampleLimits LimitsOf(dem::MeshDemands demands);
 // The error that each sample may have in a tile of this error, row by row; empty: `error_m` everywhere.
 std::vector<float> AllowedErrors(const tin::SampleLimits& limits, double error_m);
 
-// The smallest allowed error on each side of a tile of this error, and on the edges that meet at each corner: the
-// height of a corner counts for the samples on all edges that end there. Neighbours have equal values for shared sides
+// The smallest error allowed on each side of a tile of this error, and at each corner over all four edges that end
+// there, because a corner's height affects the samples of each of them. Neighbours have equal values for shared sides
 // and corners. On a pole they are `error_m`. `limits`: of the tile.
 proto::EdgeErrors EdgeErrorsOf(const dem::ElevationModel& model, const geo::TileKey& key,
                                const tin::SampleLimits& limits, double error_m);

@@ -50,7 +50,7 @@ struct StoreStats : ByteCacheStats {  // entries and bytes: approximate
   std::uint64_t damaged = 0;          // records with a wrong checksum, which were erased
   std::uint64_t written = 0;
   std::uint64_t dropped = 0;  // values not written because the medium failed or the queue was full
-  bool on = false;            // values are found and written; false: switched off, or only one of both works
+  bool on = false;            // values are found and written; false: switched off, or it can only read or only write
   // For a store on a network: look-ups that timed out; look-ups that were skipped, because the store was switched off
   // or look-ups of that kind rarely succeed; how often it was switched off.
   std::uint64_t timeouts = 0, skipped = 0, switched_off = 0;

@@ -20,7 +20,7 @@ DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile) {
   return drawn;
 }
 
-Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key) {
+Result<DrawnTriangles> DecodeTriangles(std::string_view bytes, const geo::TileKey& key) {
   std::optional<proto::QuantizedTile> tile = proto::ReadQuantizedMesh(bytes, key);
   if (!tile) {
     return MakeError(ErrorCode::kUnavailable, "tile {} of the archive is no quantized-mesh; bake it again",

@@ -13,6 +13,6 @@ namespace terrace::tiler {
 DrawnTriangles TrianglesOf(const proto::QuantizedTile& tile);
 
 // The triangles of a finished tile. kUnavailable: the bytes are not such a tile.
-Result<DrawnTriangles> DrawnByBytes(std::string_view bytes, const geo::TileKey& key);
+Result<DrawnTriangles> DecodeTriangles(std::string_view bytes, const geo::TileKey& key);
 
 }  // namespace terrace::tiler

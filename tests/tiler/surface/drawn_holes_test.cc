@@ -262,7 +262,7 @@ TEST(DrawnMesh, FindsTheNearestTriangle) {
   EXPECT_LT(beside, 55u);
 }
 
-// As DrawnByBytes makes them of tiles of archives, whose triangles in holes are not stored.
+// As DecodeTriangles makes them of tiles of archives, whose triangles in holes are not stored.
 TEST(DrawnMesh, IsAHoleWhereNoTriangleIsNear) {
   const geo::TileKey key{12, 1090, 2870};
   const double side = 180.0 / static_cast<double>(geo::TileRows(key.level));
