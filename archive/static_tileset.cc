@@ -75,7 +75,8 @@ Result<void> TakeSubtreesOf(const geo::TileRange& block, int level, int levels, 
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
       const std::string path =
           fmt::format("3dtiles/{}/{}/{}/{}.{}.subtree", proto::RootName(tree.tile), level, x, y, levels);
-      const std::string subtree = tiler::SubtreeOf(tiles, proto::TileUnder(tree.tile, level, x, y), levels);
+      const std::string subtree = tiler::SubtreeOf(tiles, proto::TileUnder(tree.tile, level, x, y), levels, stop);
+      if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped");
       if (Result<void> taken = take(path, subtree, /*is_gzip=*/false); !taken) return taken;
     }
   }

@@ -86,6 +86,11 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
       return why(error);
     }
   }
+  // Otherwise a power failure may leave the name without the content.
+  if (const int written = ::open(own.c_str(), O_RDONLY | O_CLOEXEC); written >= 0) {
+    ::fsync(written);
+    ::close(written);
+  }
   int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
   if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links
     const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);

@@ -87,11 +87,12 @@ std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>
   return proto::EncodeTileset(tileset);
 }
 
-std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels) {
+std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels, const std::stop_token& stop) {
   proto::Subtree subtree;
   subtree.levels = levels;
   subtree.tiles = proto::BlocksBelow(tree.available, top, levels);
   subtree.heights = [&](const geo::TileKey& below) {
+    if (stop.stop_requested()) return proto::HeightSpan();
     return TileHeightSpan(tree, proto::TileUnder(top, below.level, below.x, below.y));
   };
   return proto::EncodeSubtree(subtree);

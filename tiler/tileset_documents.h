@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ std::vector<proto::TreeRoot> TreesOf(const TileTree& tree);
 std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>& roots,
                         const std::string& content_query, const std::string& subtree_query, bool has_versions = true);
 
-// The subtree of `levels` levels below `top`, an available tile.
-std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels);
+// The subtree of `levels` levels below `top`, an available tile. Not a subtree if a stop was requested: the ranges of
+// an archive take long, because its tiles are read for them.
+std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -53,6 +53,9 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
   const auto deadline = state.Deadline();
   Result<tiler::EncodedTile> mesh =
       co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+  if (!mesh && mesh.error().code == ErrorCode::kInvalidArgument) {
+    co_return ClientErrorResponse(mesh.error(), context.request->id);
+  }
   if (!mesh) co_return co_await BackendFailure(mesh.error(), context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {

@@ -104,8 +104,10 @@ DocumentAnswer DescribeSubtree(const HandlerState& state, const RequestContext& 
                          context.route.subtree_levels, TileQuery(requested), requested.at_least ? "" : " alone");
   plan.content_type = "application/octet-stream";
   plan.cache_control = CacheControlOf(context.route.query, dataset, state.cache_control);
-  plan.write = [&dataset, requested, top = context.route.key, levels = context.route.subtree_levels](
-                   const std::stop_token&) { return tiler::SubtreeOf(TreeOf(dataset, requested), top, levels); };
+  plan.write = [&dataset, requested, top = context.route.key,
+                levels = context.route.subtree_levels](const std::stop_token& stop) {
+    return tiler::SubtreeOf(TreeOf(dataset, requested), top, levels, stop);
+  };
   return plan;
 }
 

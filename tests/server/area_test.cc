@@ -30,6 +30,7 @@ class AreaTest : public ServerFixture {
       ++builds_;
       while (held_ && !stop.stop_requested()) std::this_thread::sleep_for(1ms);
       if (fails_) return MakeError(ErrorCode::kUnavailable, "the disk is gone");
+      if (is_in_hole_) return MakeError(ErrorCode::kInvalidArgument, "all of the area lies in a hole");
       tiler::EncodedTile mesh;
       mesh.bytes = std::string(3000, 'v');
       mesh.max_error_m = area.error_m - 0.5;
@@ -38,7 +39,7 @@ class AreaTest : public ServerFixture {
     Start(std::move(options));
   }
 
-  std::atomic<bool> held_{false}, fails_{false}, depends_on_limit_{false};
+  std::atomic<bool> held_{false}, fails_{false}, is_in_hole_{false}, depends_on_limit_{false};
   std::atomic<int> level_{0};
 };
 
@@ -51,6 +52,15 @@ TEST_F(AreaTest, TellsItsErrorAndOrigin) {
   EXPECT_EQ(reply.Field("terrain-max-error"), "4.5");
   EXPECT_EQ(reply.Field("terrain-origin"), "20.5,-156.5,0");
   EXPECT_TRUE(reply.Field("server-timing").starts_with("cache;desc=miss, ")) << reply.Field("server-timing");
+}
+
+// That all of an area lies in a hole of the edits is known only when its mesh is made.
+TEST_F(AreaTest, TellsTheClientWhatItsMeshShows) {
+  StartAreas();
+  is_in_hole_ = true;
+  const Reply reply = Fetch(port(), kArea);
+  EXPECT_EQ(reply.status, 400);
+  EXPECT_NE(reply.body.find("all of the area lies in a hole"), std::string::npos) << reply.body;
 }
 
 TEST_F(AreaTest, AreKeptForGoodWithTheirVersion) {

@@ -9,6 +9,7 @@
 #include "server/documents/document.h"
 #include "server/handlers/handlers.h"
 #include "tests/server/handlers/allocations.h"
+#include "tiler/tileset_documents.h"
 
 namespace terrace::server {
 namespace {
@@ -57,6 +58,24 @@ TEST(StoppedJobs, DocumentsAreNotCompressed) {
   const auto made = MakeDocument(write, tiler::Coding::kGzip, source.get_token());
   ASSERT_FALSE(made);
   EXPECT_EQ(made.error().code, ErrorCode::kCancelled);
+}
+
+// The ranges of an archive are read from its files.
+TEST(StoppedJobs, SubtreesReadNoFurtherRanges) {
+  std::vector<std::vector<geo::TileRange>> available;
+  for (int level = 0; level <= 7; ++level) available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
+  tiler::TileTree tree{.available = available, .bounds = {-180, -90, 180, 90}};
+  std::stop_source source;
+  int asked = 0;
+  tree.range = [&](const geo::TileKey&) {
+    if (++asked == 10) source.request_stop();
+    return dem::HeightRange{0, 10};
+  };
+  tree.error_step = [](int) { return 0; };
+  tiler::SubtreeOf(tree, {0, 0, 0}, 7, source.get_token());
+  EXPECT_EQ(asked, 10);
+  tiler::SubtreeOf(tree, {0, 0, 0}, 7, {});
+  EXPECT_EQ(asked, 10 + 5461);
 }
 
 TEST(StoppedJobs, HeightsEnd) {
