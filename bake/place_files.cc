@@ -87,9 +87,12 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     }
   }
   // Otherwise a power failure may leave the name without the content.
-  if (const int written = ::open(own.c_str(), O_RDONLY | O_CLOEXEC); written >= 0) {
-    ::fsync(written);
-    ::close(written);
+  const int descriptor = ::open(own.c_str(), O_RDONLY | O_CLOEXEC);
+  const int sync_error = descriptor >= 0 && ::fsync(descriptor) == 0 ? 0 : errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (sync_error != 0) {
+    ::unlink(own.c_str());
+    return why(sync_error);
   }
   int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
   if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links

@@ -9,6 +9,7 @@
 #include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/handlers/handlers.h"
+#include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
 #include "server/query/mesh_query.h"
 #include "tiler/tile/strong_etag.h"
@@ -53,10 +54,7 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
   const auto deadline = state.Deadline();
   Result<tiler::EncodedTile> mesh =
       co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
-  if (!mesh && mesh.error().code == ErrorCode::kInvalidArgument) {
-    co_return ClientErrorResponse(mesh.error(), context.request->id);
-  }
-  if (!mesh) co_return co_await BackendFailure(mesh.error(), context.request->id);
+  if (!mesh) co_return co_await RefuseQuery(mesh.error(), state.catalog->datasets[dataset], context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {
     response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));

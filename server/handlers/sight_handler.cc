@@ -117,7 +117,7 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
   const auto deadline = state.Deadline();
   const bool is_quick = context.route.query.size() <= kQuickQuery;
   Result<SightQuery> parsed = co_await ParsePoints(state, context, ParseSight, is_quick, deadline);
-  if (!parsed) co_return co_await RefusePoints(parsed.error(), view, request.id);
+  if (!parsed) co_return co_await RefuseQuery(parsed.error(), view, request.id);
   if (view.only_archive && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;

@@ -43,12 +43,12 @@ std::string WriteBytes(const TempDir& dir) {
 
 TEST(Threads, ReadTheTilesOfOneModel) {
   TERRACE_REQUIRE_DATA(path, "bigtujunga_30m_utm11.tif");
-  const auto source = OpenOrFail(path);
-  ASSERT_NE(source, nullptr);
-  const std::vector<geo::TileKey> keys = SomeTiles(*source, 13, 40);
+  const auto model = OpenOrFail(path);
+  ASSERT_NE(model, nullptr);
+  const std::vector<geo::TileKey> keys = SomeTiles(*model, 13, 40);
   ExpectSameOnFourThreads([&] {
     std::vector<std::vector<float>> tiles;
-    for (const geo::TileKey& key : keys) tiles.push_back(source->Read(key).value().heights);
+    for (const geo::TileKey& key : keys) tiles.push_back(model->Read(key).value().heights);
     return tiles;
   });
 }
