@@ -100,6 +100,8 @@ class Bake(BakeCase):
         dice = random.Random(7)
         for kill in range(KILLS):
             if (place / "manifest.json").exists():
+                # If it was killed after the manifest and before the removal of its notes, the next run removes them.
+                self.assertEqual(self.run_bake("--out", place).returncode, 0)
                 self.expect_equal(place)
                 shutil.rmtree(place)
             process = self.start("--out", place, "--threads", dice.choice((1, 2)), "--json")
@@ -109,6 +111,18 @@ class Bake(BakeCase):
         self.assertGreater(kept, 0, "no kill left a finished unit: the sleeps do not fit the machine")
         done = self.run_bake("--out", place)
         self.assertEqual(done.returncode, 0, done.stderr)
+        self.expect_equal(place)
+
+    def test_killed_after_the_manifest_the_next_run_removes_the_notes(self):
+        place = self.place("notes")
+        begun = self.start("--out", place, "--json", "--threads", 1)
+        begun.stdout.readline()
+        begun.kill()
+        begun.communicate()
+        shutil.copytree(self.reference, place, dirs_exist_ok=True)
+        self.assertLessEqual({"bake.json", "bake.lock"}, set(files_of(place)))
+        done = self.run_bake("--out", place, "--json")
+        self.assertEqual((done.returncode, set(self.units(done).values())), (0, {"kept"}), done.stderr)
         self.expect_equal(place)
 
     def test_signals_drop_the_unit_and_say_how_to_go_on(self):
