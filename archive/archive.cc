@@ -41,9 +41,10 @@ class ArchiveBase : public Archive {
     return found;
   }
 
-  std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const override {
+  Result<std::optional<dem::HeightRange>> FindRange(const geo::TileKey& key) const override {
     const Result<std::optional<ArchivedTile>> found = Find(key);
-    if (!found || !*found) return std::nullopt;
+    if (!found) return tl::unexpected(found.error());
+    if (!*found) return std::nullopt;
     return (*found)->range;
   }
 

@@ -41,8 +41,8 @@ class Archive {
   // or cannot be read; the message names it.
   virtual Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const = 0;
 
-  // The range of a tile. Nothing: the archive does not have the tile, or its file cannot be read.
-  virtual std::optional<dem::HeightRange> FindRange(const geo::TileKey& key) const = 0;
+  // The range of a tile's heights in metres. Nothing and errors: as Find.
+  virtual Result<std::optional<dem::HeightRange>> FindRange(const geo::TileKey& key) const = 0;
 
   // Calls `take` for each tile, unit by unit, in the order of each unit's file. Ends when `take` fails. Reads and
   // checks every byte. Errors: those of `take` and of Find.

@@ -96,12 +96,15 @@ class Baked final : public tiler::BakedTiles {
     return std::nullopt;
   }
 
-  dem::HeightRange RangeBound(const geo::TileKey& key) const override {
+  Result<dem::HeightRange> RangeBound(const geo::TileKey& key) const override {
     for (const auto& archive : archives_) {
       if (archive->manifest().kind.format == TileFormat::kHeightPng) continue;
-      if (const std::optional<dem::HeightRange> range = archive->FindRange(key)) return *range;
+      const Result<std::optional<dem::HeightRange>> range = archive->FindRange(key);
+      if (!range) return tl::unexpected(range.error());
+      if (*range) return **range;
     }
-    return {std::min(extent_.heights.min, extent_.floor_m), std::max(extent_.heights.max, extent_.floor_m)};
+    return dem::HeightRange{std::min(extent_.heights.min, extent_.floor_m),
+                            std::max(extent_.heights.max, extent_.floor_m)};
   }
 
   Error WhyAbsent(const TileRequest& request) const override {

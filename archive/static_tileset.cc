@@ -31,7 +31,7 @@ tiler::TileTree TreeOf(const Archive& archive) {
           dataset.bounds,
           dataset.error_fraction,
           dataset.max_source_level,
-          [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all); },
+          [&archive, all](const geo::TileKey& key) { return archive.FindRange(key).value_or(all).value_or(all); },
           [&manifest](int level) { return manifest.StepAt(level); }};
 }
 

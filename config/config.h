@@ -59,10 +59,10 @@ struct ImageryConfig {
 struct SourceConfig {
   SourceConfig() = default;
   // One file. Implicit, because a path is a source.
-  SourceConfig(std::string file) : written(std::move(file)), files{written} {}  // NOLINT(google-explicit-constructor)
-  SourceConfig(const char* file) : SourceConfig(std::string(file)) {}           // NOLINT(google-explicit-constructor)
+  SourceConfig(std::string file) : path(std::move(file)), files{path} {}  // NOLINT(google-explicit-constructor)
+  SourceConfig(const char* file) : SourceConfig(std::string(file)) {}     // NOLINT(google-explicit-constructor)
 
-  std::string written;             // path or pattern, absolute
+  std::string path;                // of a file or a folder, or a glob; absolute
   std::vector<std::string> files;  // the files that it stands for
   bool is_folder = false;          // files that are not rasters are left out
   // Default: the option of the dataset.

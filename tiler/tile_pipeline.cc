@@ -10,8 +10,8 @@
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/node_error_bound.h"
 #include "tiler/mesh/refine_options.h"
+#include "tiler/mesh/sample_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/surface/drawn_points.h"
 #include "tiler/surface/drawn_sight.h"
@@ -125,7 +125,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);
@@ -175,7 +175,7 @@ Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dat
     return std::shared_ptr<const DrawnMesh>(std::move(mesh));
   }
   const double error_m =
-      NodeErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+      SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());

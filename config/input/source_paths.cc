@@ -63,11 +63,11 @@ Result<SourceConfig> ExpandSource(const std::string& written, const std::filesys
 }
 
 bool IsExpanded(const SourceConfig& source) {
-  return source.is_folder || source.files.size() != 1 || source.files.front() != source.written;
+  return source.is_folder || source.files.size() != 1 || source.files.front() != source.path;
 }
 
 bool HoldsOtherFiles(const SourceConfig& source) {
-  const Result<SourceConfig> now = ExpandSource(source.written, {});
+  const Result<SourceConfig> now = ExpandSource(source.path, {});
   return !now || now->files != source.files || now->is_folder != source.is_folder;
 }
 

@@ -48,8 +48,8 @@ std::string FlagOf(std::string_view key) {
 
 std::string OptionInfo::Flag() const { return FlagOf(key); }
 
-std::vector<OptionInfo> ServerOptions() { return Infos(ServerOptionTable()); }
-std::vector<OptionInfo> DatasetOptions() { return Infos(DatasetOptionTable()); }
+std::vector<OptionInfo> ServerOptionInfos() { return Infos(ServerOptionTable()); }
+std::vector<OptionInfo> DatasetOptionInfos() { return Infos(DatasetOptionTable()); }
 
 bool NeedsRestart(std::string_view key) {
   const auto& table = ServerOptionTable();

@@ -26,8 +26,8 @@ struct OptionInfo {
 };
 
 // Options at the top level of the file; options of a dataset.
-std::vector<OptionInfo> ServerOptions();
-std::vector<OptionInfo> DatasetOptions();
+std::vector<OptionInfo> ServerOptionInfos();
+std::vector<OptionInfo> DatasetOptionInfos();
 
 // Whether a change of this option at the top level of the file needs a restart.
 bool NeedsRestart(std::string_view key);

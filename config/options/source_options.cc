@@ -69,9 +69,9 @@ Codec<SourceConfig> SourcePath() {
             if (value.get_ref<const std::string&>().find('\0') != std::string::npos) {
               return place.Fail("has the character \\u0000, which no path has; remove it");
             }
-            source.written = value.get<std::string>();
+            source.path = value.get<std::string>();
           },
-          [](const SourceConfig& source) { return Json(source.written); }, nullptr, Json::parse(kNonEmptyText)};
+          [](const SourceConfig& source) { return Json(source.path); }, nullptr, Json::parse(kNonEmptyText)};
 }
 
 constexpr const char* kVerticalSchema = R"({
@@ -109,8 +109,8 @@ void ReadSource(const Json& value, const ConfigLocation& place, DatasetConfig& d
   } else {
     ReadObject(value, place, SourceOptionTable(), source);
   }
-  if (source.written.empty()) return;
-  Result<SourceConfig> expanded = ExpandSource(source.written, place.directory());
+  if (source.path.empty()) return;
+  Result<SourceConfig> expanded = ExpandSource(source.path, place.directory());
   if (!expanded) {
     return (is_object ? place.At("path") : place)
         .Fail(expanded.error().message + "; correct the path; a relative path starts at " + place.directory().string());
@@ -159,7 +159,7 @@ Codec<DatasetConfig> SourcesCodec() {
             Json list = Json::array();
             for (const SourceConfig& source : dataset.sources) {
               const bool is_plain = !source.vertical && !source.nodata;
-              list.push_back(is_plain ? Json(source.written) : WriteObject(source, SourceOptionTable()));
+              list.push_back(is_plain ? Json(source.path) : WriteObject(source, SourceOptionTable()));
             }
             return list;
           },

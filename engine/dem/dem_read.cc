@@ -368,6 +368,13 @@ Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const No
   if (const auto done = impl_->ApplyEdits(grid, window, which, edited, stop); !done) {
     return tl::unexpected(done.error());
   }
+  // A height that is not NaN here was set by an edit, even if it equals the floor.
+  std::vector<float> without_floor = unedited;
+  if (HasVoids(unedited)) {
+    if (const auto done = impl_->ApplyEdits(grid, window, which, without_floor, stop); !done) {
+      return tl::unexpected(done.error());
+    }
+  }
   std::vector<double> undulations;  // empty: the datums are one
   if (datum != HeightDatum::kEllipsoid && impl_->floor_undulations != nullptr && HasVoids(unedited)) {
     auto read_undulations = impl_->floor_undulations->At(grid, window);
@@ -376,7 +383,7 @@ Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const No
   }
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (IsVoid(unedited[i])) {
-      if (edited[i] == static_cast<float>(impl_->floor)) continue;
+      if (edited[i] == static_cast<float>(impl_->floor) && IsVoid(without_floor[i])) continue;
       const bool converts = !undulations.empty() && !std::isnan(undulations[i]);
       (*known)[i] = converts ? RoundHeight(static_cast<double>(edited[i]) - undulations[i]) : edited[i];
     } else if (edited[i] != unedited[i]) {

@@ -338,7 +338,7 @@ bool ElevationModel::has_datum() const {
                               [](const RasterInfo& raster) { return raster.datum_in_use.empty(); });
 }
 
-bool ElevationModel::converts() const { return impl_->floor_undulations != nullptr; }
+bool ElevationModel::has_geoid() const { return impl_->floor_undulations != nullptr; }
 
 Result<std::vector<float>> ElevationModel::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
   TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);

@@ -96,7 +96,7 @@ class ElevationModel {
   // Whether the vertical datum of every source is known. Orthometric heights need it.
   bool has_datum() const;
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
-  bool converts() const;
+  bool has_geoid() const;
 
   // Edits (docs/edits.md). Without edits all of these except AvailabilityBelow are 0 or empty.
   //

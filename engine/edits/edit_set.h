@@ -43,10 +43,10 @@ class EditSet {
   // Whether Find would find any; faster if it would find many.
   bool Any(const Box& degrees) const;
 
-  // Edits heights of nodes, which are finite. `NodeGrid`: geo::Lattice or geo::MercatorGrid. `error_m`, unless null: an
-  // upper bound of the distance between the surface through the tile's nodes and the samples of the sources. It is
-  // replaced by the bound for the edited surface and the edited samples. The window then has a halo of one, which does
-  // not count. Errors: kCancelled.
+  // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. `NodeGrid`:
+  // geo::Lattice or geo::MercatorGrid. `error_m`, unless null: an upper bound of the distance between the surface
+  // through the tile's nodes, all finite, and the samples of the sources. It is replaced by the bound for the edited
+  // surface and the edited samples. The window then has a halo of one, which does not count. Errors: kCancelled.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
                      std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,

@@ -12,7 +12,7 @@ namespace terrace::dem {
 // A source's footprint, without padding, and the deepest level that its resolution justifies.
 struct SourceExtent {
   Footprint footprint;
-  int depth = 0;
+  int deepest_level = 0;
 };
 
 // Tiles of a level that exist for another reason than a source's resolution.
@@ -22,7 +22,7 @@ struct FinerTiles {
 };
 
 // For each level from 0 to the deepest: ranges of tiles without overlap, sorted by row, then column, that contain
-// - every tile that overlaps a source of at least this depth;
+// - every tile that overlaps a source whose deepest level is at least this one;
 // - every ancestor of such a tile, and both roots;
 // - all four children of a tile that has any: 3D Tiles clients replace a tile by its children, and a missing child is a
 //   hole.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "engine/geo/tile_cover.h"
+#include "engine/mosaic/window_values.h"
 #include "engine/raster/node_rows.h"
 
 namespace terrace::dem {
@@ -45,6 +46,31 @@ bool GridCover::Covers(const PixelRange& pixels) const {
   std::int64_t covered = 0;
   for (const std::size_t i : index_.Find(BoxOf(pixels))) covered += geo::Cells(geo::Intersection(boxes_[i], pixels));
   return covered == geo::Cells(pixels);
+}
+
+void GridCover::RemoveUncovered(int factor, std::int64_t blocks_of_turn, const GridWindow& window,
+                                std::vector<float>& heights) const {
+  std::vector<std::uint8_t> covered(heights.size());
+  for (const std::int64_t turn : {0, -1, 1}) {
+    if (turn != 0 && blocks_of_turn == 0) break;
+    const GridWindow turned{window.column - turn * blocks_of_turn, window.row, window.columns, window.rows};
+    const PixelRange wanted{turned.column, turned.row, turned.column + turned.columns - 1,
+                            turned.row + turned.rows - 1};
+    for (const std::size_t i : index_.Find(PixelsOf(turned, factor))) {
+      const PixelRange& box = boxes_[i];
+      const PixelRange blocks = geo::Intersection(
+          {box.start_x / factor, box.start_y / factor, box.end_x / factor, box.end_y / factor}, wanted);
+      if (geo::IsEmpty(blocks)) continue;
+      if (blocks == wanted) return;
+      for (std::int64_t row = blocks.start_y; row <= blocks.end_y; ++row) {
+        const auto first = covered.begin() + static_cast<std::ptrdiff_t>(IndexIn(turned, blocks.start_x, row));
+        std::fill_n(first, blocks.end_x - blocks.start_x + 1, std::uint8_t{1});
+      }
+    }
+  }
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (covered[i] == 0) heights[i] = SampleRules::kVoid;
+  }
 }
 
 std::vector<std::uint8_t> GridCover::Inside(const NodePositions& positions) const {

@@ -9,6 +9,7 @@
 #include "engine/crs/node_positions.h"
 #include "engine/geo/tile_key.h"
 #include "engine/mosaic/grid_members.h"
+#include "engine/raster/sample_grid.h"
 
 namespace terrace::dem {
 
@@ -32,6 +33,11 @@ class GridCover {
   // Whether the rasters cover all of these pixels. Precondition: the range is not empty and lies inside the raster
   // grid.
   bool Covers(const PixelRange& pixels) const;
+
+  // Makes the heights of blocks of `factor` x `factor` pixels void where no raster has a part of the block.
+  // `blocks_of_turn`: blocks around the Earth if the raster grid wraps, else 0.
+  void RemoveUncovered(int factor, std::int64_t blocks_of_turn, const GridWindow& window,
+                       std::vector<float>& heights) const;
 
  private:
   std::vector<std::uint8_t> InsideOfAxes(const NodePositions& positions) const;

@@ -12,7 +12,7 @@ namespace {
 
 // Those of `all`, the values of a grid, that lie in a window.
 template <typename T>
-std::vector<T> Cut(const VoidGrid& grid, const std::vector<T>& all, const GridWindow& window) {
+std::vector<T> Cut(const WindowWithHoles& grid, const std::vector<T>& all, const GridWindow& window) {
   std::vector<T> values;
   values.reserve(static_cast<std::size_t>(window.columns * window.rows));
   for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
@@ -37,8 +37,8 @@ GridWindow HullOfMarks(const std::vector<std::uint8_t>& marks, const GridWindow&
 // Averages beside a hole may cover only a part of their block, and so not its centre. The initial guess does not use
 // them, so that it continues a plane exactly. They are used if nothing lies behind them.
 void WidenHoles(const GridWindow& wide, const std::vector<float>& heights, const std::vector<std::uint8_t>& holes,
-                std::int64_t columns, std::int64_t rows, bool wraps, VoidGrid& grid) {
-  const VoidGrid around{wide, {}, {}};
+                std::int64_t columns, std::int64_t rows, bool wraps, WindowWithHoles& grid) {
+  const WindowWithHoles around{wide, {}, {}};
   const GridWindow& window = grid.window;
   for (std::int64_t row = window.row; row < window.row + window.rows; ++row) {
     for (std::int64_t column = window.column; column < window.column + window.columns; ++column) {
@@ -59,8 +59,8 @@ void WidenHoles(const GridWindow& wide, const std::vector<float>& heights, const
 
 }  // namespace
 
-Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, bool is_guess,
-                                       const std::stop_token& stop) const {
+Result<WindowWithHoles> RasterGrid::ReadVoids(int factor, const GridWindow& window, bool is_guess,
+                                              const std::stop_token& stop) const {
   const auto holes_in = [&](const GridWindow& in, const std::vector<float>& heights) {
     return voids_.HolesIn(members_, member_index_, factor, in, Columns(factor).count(), heights);
   };
@@ -68,14 +68,14 @@ Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, boo
     auto bridged = ReadBridged(factor, window, stop);
     if (!bridged) return tl::unexpected(bridged.error());
     auto holes = holes_in(window, bridged->heights);
-    return VoidGrid{window, std::move(bridged->heights), std::move(holes)};
+    return WindowWithHoles{window, std::move(bridged->heights), std::move(holes)};
   }
   const GridWindow wide = Grown(window, 1, factor);
   const auto heights = ReadAverages(factor, wide, stop);
   if (!heights) return tl::unexpected(heights.error());
   const auto holes = holes_in(wide, *heights);
-  const VoidGrid around{wide, {}, {}};
-  VoidGrid grid{window, Cut(around, *heights, window), Cut(around, holes, window)};
+  const WindowWithHoles around{wide, {}, {}};
+  WindowWithHoles grid{window, Cut(around, *heights, window), Cut(around, holes, window)};
   WidenHoles(wide, *heights, holes, Columns(factor).count(), Rows(factor).count(), wraps_, grid);
   return grid;
 }
@@ -83,7 +83,7 @@ Result<VoidGrid> RasterGrid::ReadVoids(int factor, const GridWindow& window, boo
 // Initial guess for large regions, from the same holes by twice the factor. The guess is then adjusted to the heights
 // around.
 Result<void> RasterGrid::GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions,
-                                    VoidGrid& grid, const std::stop_token& stop) const {
+                                    WindowWithHoles& grid, const std::stop_token& stop) const {
   const GridWindow near = Grown(window, kSweeps, factor);
   const GridAxis columns = Columns(factor), rows = Rows(factor);
   const GridAxis coarse_columns = Columns(2 * factor), coarse_rows = Rows(2 * factor);

@@ -47,7 +47,7 @@ class Patch {
 
 }  // namespace
 
-std::vector<VoidRegion> RegionsIn(const VoidGrid& grid, const GridWindow& core, const OpenSides& open) {
+std::vector<VoidRegion> RegionsIn(const WindowWithHoles& grid, const GridWindow& core, const OpenSides& open) {
   const GridWindow& window = grid.window;
   const std::int64_t last_column = window.column + window.columns - 1, last_row = window.row + window.rows - 1;
   std::vector<VoidRegion> regions;
@@ -81,7 +81,7 @@ std::vector<VoidRegion> RegionsIn(const VoidGrid& grid, const GridWindow& core, 
   return regions;
 }
 
-void SolveHarmonic(const VoidRegion& region, VoidGrid& grid) {
+void SolveHarmonic(const VoidRegion& region, WindowWithHoles& grid) {
   const GridWindow& window = grid.window;
   Patch patch(region.box);
   std::vector<std::size_t> inside;
@@ -134,7 +134,7 @@ void SolveHarmonic(const VoidRegion& region, VoidGrid& grid) {
   }
 }
 
-void RelaxHarmonic(const std::vector<std::size_t>& samples, VoidGrid& grid) {
+void RelaxHarmonic(const std::vector<std::size_t>& samples, WindowWithHoles& grid) {
   const GridWindow& window = grid.window;
   constexpr double kDamping = 0.8;  // also damps errors that alternate between samples
   std::vector<double> before(samples.size());

@@ -12,7 +12,7 @@
 namespace terrace::dem {
 
 // A window of a grid.
-struct VoidGrid {
+struct WindowWithHoles {
   GridWindow window;
   std::vector<float> heights;         // NaN: no height
   std::vector<std::uint8_t> unknown;  // 1: a height is to be computed, and `heights` is ignored; 0: nothing to compute
@@ -40,15 +40,15 @@ struct OpenSides {
 };
 
 // Returns the regions with a sample in `core`, ordered by their first sample.
-std::vector<VoidRegion> RegionsIn(const VoidGrid& grid, const GridWindow& core, const OpenSides& open);
+std::vector<VoidRegion> RegionsIn(const WindowWithHoles& grid, const GridWindow& core, const OpenSides& open);
 
 // Computes the harmonic heights of a region. They depend only on the region and the heights beside it; if there are no
 // heights beside it, its samples stay NaN. Precondition: !region.is_cut && !region.is_large().
-void SolveHarmonic(const VoidRegion& region, VoidGrid& grid);
+void SolveHarmonic(const VoidRegion& region, WindowWithHoles& grid);
 
 // Smooths samples that have an initial guess: kSweeps times, each moves towards the mean of its neighbours. A result
 // depends on the samples within distance kSweeps. Other samples do not change, and are used unless they are NaN.
 inline constexpr int kSweeps = 8;
-void RelaxHarmonic(const std::vector<std::size_t>& samples, VoidGrid& grid);
+void RelaxHarmonic(const std::vector<std::size_t>& samples, WindowWithHoles& grid);
 
 }  // namespace terrace::dem

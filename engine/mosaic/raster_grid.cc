@@ -256,7 +256,9 @@ Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow
   const auto around = ReadAround(factor, wide, window, bridged.heights, stop);
   if (!around) return tl::unexpected(around.error());
   if (std::ranges::all_of(*around, IsVoid)) return bridged;
-  CopyInto(FillVoids(*around, wide, voids, gap), voids, window, bridged.heights);
+  std::vector<float> filled = FillVoids(*around, wide, voids, gap);
+  cover_.RemoveUncovered(factor, wraps_ ? Columns(factor).count() : 0, voids, filled);
+  CopyInto(filled, voids, window, bridged.heights);
   return bridged;
 }
 

@@ -197,9 +197,10 @@ class RasterGrid {
                                        const std::stop_token& stop) const;
   Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,
                                         const std::stop_token& stop) const;
-  Result<VoidGrid> ReadVoids(int factor, const GridWindow& window, bool is_guess, const std::stop_token& stop) const;
-  Result<void> GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions, VoidGrid& grid,
-                          const std::stop_token& stop) const;
+  Result<WindowWithHoles> ReadVoids(int factor, const GridWindow& window, bool is_guess,
+                                    const std::stop_token& stop) const;
+  Result<void> GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions,
+                          WindowWithHoles& grid, const std::stop_token& stop) const;
   GridWindow Grown(const GridWindow& window, int halo, int factor) const;
   Result<PointBlock> ReadPointBlock(const GridWindow& window, const std::stop_token& stop) const;
   GridWindow WindowOfPointBlock(std::int64_t block_column, std::int64_t block_row) const;

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "proto/compress.h"
+#include "server/api/caching.h"
 #include "server/api/tile_formats.h"
 #include "server/http/http_error.h"
 #include "tiler/tile/strong_etag.h"
@@ -41,8 +42,10 @@ Response Serve(const Document& document, const Request& request, std::string_vie
 
 Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::Coding coding,
                                       const std::stop_token& stop) {
-  std::string bytes = write(stop);
+  DocumentText text = write(stop);
   RenderedDocument made;
+  made.is_final = text.is_final;
+  std::string& bytes = text.bytes;
   if (coding == tiler::Coding::kGzip) {
     std::string compressed = proto::Gzip(bytes, proto::kGzipLevel, stop);
     if (compressed.size() < bytes.size()) {
@@ -62,7 +65,7 @@ Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Req
   response.content_encoding = tiler::NameOf(made.coding);
   response.body = made.body;
   response.etag = made.etag;
-  response.cache_control = plan.cache_control;
+  response.cache_control = made.is_final ? plan.cache_control : kRevalidate;
   response.vary = "Accept-Encoding";
   response.depends_on_token = plan.depends_on_token;
   return Conditional(std::move(response), request);
@@ -90,7 +93,7 @@ asio::awaitable<Response> DocumentMaker::MakeOnWorker(DocumentPlan plan, tiler::
       co_await workers_.Run(std::move(work), TileService::Length::kShort, deadline, context.request->client);
   if (!document) co_return co_await BackendFailure(document.error(), context.request->id);
   const auto made = std::make_shared<const RenderedDocument>(*std::move(document));
-  kept_.Insert(Key{plan.key, coding}, made);
+  if (made->is_final) kept_.Insert(Key{plan.key, coding}, made);
   co_return Serve(*made, plan, *context.request);
 }
 

@@ -12,6 +12,7 @@
 #include <stop_token>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 
 #include "engine/core/result.h"
@@ -39,10 +40,20 @@ struct Document {
 // Returns the document in the coding that the request prefers; 304 if the client already has it.
 Response Serve(const Document& document, const Request& request, std::string_view cache_control);
 
+struct DocumentText {
+  DocumentText() = default;
+  DocumentText(std::string text) : bytes(std::move(text)) {}  // NOLINT(google-explicit-constructor)
+
+  std::string bytes;
+  // Whether it stays the same. False: something could not be read. The document is then right but not as good as it can
+  // be; it is not cached, and clients ask for it again.
+  bool is_final = true;
+};
+
 struct DocumentPlan {
   // Called on any thread. Refers only to the catalog and to its own captures. Long writers check the stop token; the
   // result is discarded after a stop.
-  using Write = std::function<std::string(const std::stop_token&)>;
+  using Write = std::function<DocumentText(const std::stop_token&)>;
 
   std::string key;                 // equal only for equal documents of one catalog; contains no token
   std::string_view content_type;   // a literal
@@ -59,6 +70,7 @@ struct RenderedDocument {
   Body body;
   tiler::Coding coding = tiler::Coding::kIdentity;
   std::string etag;
+  bool is_final = true;  // as in DocumentText
 };
 inline std::size_t BytesOf(const RenderedDocument& made) { return made.body->size() + made.etag.size(); }
 

@@ -16,8 +16,12 @@
 namespace terrace::server {
 namespace {
 
-dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key) {
-  if (dataset.range_bound) return dataset.range_bound(key);
+// Sets `is_known` to false if the range of the tile cannot be read; the range of the dataset contains it.
+dem::HeightRange RangeOf(const DatasetView& dataset, const geo::TileKey& key, bool& is_known) {
+  if (dataset.range_bound) {
+    if (const Result<dem::HeightRange> range = dataset.range_bound(key)) return *range;
+    is_known = false;
+  }
   return {std::min(dataset.heights.min, dataset.floor_m), std::max(dataset.heights.max, dataset.floor_m)};
 }
 
@@ -32,30 +36,36 @@ std::string ContentQuery(const RequestedError& requested, std::string_view query
   return content;
 }
 
-// `requested`: as TileQuery writes it into the templates.
-tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested) {
+// `requested`: as TileQuery writes it into the templates. `are_ranges_known`: set by TileTree::range, as RangeOf does;
+// must outlive the tree.
+tiler::TileTree TreeOf(const DatasetView& dataset, RequestedError requested, bool& are_ranges_known) {
   return {dataset.version(),
           dataset.attribution,
           dataset.available,
           dataset.bounds,
           dataset.error_scale.fraction,
           dataset.error_scale.max_source_level,
-          [&dataset](const geo::TileKey& key) { return RangeOf(dataset, key); },
+          [&](const geo::TileKey& key) { return RangeOf(dataset, key, are_ranges_known); },
           [&dataset, requested](int level) { return ErrorStep(requested, level, dataset.error_scale); }};
 }
 
-std::string WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots,
-                         RequestedError requested, const std::string& content_query, const std::string& subtree_query) {
+DocumentText WriteTileset(const DatasetView& dataset, const std::vector<proto::TreeRoot>& roots,
+                          RequestedError requested, const std::string& content_query,
+                          const std::string& subtree_query) {
   requested.at_least = requested.error_m.has_value();
-  return tiler::TilesetJson(TreeOf(dataset, requested), roots, content_query, subtree_query);
+  DocumentText tileset;
+  tileset.bytes = tiler::TilesetJson(TreeOf(dataset, requested, tileset.is_final), roots, content_query, subtree_query);
+  return tileset;
 }
 
 }  // namespace
 
 void AddTileset(const DatasetView& dataset, HandlerState::DatasetDocuments& made) {
   if (!CheckHasFormat(dataset, tiler::TileFormat::kGlb)) return;
-  made.roots = std::make_shared<const std::vector<proto::TreeRoot>>(tiler::TreesOf(TreeOf(dataset, {})));
-  made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", ""), "application/json");
+  bool are_ranges_known = true;  // not used: roots have no ranges
+  made.roots =
+      std::make_shared<const std::vector<proto::TreeRoot>>(tiler::TreesOf(TreeOf(dataset, {}, are_ranges_known)));
+  made.tileset = Document::Make(WriteTileset(dataset, *made.roots, {}, "", "").bytes, "application/json");
 }
 
 DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& context) {
@@ -106,7 +116,9 @@ DocumentAnswer DescribeSubtree(const HandlerState& state, const RequestContext& 
   plan.cache_control = CacheControlOf(context.route.query, dataset, state.cache_control);
   plan.write = [&dataset, requested, top = context.route.key,
                 levels = context.route.subtree_levels](const std::stop_token& stop) {
-    return tiler::SubtreeOf(TreeOf(dataset, requested), top, levels, stop);
+    DocumentText subtree;
+    subtree.bytes = tiler::SubtreeOf(TreeOf(dataset, requested, subtree.is_final), top, levels, stop);
+    return subtree;
   };
   return plan;
 }

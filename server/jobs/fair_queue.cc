@@ -17,7 +17,7 @@ constexpr unsigned kMeanSamples = 32;
 // The limit of clients without jobs whose use is remembered. If there are more, all of them are forgotten.
 constexpr std::size_t kMaxIdle = 4096;
 
-JobClock::time_point KeyOf(const JobOrder& order, JobClock::time_point now) { return now + order.level * kAgeOfLevel; }
+JobClock::time_point KeyOf(const JobTerms& terms, JobClock::time_point now) { return now + terms.level * kAgeOfLevel; }
 
 }  // namespace
 
@@ -30,12 +30,12 @@ double FairQueue::Client::UsedAt(JobClock::time_point now) const {
 }
 
 void FairQueue::Push(PoolJobPtr job, JobClock::time_point now) {
-  Client& client = clients_[job->order.client];
+  Client& client = clients_[job->terms.client];
   const bool was_active = client.active();
   const Length length = LengthOf(*job);
-  job->key = KeyOf(job->order, now);
+  job->key = KeyOf(job->terms, now);
   job->number = next_number_++;
-  job->expected_s = MeanOf(job->order).seconds;
+  job->expected_s = MeanOf(job->terms).seconds;
   // Allocations come first, because they may fail; Take must not fail.
   client.started.reserve(threads_);
   client.waiting[length].emplace(job->key, job);
@@ -79,28 +79,28 @@ PoolJobPtr FairQueue::Take(JobClock::time_point now, bool all) {
   best->last_turn = next_turn_++;
   job->state = PoolJob::State::kRunning;
   job->started = now;
-  if (job->order.is_long) ++long_running_;
+  if (job->terms.is_long) ++long_running_;
   return job;
 }
 
 void FairQueue::Finish(const PoolJobPtr& job, JobClock::time_point now) {
   const double seconds = std::max(Seconds(now - job->started).count(), 0.0);
-  Mean& mean = means_[job->order.kind % kKinds];
+  Mean& mean = means_[job->terms.kind % kKinds];
   mean.samples = std::min(mean.samples + 1, kMeanSamples);
   mean.seconds += (seconds - mean.seconds) / mean.samples;
-  const auto client = clients_.find(job->order.client);
+  const auto client = clients_.find(job->terms.client);
   client->second.used_s += seconds;
   now_s_ += seconds / static_cast<double>(active_);
   std::vector<JobClock::time_point>& started = client->second.started;
   started.erase(std::ranges::find(started, job->started));
-  if (job->order.is_long) --long_running_;
+  if (job->terms.is_long) --long_running_;
   job->state = PoolJob::State::kDone;
   if (!client->second.active()) Leave(client);
 }
 
 bool FairQueue::Remove(const PoolJobPtr& job) {
   if (job->state != PoolJob::State::kWaiting) return false;
-  const auto client = clients_.find(job->order.client);
+  const auto client = clients_.find(job->terms.client);
   Erase(client->second, job);
   job->state = PoolJob::State::kDone;
   if (!client->second.active()) Leave(client);
@@ -124,18 +124,18 @@ PoolJobPtr FairQueue::RemoveNewestOfLargest() {
   return newest;
 }
 
-Seconds FairQueue::ExpectedWait(const JobOrder& order, JobClock::time_point now) const {
-  const Length length = order.is_long ? kLong : kShort;
+Seconds FairQueue::ExpectedWait(const JobTerms& terms, JobClock::time_point now) const {
+  const Length length = terms.is_long ? kLong : kShort;
   double own = 0;
-  if (const auto client = clients_.find(order.client); client != clients_.end()) {
+  if (const auto client = clients_.find(terms.client); client != clients_.end()) {
     const Waiting& waiting = client->second.waiting[length];
-    const auto end = waiting.upper_bound(KeyOf(order, now));
+    const auto end = waiting.upper_bound(KeyOf(terms, now));
     for (auto job = waiting.begin(); job != end; ++job) own += job->second->expected_s;
   }
   double ahead = own;
-  const double until_its_turn = own + MeanOf(order).seconds;
+  const double until_its_turn = own + MeanOf(terms).seconds;
   for (const auto& [number, client] : clients_) {
-    if (number != order.client) ahead += std::min(client.expected_s[length], until_its_turn);
+    if (number != terms.client) ahead += std::min(client.expected_s[length], until_its_turn);
   }
   return Seconds(ahead / (length == kLong ? max_long_ : threads_));
 }

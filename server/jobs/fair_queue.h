@@ -22,7 +22,8 @@ namespace terrace::server {
 
 using JobClock = std::chrono::steady_clock;
 
-struct JobOrder {
+// What decides when one job runs.
+struct JobTerms {
   std::uint64_t client = 0;
   int level = 0;         // a client's job of a lower level runs first, even if it arrives shortly after: shallow tiles
                          // cover the area of deep tiles. Deep tiles are not delayed indefinitely
@@ -36,7 +37,7 @@ struct JobOrder {
 struct PoolJob {
   std::function<void()> run;
   std::function<void()> on_dropped;  // called instead of `run` if the job is removed for others; may be empty
-  JobOrder order;
+  JobTerms terms;
 
  private:
   friend class FairQueue;
@@ -75,7 +76,7 @@ class FairQueue {
   // the new job) / the number of threads that may run it, where own is the time of its client's waiting jobs before it.
   // Only jobs of the same length (is_long) count, each with the mean time of its kind. Running jobs, and kinds that
   // have never run, are not counted.
-  std::chrono::duration<double> ExpectedWait(const JobOrder& order, JobClock::time_point now) const;
+  std::chrono::duration<double> ExpectedWait(const JobTerms& terms, JobClock::time_point now) const;
 
   std::size_t size() const { return size_; }
 
@@ -100,8 +101,8 @@ class FairQueue {
 
   static constexpr std::size_t kKinds = 1024;  // kinds with equal remainders share a mean
 
-  const Mean& MeanOf(const JobOrder& order) const { return means_[order.kind % kKinds]; }
-  static Length LengthOf(const PoolJob& job) { return job.order.is_long ? kLong : kShort; }
+  const Mean& MeanOf(const JobTerms& terms) const { return means_[terms.kind % kKinds]; }
+  static Length LengthOf(const PoolJob& job) { return job.terms.is_long ? kLong : kShort; }
   bool MayRunLong(bool all) const { return all || long_running_ < max_long_; }
   PoolJobPtr* FirstOf(Client& client, bool all) const;
   void Erase(Client& client, const PoolJobPtr& job);

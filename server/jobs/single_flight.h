@@ -51,11 +51,11 @@ class SingleFlight {
   SingleFlight(const SingleFlight&) = delete;
   SingleFlight& operator=(const SingleFlight&) = delete;
 
-  // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `order`. `name` is
+  // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `terms`. `name` is
   // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the
-  // flight's job. kCancelled: the order's deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
+  // flight's job. kCancelled: the deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
   // pool is cancelled. Otherwise the result of `build`.
-  asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobOrder order);
+  asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobTerms terms);
 
   std::size_t in_flight() const {
     const std::lock_guard lock(mutex_);
@@ -68,7 +68,7 @@ class SingleFlight {
   class WaitGuard;
   using FlightPtr = std::shared_ptr<Flight>;
 
-  void Launch(const FlightPtr& flight, Build build, JobOrder order);
+  void Launch(const FlightPtr& flight, Build build, JobTerms terms);
   void RunFlight(const FlightPtr& flight, const Build& build);
   void Fail(const FlightPtr& flight, const PoolJob* job, Error error);
   void Complete(const FlightPtr& flight, Result<Value> outcome);
@@ -124,9 +124,9 @@ class SingleFlight<Key, Value, Hash>::WaitGuard {
 
 template <typename Key, typename Value, typename Hash>
 asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFlight<Key, Value, Hash>::Join(
-    Key key, std::string name, Build build, JobOrder order) {
+    Key key, std::string name, Build build, JobTerms terms) {
   const auto executor = co_await asio::this_coro::executor;
-  const auto waiter = std::make_shared<asio::steady_timer>(executor, order.deadline);
+  const auto waiter = std::make_shared<asio::steady_timer>(executor, terms.deadline);
   std::unique_lock lock(mutex_);
   if (pool_.cancelled().stop_requested()) {
     co_return FlightResult(MakeError(ErrorCode::kUnavailable, "the server is shutting down"), false);
@@ -138,12 +138,12 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
   if (!joined) flights_.emplace(key, flight);
   const bool has_job = flight->begun || std::ranges::any_of(flight->jobs, [&](const auto& job) {
                          const PoolJobPtr waiting = job.lock();
-                         return waiting && waiting->order.client == order.client;
+                         return waiting && waiting->terms.client == terms.client;
                        });
   lock.unlock();
   const WaitGuard guard(*this, flight, waiter);
   if (joined) joined_total_.fetch_add(1, std::memory_order_relaxed);
-  if (!has_job) Launch(flight, std::move(build), order);
+  if (!has_job) Launch(flight, std::move(build), terms);
 
   boost::system::error_code ignored;  // finished, expired or cancelled; the outcome shows which
   co_await waiter->async_wait(asio::redirect_error(asio::use_awaitable, ignored));
@@ -159,12 +159,12 @@ asio::awaitable<typename SingleFlight<Key, Value, Hash>::FlightResult> SingleFli
 
 // mutex_ is not held: the pool may displace another flight's job.
 template <typename Key, typename Value, typename Hash>
-void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, Build build, JobOrder order) {
+void SingleFlight<Key, Value, Hash>::Launch(const FlightPtr& flight, Build build, JobTerms terms) {
   PoolJobPtr job;
   Result<void> submitted;
   try {
     job = std::make_shared<PoolJob>();
-    job->order = order;
+    job->terms = terms;
     job->run = [this, flight, build = std::move(build)] { RunFlight(flight, build); };
     job->on_dropped = [this, flight, self = job.get()] { Fail(flight, self, DroppedJobError(flight->name)); };
     {

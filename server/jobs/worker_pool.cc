@@ -57,7 +57,7 @@ Result<void> WorkerPool::Submit(PoolJobPtr job) {
     if (cancel_.stop_requested()) return MakeError(ErrorCode::kUnavailable, "the server is shutting down");
     const JobClock::time_point now = now_();
     // Compared in seconds, because a deadline may be time_point::max().
-    if (queue_.ExpectedWait(job->order, now) > std::chrono::duration<double>(job->order.deadline - now)) {
+    if (queue_.ExpectedWait(job->terms, now) > std::chrono::duration<double>(job->terms.deadline - now)) {
       return MakeError(ErrorCode::kOverloaded, "too many jobs are waiting: this job cannot start before its deadline");
     }
     queue_.Push(job, now);

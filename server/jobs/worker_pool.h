@@ -69,9 +69,9 @@ class WorkerPool {
   WorkerPool& operator=(const WorkerPool&) = delete;
 
   // Runs `work` on a worker for one caller, who waits for its result. Errors: those of `work` and Submit; kCancelled:
-  // the order's deadline passed, or the awaiting coroutine was cancelled. The coroutine must run on a single thread.
+  // the deadline passed, or the awaiting coroutine was cancelled. The coroutine must run on a single thread.
   template <typename T>
-  asio::awaitable<Result<T>> Run(Work<T> work, JobOrder order);
+  asio::awaitable<Result<T>> Run(Work<T> work, JobTerms terms);
 
   // On an error the job does not run. kOverloaded: it cannot start before its deadline, or the queue is full.
   // kUnavailable: the pool accepts no more jobs. May call another job's `on_dropped`.
@@ -166,12 +166,12 @@ class WorkerPool::WaitGuard {
 };
 
 template <typename T>
-asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobOrder order) {
+asio::awaitable<Result<T>> WorkerPool::Run(Work<T> work, JobTerms terms) {
   const auto executor = co_await asio::this_coro::executor;
-  const auto waiter = std::make_shared<asio::steady_timer>(executor, order.deadline);
+  const auto waiter = std::make_shared<asio::steady_timer>(executor, terms.deadline);
   const auto state = std::make_shared<RunState<T>>(std::move(work), cancelled(), waiter);
   const auto job = std::make_shared<PoolJob>();
-  job->order = order;
+  job->terms = terms;
   job->run = [state] { state->Finish(RunWork(RunState<T>::kName, state->work, state->stop.get_token())); };
   job->on_dropped = [state] { state->Finish(tl::unexpected(DroppedJobError(RunState<T>::kName))); };
   const WaitGuard<T> guard(*this, state, job);

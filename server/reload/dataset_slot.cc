@@ -57,7 +57,7 @@ std::vector<std::string> NamedFiles(const config::DatasetConfig& dataset) {
 
 // For messages.
 const std::string& PlaceOf(const config::DatasetConfig& dataset) {
-  return dataset.sources.empty() ? dataset.baked : dataset.sources.front().written;
+  return dataset.sources.empty() ? dataset.baked : dataset.sources.front().path;
 }
 
 std::vector<std::optional<dem::FileStamp>> StampsOf(const std::vector<std::string>& files) {

@@ -38,9 +38,9 @@ struct DatasetView {
   dem::GeoBounds bounds;
   dem::HeightRange heights;  // of the data
   double floor_m = 0;        // height where there is no data
-  // ElevationModel::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Empty: the
-  // range above holds for all tiles.
-  std::function<dem::HeightRange(const geo::TileKey&)> range_bound = {};
+  // ElevationModel::RangeBound: a range that contains all samples of a tile. Reads no raster; thread-safe. Errors:
+  // those of BakedTiles::RangeBound. Empty: the range above holds for all tiles.
+  std::function<Result<dem::HeightRange>(const geo::TileKey&)> range_bound = {};
   bool has_datum = true;                         // the vertical datum of its heights is known
   std::size_t sources = 1;                       // rasters that the heights come from
   bool has_water = false;                        // tiles have a water mask

@@ -16,7 +16,7 @@ using Clock = TileService::Clock;
 
 constexpr int kAfterTiles = 40;  // deeper than any
 
-// Kinds of jobs (JobOrder): tiles of a dataset and level, and work for one request.
+// Kinds of jobs (JobTerms): tiles of a dataset and level, and work for one request.
 std::uint64_t KindOfTile(const tiler::CacheKey& key) {
   return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
 }
@@ -68,12 +68,12 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
     if (is_built && observer_) observer_(catalog->datasets[request.dataset], tile);
     return tile;
   };
-  JobOrder order;
-  order.client = client;
-  order.level = request.key.level;
-  order.kind = KindOfTile(key);
-  order.deadline = deadline;
-  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), order);
+  JobTerms terms;
+  terms.client = client;
+  terms.level = request.key.level;
+  terms.kind = KindOfTile(key);
+  terms.deadline = deadline;
+  Flights::FlightResult flight = co_await flights_.Join(key, NameOf(request), std::move(find_or_build), terms);
   if (!flight.joined) misses_.fetch_add(1, std::memory_order_relaxed);
   if (!flight.value) {
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
@@ -83,14 +83,14 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
 
-JobOrder TileService::OrderOf(Length length, Clock::time_point deadline, std::uint64_t client) {
-  JobOrder order;
-  order.client = client;
-  order.is_long = length == Length::kLong;
-  order.level = order.is_long ? kAfterTiles : 0;
-  order.kind = order.is_long ? kLongKind : kShortKind;
-  order.deadline = deadline;
-  return order;
+JobTerms TileService::TermsOf(Length length, Clock::time_point deadline, std::uint64_t client) {
+  JobTerms terms;
+  terms.client = client;
+  terms.is_long = length == Length::kLong;
+  terms.level = terms.is_long ? kAfterTiles : 0;
+  terms.kind = terms.is_long ? kLongKind : kShortKind;
+  terms.deadline = deadline;
+  return terms;
 }
 
 void TileService::RetainTilesOf(const Catalog& catalog) {

@@ -56,7 +56,7 @@ class TileService {
 
   // For tiles that Find has not found: joins a flight, or starts one. Errors: those of TilePipeline::Build, and
   // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
-  // single thread. `client`: as in JobOrder. Precondition: the request names one of the datasets.
+  // single thread. `client`: as in JobTerms. Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request, Clock::time_point deadline,
                                             std::uint64_t client = 0);
 
@@ -65,7 +65,7 @@ class TileService {
   enum class Length { kShort, kLong };
   template <typename T>
   asio::awaitable<Result<T>> Run(Work<T> work, Length length, Clock::time_point deadline, std::uint64_t client = 0) {
-    return pool_.Run<T>(std::move(work), OrderOf(length, deadline, client));
+    return pool_.Run<T>(std::move(work), TermsOf(length, deadline, client));
   }
 
   // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. From
@@ -96,7 +96,7 @@ class TileService {
   Stats stats() const;
 
  private:
-  static JobOrder OrderOf(Length length, Clock::time_point deadline, std::uint64_t client);
+  static JobTerms TermsOf(Length length, Clock::time_point deadline, std::uint64_t client);
 
   const BuildObserver observer_;
   tiler::TileTiers tiers_;

@@ -45,7 +45,7 @@ TEST_F(ArchiveTest, TilesComeBackAsTheyWereAdded) {
     EXPECT_EQ((*found)->tile.vertices, wanted.vertices);
     EXPECT_EQ((*found)->tile.triangles, wanted.triangles);
     EXPECT_EQ((*found)->range.min, InventedRange(key).min);
-    EXPECT_EQ(archive->FindRange(key)->max, InventedRange(key).max);
+    EXPECT_EQ(archive->FindRange(key).value()->max, InventedRange(key).max);
   }
 }
 

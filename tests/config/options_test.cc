@@ -25,7 +25,7 @@ std::vector<ConfigError> Set(std::string_view key, const std::string& text, Conf
 }
 
 TEST(ServerOptions, TakeTheirDefaultsAsFlags) {
-  for (const OptionInfo& option : ServerOptions()) {
+  for (const OptionInfo& option : ServerOptionInfos()) {
     if (!option.has_flag || option.default_value.empty()) continue;
     std::string text = option.default_value;
     if (text.front() == '"') text = text.substr(1, text.size() - 2);
@@ -36,12 +36,12 @@ TEST(ServerOptions, TakeTheirDefaultsAsFlags) {
 }
 
 TEST(ServerOptions, NameEveryFlagAfterItsKey) {
-  for (const OptionInfo& option : ServerOptions()) {
+  for (const OptionInfo& option : ServerOptionInfos()) {
     EXPECT_EQ(option.Flag().find('_'), std::string::npos);
     EXPECT_EQ(option.has_flag, option.key != "datasets" && option.key != "tokens");
     EXPECT_FALSE(option.help.empty());
   }
-  EXPECT_EQ(ServerOptions().front().Flag(), "--listen");
+  EXPECT_EQ(ServerOptionInfos().front().Flag(), "--listen");
 }
 
 TEST(SetServerOption, TakesListsWithCommas) {

@@ -189,7 +189,7 @@ TEST(LoadConfig, TakesPathsRelativeToTheFile) {
   std::ofstream(folder / "terrace.json") << R"({"datasets": [{"name": "a", "sources": ["a.tif"]}], "viewer": "page"})";
   const ConfigResult config = LoadConfig(folder / "terrace.json");
   ASSERT_TRUE(config);
-  EXPECT_EQ(config->datasets.at(0).sources.at(0).written, (folder / "a.tif").string());
+  EXPECT_EQ(config->datasets.at(0).sources.at(0).path, (folder / "a.tif").string());
   EXPECT_EQ(config->viewer.directory, folder / "page");
   std::filesystem::remove_all(folder);
 }

@@ -55,7 +55,7 @@ TEST(Manual, NeedsOneMarkerForEveryTable) {
 
 // "Did you mean" never suggests another option for the name of an option.
 TEST(Options, HaveOtherWordsThatAreNoOptions) {
-  for (const auto& options : {ServerOptions(), DatasetOptions()}) {
+  for (const auto& options : {ServerOptionInfos(), DatasetOptionInfos()}) {
     for (const OptionInfo& option : options) {
       const std::string words = fmt::format(" {} ", option.other_words);
       EXPECT_EQ(words.find("  ") == std::string::npos, !option.other_words.empty()) << words;
@@ -76,8 +76,8 @@ void ExpectOneSentence(const std::vector<OptionInfo>& options) {
 }
 
 TEST(Help, IsOneSentenceForEveryOption) {
-  ExpectOneSentence(ServerOptions());
-  ExpectOneSentence(DatasetOptions());
+  ExpectOneSentence(ServerOptionInfos());
+  ExpectOneSentence(DatasetOptionInfos());
 }
 
 TEST(Parser, TellsTheCasesApart) {

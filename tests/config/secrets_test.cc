@@ -80,7 +80,7 @@ Json Valid() {
 TEST(ConfigSecrets, NoErrorTellsWhatStandsInAnyPlace) {
   const std::vector<std::string> places = Places();
   EXPECT_GE(places.size(), 80u);
-  for (const OptionInfo& option : ServerOptions()) {
+  for (const OptionInfo& option : ServerOptionInfos()) {
     EXPECT_TRUE(std::binary_search(places.begin(), places.end(), "/" + std::string(option.key))) << option.key;
   }
   int refused = 0;
@@ -137,11 +137,11 @@ TEST(ConfigSecrets, NoErrorTellsTheTextOfAFlag) {
        {kSecret, kSecret + ",\n" + kSecret, "[\"" + kSecret + "\", 1]", "{\"token\": \"" + kSecret + "\"}"}) {
     for (const std::string directory : {"/start", ""}) {
       std::vector<ConfigError> errors;
-      for (const OptionInfo& option : ServerOptions()) {
+      for (const OptionInfo& option : ServerOptionInfos()) {
         Config config;
         if (option.has_flag) SetServerOption(option.key, text, directory, config, errors);
       }
-      for (const OptionInfo& option : DatasetOptions()) {
+      for (const OptionInfo& option : DatasetOptionInfos()) {
         DatasetConfig dataset;
         if (option.has_flag) SetDatasetOption(option.key, text, directory, dataset, errors);
       }

@@ -97,8 +97,10 @@ TEST_F(DocumentsTest, SubtreesAreMadeOnWorkersAndKept) {
   tall.name = "tall";
   for (int level = 0; level <= 7; ++level) tall.available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
   std::atomic<int> asked = 0;
-  tall.range_bound = [&asked](const geo::TileKey&) {
+  std::atomic<bool> is_readable = false;
+  tall.range_bound = [&](const geo::TileKey&) -> Result<dem::HeightRange> {
     ++asked;
+    if (!is_readable) return MakeError(ErrorCode::kUnavailable, "cannot be read now");
     return dem::HeightRange{-100, 100};
   };
   more_datasets_ = {tall};
@@ -114,9 +116,13 @@ TEST_F(DocumentsTest, SubtreesAreMadeOnWorkersAndKept) {
   }
 
   Open(true);
+  EXPECT_EQ(Fetch(port(), target).Field("cache-control"), "no-cache");
+  is_readable = true;
+  asked = at_start;
   const Reply made = Fetch(port(), target);
   EXPECT_EQ(made.status, 200);
-  EXPECT_EQ(asked, at_start + 5461);
+  EXPECT_NE(made.Field("cache-control"), "no-cache");
+  EXPECT_EQ(asked, at_start + 5461) << "a reply without the ranges was kept";
   EXPECT_EQ(Fetch(port(), target + "?compression=none&v=3").body, made.body);
   EXPECT_EQ(asked, at_start + 5461) << "kept";
   EXPECT_NE(Fetch(port(), target + "?fraction=0.1").body, made.body) << "shorter skirts";

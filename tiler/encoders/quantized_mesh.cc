@@ -22,7 +22,7 @@ static_assert(dem::WaterRaster::kSide == proto::kWaterMaskSide);
 Result<proto::WaterMask> SeaMaskOf(const Dataset& dataset, const proto::TileSamples& samples,
                                    const std::stop_token& stop) {
   const double sea_level_m = *dataset.water.sea_level_m;
-  if (!dataset.model->converts()) return proto::Shortest(proto::SeaLevelMask(samples, sea_level_m));
+  if (!dataset.model->has_geoid()) return proto::Shortest(proto::SeaLevelMask(samples, sea_level_m));
   const Result<dem::TileHeights> in_source_datum = dataset.model->ReadInSourceDatum(samples.key, stop);
   if (!in_source_datum) return tl::unexpected(in_source_datum.error());
   return proto::Shortest(

@@ -46,8 +46,8 @@ class BakedTiles {
   // damaged or cannot be read; the message names it.
   virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
 
-  // ElevationModel::RangeBound of a baked tile; for other tiles the range of the dataset.
-  virtual dem::HeightRange RangeBound(const geo::TileKey& key) const = 0;
+  // ElevationModel::RangeBound of a baked tile; for other tiles the range of the dataset. Errors: those of Find.
+  virtual Result<dem::HeightRange> RangeBound(const geo::TileKey& key) const = 0;
 
   // Why Find finds nothing for a request: kNotFound.
   virtual Error WhyAbsent(const TileRequest& request) const = 0;

@@ -234,10 +234,10 @@ void AddBake(CLI::App& app, int& exit_code) {
   AddWhat(*command, *arguments);
   AddHow(*command, *arguments);
   AddPlanning(*command, *arguments);
-  std::vector<config::OptionInfo> about_dataset = config::DatasetOptions();
+  std::vector<config::OptionInfo> about_dataset = config::DatasetOptionInfos();
   std::erase_if(about_dataset, [](const auto& option) { return option.key == "baked" || option.key == "public"; });
   AddFlags(*command, about_dataset, "The dataset, as for terrace serve", arguments->dataset_flags);
-  std::vector<config::OptionInfo> about_cache = config::ServerOptions();
+  std::vector<config::OptionInfo> about_cache = config::ServerOptionInfos();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
   AddFlags(*command, about_cache, "Statistics of the rasters, as for terrace serve", arguments->cache_flags);
   AddStatus(*command, exit_code);

@@ -56,8 +56,8 @@ std::string NameOf(const config::DatasetConfig& dataset) {
 }
 
 std::string NameOf(const std::vector<config::SourceConfig>& sources) {
-  if (sources.size() == 1) return sources.front().written;
-  return fmt::format("{} and {} more source{}", sources.front().written, sources.size() - 1,
+  if (sources.size() == 1) return sources.front().path;
+  return fmt::format("{} and {} more source{}", sources.front().path, sources.size() - 1,
                      sources.size() == 2 ? "" : "s");
 }
 

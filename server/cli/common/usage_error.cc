@@ -28,7 +28,7 @@ std::string ExplainCommand(const CLI::App& program, const std::string& word) {
 // Names that other programs use for options of the configuration, by flag.
 std::map<std::string, std::string_view> OtherWords() {
   std::map<std::string, std::string_view> words;
-  for (const auto& options : {config::ServerOptions(), config::DatasetOptions()}) {
+  for (const auto& options : {config::ServerOptionInfos(), config::DatasetOptionInfos()}) {
     for (const config::OptionInfo& option : options) words.emplace(option.Flag(), option.other_words);
   }
   return words;
@@ -60,7 +60,7 @@ std::vector<std::string> NearestFlags(const CLI::App& command, const std::string
 
 // The configuration key that corresponds to this flag; empty: there is no such key.
 std::string_view KeyWithoutFlag(const std::string& flag) {
-  for (const auto& options : {config::ServerOptions(), config::DatasetOptions()}) {
+  for (const auto& options : {config::ServerOptionInfos(), config::DatasetOptionInfos()}) {
     for (const config::OptionInfo& option : options) {
       if (!option.has_flag && option.Flag() == flag) return option.key;
     }

@@ -292,7 +292,7 @@ void AddInfo(CLI::App& app, int& exit_code) {
                     "Describes all DEMs as one dataset; where they overlap, the first that has a height is used");
   command->add_option("--draw", arguments->draw, "Writes a picture of the edits: hill shade with the features")
       ->type_name("FILE.png");
-  std::vector<config::OptionInfo> about_heights = config::DatasetOptions();  // the others are about serving
+  std::vector<config::OptionInfo> about_heights = config::DatasetOptionInfos();  // the others are about serving
   about_heights.erase(std::remove_if(about_heights.begin(), about_heights.end(),
                                      [](const auto& option) {
                                        return option.key != "vertical" && option.key != "nodata" &&
@@ -300,7 +300,7 @@ void AddInfo(CLI::App& app, int& exit_code) {
                                      }),
                       about_heights.end());
   AddFlags(*command, about_heights, "Heights, as for terrace serve", arguments->dataset_flags);
-  std::vector<config::OptionInfo> about_cache = config::ServerOptions();
+  std::vector<config::OptionInfo> about_cache = config::ServerOptionInfos();
   std::erase_if(about_cache, [](const auto& option) { return !option.key.starts_with("cache_dir"); });
   AddFlags(*command, about_cache, "Statistics of the rasters, as for terrace serve", arguments->cache_flags);
   command->callback([arguments, &exit_code] { exit_code = FinishOutput(Info(*arguments)); });

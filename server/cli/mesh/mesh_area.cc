@@ -151,7 +151,7 @@ int MeshArea(const AreaMeshArguments& arguments) {
 
 void AddAreaOptions(CLI::App& command, AreaOptions& options) {
   constexpr const char* kGroup = "Meshes of an area, as /{dataset}/mesh of a server; need --max-error";
-  std::vector<config::OptionInfo> dataset_options = config::DatasetOptions();
+  std::vector<config::OptionInfo> dataset_options = config::DatasetOptionInfos();
   std::erase_if(dataset_options, [](const auto& option) { return option.key != "edits" && option.key != "vertical"; });
   AddFlags(command, dataset_options, kGroup, options.dataset);
   command.add_option("--bbox", options.box, "The area in degrees; by default all of the DEM")

@@ -150,8 +150,9 @@ void AddServe(CLI::App& app, int& exit_code) {
                     "Prints the configuration with all defaults and options as JSON, and ends");
   command->add_flag("--check-config", arguments->check_config,
                     "Checks whether the server could start, without opening rasters or listening, and ends");
-  AddFlags(*command, config::ServerOptions(), "Server", arguments->server_flags);
-  AddFlags(*command, config::DatasetOptions(), "Datasets of the DEMs on the command line", arguments->dataset_flags);
+  AddFlags(*command, config::ServerOptionInfos(), "Server", arguments->server_flags);
+  AddFlags(*command, config::DatasetOptionInfos(), "Datasets of the DEMs on the command line",
+           arguments->dataset_flags);
   command->callback([arguments, &exit_code] {
     std::error_code unnamed;
     arguments->directory = std::filesystem::current_path(unnamed);

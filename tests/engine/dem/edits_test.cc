@@ -417,6 +417,31 @@ TEST_F(TerrainEdits, CountFromTheGeoidOfTheSources) {
   EXPECT_GE(stated->info().heights.max, 500 + 40);
 }
 
+TEST_F(TerrainEdits, ShowOnMapsWhereTheySetTheHeightOfTheFloor) {
+  const std::string floor = std::to_string(OpenOrFail(slope_)->info().floor);
+  const auto source = Open(Rectangle(R"({"op":"flatten","height":)" + floor + "}", 9.9, 50.1, 10.05, 50.2));
+  ASSERT_NE(source, nullptr);
+  const geo::MercatorGrid grid{10};
+  const NodeWindow window{static_cast<std::int64_t>((9.8 + 180) / 360 * static_cast<double>(grid.columns())), 88'400,
+                          200, 600};
+  const auto known = source->ReadKnownMercator(10, window, HeightDatum::kEllipsoid);
+  ASSERT_TRUE(known);
+  int inside = 0, outside = 0;
+  for (std::size_t i = 0; i < known->size(); ++i) {
+    const double x = grid.Longitude(window.column + static_cast<std::int64_t>(i % 200));
+    const double y = grid.Latitude(window.row + static_cast<std::int64_t>(i / 200));
+    if (x > 9.901 && x < 9.999 && y > 50.101 && y < 50.199) {
+      ++inside;
+      ASSERT_EQ((*known)[i], static_cast<float>(source->info().floor)) << x << " " << y;
+    } else if (x < 9.899) {
+      ++outside;
+      ASSERT_TRUE(std::isnan((*known)[i])) << x << " " << y;
+    }
+  }
+  EXPECT_GT(inside, 1000);
+  EXPECT_GT(outside, 1000);
+}
+
 // Contours over an edit where the source has a void at its rim count from the same geoid as those beside it.
 TEST_F(TerrainEdits, CountFromTheGeoidOnMapsOverVoidsToo) {
   RasterSpec spec{.width = 400, .height = 400, .geo_transform = {10, 0.001, 0, 50.4, 0, -0.001}, .nodata = -9999};

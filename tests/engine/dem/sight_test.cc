@@ -409,6 +409,40 @@ TEST(Sight, DoesNotSeeTheGroundBelowThroughAVoidOfTheRim) {
   }
 }
 
+// Rasters of one grid with a gap of ten columns between them, as narrow as the voids that are filled in a raster.
+TEST(Sight, SeesTheRasterBelowInANarrowGapBetweenRasters) {
+  const TempDir dir;
+  constexpr double kStep = 0.001;
+  std::vector<DemFile> files;
+  const auto add = [&](const char* name, int column, int width, int height) {
+    RasterSpec spec{.width = width, .height = height, .geo_transform = {10 + column * kStep, kStep, 0, 46, 0, -kStep}};
+    spec.value = [](int, int) { return 1000.0; };
+    files.push_back({WriteRaster(dir, spec, name)});
+  };
+  add("west.tif", 0, 40, 60);
+  add("east.tif", 50, 40, 60);
+  add("between.tif", 40, 10, 20);
+  RasterSpec below{.width = 60, .height = 60, .geo_transform = {9.99, .002, 0, 46.01, 0, -.002}};
+  below.value = [](int, int) { return 10.0; };
+  files.push_back({WriteRaster(dir, below, "below.tif")});
+  const auto source = OpenOrFail(files);
+  ASSERT_TRUE(source);
+  const double y = 46 - 45 * kStep;
+  const std::vector<GeoPosition> places = {{10 + 39.9 * kStep, y}, {10 + 40.1 * kStep, y}, {10 + 49.9 * kStep, y}};
+  const auto heights = source->ReadPoints(places);
+  ASSERT_TRUE(heights);
+  EXPECT_EQ(*heights, (std::vector<float>{1000, 10, 10}));
+  const std::vector<SightRay> rays = {{{10 + 41 * kStep, y, 500}, {10 + 49 * kStep, y, 500}},
+                                      {{10 + 41 * kStep, y, 500}, {10 + 51 * kStep, y, 500}}};
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  EXPECT_TRUE((*answers)[0].is_visible);
+  EXPECT_NEAR((*answers)[0].clearance_m, 490, 1);
+  EXPECT_FALSE((*answers)[0].has_gaps);
+  EXPECT_FALSE((*answers)[1].is_visible);
+  EXPECT_NEAR(*(*answers)[1].blocked_at, 0.9, 0.01);
+}
+
 // The lowest place is the end of the ray, where it meets the ground.
 TEST(Sight, TellsTheEndOfARayAsItsLowestPlace) {
   const TempDir dir;

@@ -114,7 +114,7 @@ TEST(VerticalDatum, EllipsoidalReferenceSystemsPass) {
   const auto source = OpenOrFail(WriteRaster(dir, Hills("EPSG:4979")));
   ASSERT_NE(source, nullptr);
   EXPECT_TRUE(source->has_datum());
-  EXPECT_FALSE(source->converts());
+  EXPECT_FALSE(source->has_geoid());
   EXPECT_EQ(source->info().sources.front().datum_in_use, "ellipsoid");
 }
 

@@ -64,7 +64,7 @@ TEST(StoppedJobs, DocumentsAreNotCompressed) {
 TEST(StoppedJobs, SubtreesReadNoFurtherRanges) {
   std::vector<std::vector<geo::TileRange>> available;
   for (int level = 0; level <= 7; ++level) available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
-  tiler::TileTree tree{.available = available, .bounds = {-180, -90, 180, 90}};
+  tiler::TileTree tree{"", "", available, {-180, -90, 180, 90}, 0.5, 0, {}, {}};
   std::stop_source source;
   int asked = 0;
   tree.range = [&](const geo::TileKey&) {

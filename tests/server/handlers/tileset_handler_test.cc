@@ -184,6 +184,29 @@ TEST_F(TilesetHandlerTest, SubtreesTellTheHeightsOfEachTileAtTheErrorAskedFor) {
   }
 }
 
+// As from an archive whose file cannot be read for a moment.
+TEST_F(TilesetHandlerTest, SubtreesWithoutTheRangeOfATileHaveThatOfTheDatasetAndAreAskedForAgain) {
+  const std::string target = "/maui/3dtiles/7-16-32/0/0/0.6.subtree?v=" + datasets_[0].version();
+  datasets_[0].heights = {-50, 70};
+  bool is_readable = false;
+  datasets_[0].range_bound = [&](const geo::TileKey& key) -> Result<dem::HeightRange> {
+    if (key.level == 12 && !is_readable) return MakeError(ErrorCode::kUnavailable, "cannot be read now");
+    return dem::HeightRange{0, 1};
+  };
+  state_.emplace(datasets_);
+  const Response loose = Get(target);
+  EXPECT_EQ(loose.cache_control, "no-cache");
+  is_readable = true;
+  const Response tight = Get(target);
+  EXPECT_NE(tight.cache_control, "no-cache");
+  const auto height_of = [](const Response& response) {
+    const Result<proto::ReadSubtree> read = proto::ParseSubtree(*response.body, 6);
+    return read ? read->max_heights[341] : -1;
+  };
+  EXPECT_GE(height_of(loose), 70);
+  EXPECT_LE(height_of(tight), 10);
+}
+
 TEST_F(TilesetHandlerTest, SubtreesHoldExactlyTheTilesOfTheDataset) {
   for (const char* const root : {"7-16-32", "7-17-32"}) {
     const Response response = Get(std::string("/maui/3dtiles/") + root + "/0/0/0.6.subtree");

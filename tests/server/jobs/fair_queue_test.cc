@@ -16,10 +16,10 @@ class FairQueueTest : public testing::Test {
  protected:
   PoolJobPtr Push(FairQueue& queue, std::uint64_t client, int level = 0, bool is_long = false, std::uint64_t kind = 0) {
     auto job = std::make_shared<PoolJob>();
-    job->order.client = client;
-    job->order.level = level;
-    job->order.is_long = is_long;
-    job->order.kind = kind;
+    job->terms.client = client;
+    job->terms.level = level;
+    job->terms.is_long = is_long;
+    job->terms.kind = kind;
     queue.Push(job, now_);
     return job;
   }
@@ -29,7 +29,7 @@ class FairQueueTest : public testing::Test {
     if (!job) return 0;
     now_ += time;
     queue.Finish(job, now_);
-    return job->order.client;
+    return job->terms.client;
   }
 
   JobClock::time_point now_{1h};
@@ -42,7 +42,7 @@ TEST_F(FairQueueTest, ClientsTakeTurnsAndShallowTilesGoFirst) {
   Push(queue, 3, 20);
   std::vector<std::string> order;
   while (const PoolJobPtr job = queue.Take(now_)) {
-    order.push_back(std::to_string(job->order.client) + ":" + std::to_string(job->order.level));
+    order.push_back(std::to_string(job->terms.client) + ":" + std::to_string(job->terms.level));
     now_ += 10ms;
     queue.Finish(job, now_);
   }
@@ -54,7 +54,7 @@ TEST_F(FairQueueTest, ADeepTileThatHasWaitedGoesBeforeShallowOnesThatCome) {
   Push(queue, 1, 2);
   now_ += 250ms;
   Push(queue, 1, 0);
-  EXPECT_EQ(queue.Take(now_)->order.level, 2);
+  EXPECT_EQ(queue.Take(now_)->terms.level, 2);
 }
 
 TEST_F(FairQueueTest, WhoAsksOnceIsNextHoweverManyJobsAnotherHas) {
@@ -64,7 +64,7 @@ TEST_F(FairQueueTest, WhoAsksOnceIsNextHoweverManyJobsAnotherHas) {
   now_ += 50ms;
   Push(queue, 2, 30);
   queue.Finish(first, now_);
-  EXPECT_EQ(queue.Take(now_)->order.client, 2u);
+  EXPECT_EQ(queue.Take(now_)->terms.client, 2u);
 }
 
 TEST_F(FairQueueTest, TimeCountsAndNotTheNumberOfJobs) {
@@ -77,9 +77,9 @@ TEST_F(FairQueueTest, TimeCountsAndNotTheNumberOfJobs) {
   for (int i = 0; i < 500; ++i) {
     const auto before = now_;
     const PoolJobPtr job = queue.Take(now_);
-    now_ += job->order.client == 1 ? 100ms : 10ms;
+    now_ += job->terms.client == 1 ? 100ms : 10ms;
     queue.Finish(job, now_);
-    used[job->order.client] += std::chrono::duration_cast<std::chrono::milliseconds>(now_ - before);
+    used[job->terms.client] += std::chrono::duration_cast<std::chrono::milliseconds>(now_ - before);
   }
   EXPECT_LE(used[1] - used[2], 100ms);
   EXPECT_LE(used[2] - used[1], 100ms);
@@ -118,7 +118,7 @@ TEST_F(FairQueueTest, WhatRunsCountsBeforeItEnds) {
   Push(queue, 2, 0, /*is_long=*/true);
   const PoolJobPtr first = queue.Take(now_);
   now_ += 5s;
-  EXPECT_EQ(queue.Take(now_)->order.client, first->order.client == 1 ? 2u : 1u);
+  EXPECT_EQ(queue.Take(now_)->terms.client, first->terms.client == 1 ? 2u : 1u);
 }
 
 TEST_F(FairQueueTest, LongJobsLeaveAThreadAndWaitForOneAnother) {
@@ -133,7 +133,7 @@ TEST_F(FairQueueTest, LongJobsLeaveAThreadAndWaitForOneAnother) {
   Push(queue, 2, 40, /*is_long=*/true);
   now_ += 10s;
   queue.Finish(first, now_);
-  EXPECT_EQ(queue.Take(now_)->order.client, 2u) << "the next long one is of who has used less";
+  EXPECT_EQ(queue.Take(now_)->terms.client, 2u) << "the next long one is of who has used less";
   EXPECT_TRUE(queue.HasNext(/*all=*/true));
 }
 
@@ -168,7 +168,7 @@ TEST_F(FairQueueTest, TheNewestOfTheLargestMakesRoom) {
 
 TEST_F(FairQueueTest, ExpectsToWaitForItsShareOfWhatIsAhead) {
   FairQueue queue(2);
-  JobOrder greedy, polite, other;
+  JobTerms greedy, polite, other;
   greedy.client = 1;
   polite.client = 2;
   other.client = 1;

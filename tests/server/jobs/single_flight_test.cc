@@ -26,12 +26,12 @@ using Flights = SingleFlight<std::size_t, Value>;
 
 Value SomeValue() { return std::make_shared<const int>(7); }
 
-JobOrder Until(JobClock::time_point deadline, std::uint64_t client = 0, int level = 0) {
-  JobOrder order;
-  order.client = client;
-  order.level = level;
-  order.deadline = deadline;
-  return order;
+JobTerms Until(JobClock::time_point deadline, std::uint64_t client = 0, int level = 0) {
+  JobTerms terms;
+  terms.client = client;
+  terms.level = level;
+  terms.deadline = deadline;
+  return terms;
 }
 
 // Waits until `stop` is requested, for at most ten seconds.
@@ -53,19 +53,19 @@ class SingleFlightTest : public testing::Test {
     asio::co_spawn(io_, flights_.Join(0, "it", std::move(build), Until(deadline)),
                    asio::bind_cancellation_slot(slot, keep));
   }
-  void JoinAs(std::size_t key, JobOrder order, Flights::Build build,
+  void JoinAs(std::size_t key, JobTerms terms, Flights::Build build,
               asio::cancellation_slot slot = asio::cancellation_slot()) {
     auto keep = [this](std::exception_ptr, Flights::FlightResult flight) {
       flights_done_.push_back(std::move(flight));
     };
-    asio::co_spawn(io_, flights_.Join(key, "it", std::move(build), order), asio::bind_cancellation_slot(slot, keep));
+    asio::co_spawn(io_, flights_.Join(key, "it", std::move(build), terms), asio::bind_cancellation_slot(slot, keep));
   }
   // Blocks the workers with jobs of the first client.
   void HoldWorkers(const std::shared_future<void>& open) {
     std::latch begun(pool_.threads());
     for (unsigned i = 0; i < pool_.threads(); ++i) {
       auto job = std::make_shared<PoolJob>();
-      job->order.client = 1;
+      job->terms.client = 1;
       job->run = [&begun, open] {
         begun.count_down();
         open.wait();

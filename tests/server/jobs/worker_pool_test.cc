@@ -25,10 +25,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-PoolJobPtr JobOf(std::function<void()> run, JobOrder order = {}) {
+PoolJobPtr JobOf(std::function<void()> run, JobTerms terms = {}) {
   auto job = std::make_shared<PoolJob>();
   job->run = std::move(run);
-  job->order = order;
+  job->terms = terms;
   return job;
 }
 
@@ -104,7 +104,7 @@ TEST(WorkerPool, RefusesOnlyWhatCannotBeginInTime) {
     is_open.wait();
   })));
   begun.get_future().wait();
-  JobOrder patient{1}, hasty{1};
+  JobTerms patient{1}, hasty{1};
   patient.deadline = now() + 25s;
   int taken = 0;
   while (taken < 100 && busy.pool.Submit(JobOf([] {}, patient))) ++taken;
@@ -145,11 +145,11 @@ TEST(WorkerPool, RunsWhatItTookAndTakesNothingAfterShutdown) {
 template <typename T>
 std::future<Result<T>> RunAside(WorkerPool& pool, Work<T> work, std::chrono::milliseconds time = 10s,
                                 asio::cancellation_slot leave = {}) {
-  JobOrder order;
-  order.deadline = JobClock::now() + time;
+  JobTerms terms;
+  terms.deadline = JobClock::now() + time;
   const auto io = std::make_shared<asio::io_context>(1);
   auto ran =
-      asio::co_spawn(*io, pool.Run<T>(std::move(work), order), asio::bind_cancellation_slot(leave, asio::use_future));
+      asio::co_spawn(*io, pool.Run<T>(std::move(work), terms), asio::bind_cancellation_slot(leave, asio::use_future));
   std::thread([io] { io->run(); }).detach();
   return ran;
 }
@@ -193,8 +193,8 @@ TEST(WorkerPool, RunWithdrawsAndStopsForWhoLeaves) {
   std::promise<void> begun;
   asio::io_context io(1);
   asio::cancellation_signal leave, leave_second;
-  JobOrder order;
-  order.deadline = JobClock::now() + 10s;
+  JobTerms terms;
+  terms.deadline = JobClock::now() + 10s;
   int ended = 0, ran = 0;
   const auto end = [&](std::exception_ptr, const auto&) { ++ended; };
   const Work<bool> first = [&, wait = UntilStopped(stopped)](std::stop_token stop) {
@@ -202,10 +202,10 @@ TEST(WorkerPool, RunWithdrawsAndStopsForWhoLeaves) {
     return wait(std::move(stop));
   };
   const Work<int> second = [&](std::stop_token) -> Result<int> { return ++ran; };
-  asio::co_spawn(io, pool.Run<bool>(first, order), asio::bind_cancellation_slot(leave.slot(), end));
+  asio::co_spawn(io, pool.Run<bool>(first, terms), asio::bind_cancellation_slot(leave.slot(), end));
   io.poll();
   begun.get_future().wait();
-  asio::co_spawn(io, pool.Run<int>(second, order), asio::bind_cancellation_slot(leave_second.slot(), end));
+  asio::co_spawn(io, pool.Run<int>(second, terms), asio::bind_cancellation_slot(leave_second.slot(), end));
   io.restart();
   io.poll();
   EXPECT_EQ(pool.queued(), 1u);
@@ -246,11 +246,11 @@ TEST(WorkerPool, RunTellsWhomTheQueueDisplaces) {
   const Work<int> nothing = [](std::stop_token) -> Result<int> { return 1; };
   asio::io_context io(1);
   std::vector<Result<int>> ends;
-  JobOrder order;
-  order.deadline = JobClock::now() + 10s;
+  JobTerms terms;
+  terms.deadline = JobClock::now() + 10s;
   for (const std::uint64_t client : {7, 7, 8}) {
-    order.client = client;
-    asio::co_spawn(io, busy.pool.Run<int>(nothing, order),
+    terms.client = client;
+    asio::co_spawn(io, busy.pool.Run<int>(nothing, terms),
                    [&](std::exception_ptr, Result<int> end) { ends.push_back(std::move(end)); });
     io.poll();
     io.restart();

@@ -19,7 +19,7 @@ class FakeBaked final : public tiler::BakedTiles {
     tile.bytes = "baked";
     return tile;
   }
-  dem::HeightRange RangeBound(const geo::TileKey&) const override { return {}; }
+  Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange(); }
   Error WhyAbsent(const tiler::TileRequest&) const override { return {}; }
 
  private:

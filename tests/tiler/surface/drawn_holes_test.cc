@@ -121,7 +121,7 @@ class UnreadableArchive final : public BakedTiles {
   Result<std::optional<EncodedTile>> Find(const TileRequest&) const override {
     return MakeError(ErrorCode::kUnavailable, "unreadable");
   }
-  dem::HeightRange RangeBound(const geo::TileKey&) const override { return {}; }
+  Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange(); }
   Error WhyAbsent(const TileRequest&) const override { return {}; }
 
  private:
