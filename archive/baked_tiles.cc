@@ -23,7 +23,7 @@ using tiler::TileRequest;
 proto::TileExtensions ExtensionsIn(const Manifest& manifest, const geo::TileKey& key) {
   const BakedDataset& dataset = manifest.dataset;
   proto::TileExtensions extensions = manifest.kind.extensions;
-  extensions.metadata = extensions.metadata && proto::CarriesMetadata(key, dataset.metadata_levels,
+  extensions.metadata = extensions.metadata && proto::CarriesMetadata(key, dataset.metadata_availability,
                                                                       dataset.max_source_level, manifest.available);
   return extensions;
 }
@@ -148,7 +148,7 @@ class Baked final : public tiler::BakedTiles {
     }
     extent_.normals = manifest.kind.extensions.normals;
     extent_.water_mask = manifest.kind.extensions.water_mask;
-    if (manifest.kind.extensions.metadata) extent_.metadata_levels = dataset.metadata_levels;
+    if (manifest.kind.extensions.metadata) extent_.metadata_availability = dataset.metadata_availability;
   }
 
   const std::vector<std::shared_ptr<const Archive>> archives_;

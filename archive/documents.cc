@@ -30,7 +30,7 @@ std::string LayerJson(const Manifest& manifest) {
   layer.bounds = dataset.bounds;
   layer.normals = manifest.kind.extensions.normals;
   layer.water_mask = manifest.kind.extensions.water_mask;
-  if (manifest.kind.extensions.metadata) layer.metadata_levels = dataset.metadata_levels;
+  if (manifest.kind.extensions.metadata) layer.metadata_availability = dataset.metadata_availability;
   return proto::EncodeLayerJson(layer);
 }
 

@@ -43,7 +43,7 @@ struct BakedDataset {
   dem::HeightRange heights;                                               // of the data
   double floor_m = 0;
   bool has_datum = true;
-  int metadata_levels = 0;
+  int metadata_availability = 0;
   int max_level = 0;         // of the dataset, also where the archive ends above it
   int max_source_level = 0;  // without edits (dem::ElevationModel::max_source_level)
   std::uint64_t sources = 1;

@@ -72,7 +72,7 @@ constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
 Json DatasetJson(const BakedDataset& dataset) {
   const auto& [name, attribution, generation, error_fraction, glb_compression, bounds, heights, floor_m, has_datum,
-               metadata_levels, max_level, max_source_level, sources] = dataset;
+               metadata_availability, max_level, max_source_level, sources] = dataset;
   Json json;
   json["name"] = name;
   json["attribution"] = attribution;
@@ -84,7 +84,7 @@ Json DatasetJson(const BakedDataset& dataset) {
   json["heights"] = {heights.min, heights.max};
   json["floor"] = floor_m;
   json["has_datum"] = has_datum;
-  json["metadata_levels"] = metadata_levels;
+  json["metadata_levels"] = metadata_availability;
   json["max_level"] = max_level;
   if (max_source_level != max_level) json["finest_level"] = max_source_level;
   json["sources"] = sources;
@@ -104,7 +104,7 @@ BakedDataset ReadDataset(const Json& json) {
   dataset.heights = {NumberOf(json.at("heights").at(0)), NumberOf(json.at("heights").at(1))};
   dataset.floor_m = NumberOf(json.at("floor"));
   dataset.has_datum = json.at("has_datum").get<bool>();
-  dataset.metadata_levels = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
+  dataset.metadata_availability = WholeOf<int>(json.at("metadata_levels"), 0, geo::kMaxLevel);
   dataset.max_level = WholeOf<int>(json.at("max_level"), 0, geo::kMaxLevel);
   dataset.max_source_level =
       json.contains("finest_level") ? WholeOf<int>(json.at("finest_level"), 0, dataset.max_level) : dataset.max_level;

@@ -77,7 +77,7 @@ Result<tiler::TileRequest> KindOf(const tiler::Dataset& dataset, const BakeReque
             "its configuration",
             dataset.name);
       }
-      if (wanted.metadata && dataset.metadata_levels == 0) {
+      if (wanted.metadata && dataset.metadata_availability == 0) {
         return MakeError(ErrorCode::kInvalidArgument,
                          "extension metadata: dataset {} has none; set metadata_availability in its configuration",
                          dataset.name);
@@ -117,7 +117,7 @@ archive::BakedDataset Describe(const tiler::Dataset& dataset) {
   baked.heights = info.heights;
   baked.floor_m = info.floor;
   baked.has_datum = dataset.model->has_datum();
-  baked.metadata_levels = dataset.metadata_levels;
+  baked.metadata_availability = dataset.metadata_availability;
   baked.max_level = info.max_level;
   baked.max_source_level = info.max_source_level;
   baked.sources = info.sources.size();
@@ -210,7 +210,7 @@ tiler::TileRequest RequestOf(const archive::Manifest& manifest, const geo::TileK
   request.key = key;
   if (!manifest.error_steps.empty()) request.error_step = manifest.error_steps[static_cast<std::size_t>(key.level)];
   request.extensions.metadata =
-      request.extensions.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_levels,
+      request.extensions.metadata && proto::CarriesMetadata(key, manifest.dataset.metadata_availability,
                                                             manifest.dataset.max_source_level, manifest.available);
   return request;
 }

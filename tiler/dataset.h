@@ -55,8 +55,8 @@ struct Dataset {
   std::vector<WatchedFile> baked_files;              // a change of one of them means that there is another archive
   WaterOptions water;
   ImageryOptions imagery;
-  int metadata_levels = 0;       // tiles at multiples of this level have availability metadata; 0: none
-  std::uint64_t generation = 0;  // hash of contents, of all options that change bytes, and of the encoders
+  int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
+  std::uint64_t generation = 0;   // hash of contents, of all options that change bytes, and of the encoders
   // The same without edits; 0: there are none. Caches are keyed by it and by TileEditsHash: tiles that no edit touches
   // stay.
   std::uint64_t unedited_generation = 0;

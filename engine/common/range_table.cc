@@ -20,7 +20,7 @@ void BlockRange::Add(const BlockRange& other) {
   min = std::min(min, other.min);
   max = std::max(max, other.max);
   has_voids |= other.has_voids;
-  has_holes |= other.has_holes;
+  has_enclosed_voids |= other.has_enclosed_voids;
 }
 
 RangeTable::RangeTable(int width, int height) : width_(width), height_(height) {
@@ -59,7 +59,7 @@ void RangeTable::AddBlocks(int block_column, int block_row, int columns, const s
 void RangeTable::MarkHole(int row, int first, int last) {
   Level& finest = levels_.front();
   for (int x = first / kBlock; x <= last / kBlock; ++x) {
-    finest.At(x, row / kBlock).has_holes = true;
+    finest.At(x, row / kBlock).has_enclosed_voids = true;
   }
 }
 

@@ -14,7 +14,7 @@ struct BlockRange {
   float min = std::numeric_limits<float>::infinity();  // min > max: nothing but voids
   float max = -std::numeric_limits<float>::infinity();
   bool has_voids = false;
-  bool has_holes = false;  // voids with data all around them, which do not touch the raster's rim
+  bool has_enclosed_voids = false;  // voids with data all around them, which do not touch the raster's rim
 
   void Add(float height);  // NaN: a void
   void Add(const BlockRange& other);

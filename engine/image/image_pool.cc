@@ -5,7 +5,7 @@
 #include "engine/common/source_log.h"
 #include "engine/gdal/sample_rules.h"
 #include "engine/image/image_bins.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

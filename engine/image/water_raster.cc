@@ -14,7 +14,7 @@
 #include "engine/gdal/raster_file.h"
 #include "engine/gdal/sample_rules.h"
 #include "engine/raster/grid_cells.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/sources/located_raster.h"
 
 namespace terrace::dem {

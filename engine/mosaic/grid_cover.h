@@ -9,7 +9,7 @@
 #include "engine/crs/node_positions.h"
 #include "engine/geo/tile_key.h"
 #include "engine/mosaic/grid_members.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

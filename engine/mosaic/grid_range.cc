@@ -118,7 +118,7 @@ std::optional<Box> RasterGrid::BoxAroundHoles(const Box& pixels, int factor) con
   const auto has_holes = [&](double west, double north, double east, double south) {
     const double halo = 2.0 * factor;  // an average by overviews may be void beside a hole
     const Box wide{west - halo, north - halo, east + halo, south + halo};
-    return Ranges(wide).has_holes || voids_.SharesHole(wide);
+    return Ranges(wide).has_enclosed_voids || voids_.SharesHole(wide);
   };
   if (options_.voids != HoleFill::kSmooth || !has_holes(box.min_x, box.min_y, box.max_x, box.max_y)) {
     return std::nullopt;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "engine/mosaic/window_values.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

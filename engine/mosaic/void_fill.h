@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "engine/common/box_index.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

@@ -9,7 +9,7 @@
 
 #include "engine/core/result.h"
 #include "engine/raster/block_sums.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/crs/node_positions.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 namespace terrace::dem {
 

@@ -404,7 +404,7 @@ void RasterSource::LoseCache(const Error& error) const {
 Result<std::vector<float>> RasterSource::ReadAverages(int factor, const GridWindow& window,
                                                       const std::stop_token& stop) const {
   // Uses memory and the cache file only if the files have not changed since they were prepared.
-  if (factor >= kLargestDirectFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
+  if (factor >= kLargestMeasuredFactor && (kept_ ? !kept_->coarse.grids.empty() : paging_->has_coarse_averages)) {
     if (auto unchanged = handles_.CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
     if (const StatisticsPages::Statistics known = statistics(); known->coarse.Has(factor))
       return known->coarse.Read(factor, window);

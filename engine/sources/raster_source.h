@@ -22,7 +22,7 @@
 #include "engine/crs/level_plan.h"
 #include "engine/crs/vertical_datum.h"
 #include "engine/gdal/handle_pool.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/sources/prepare.h"
 #include "engine/statistics/raster_statistics.h"
 

@@ -27,7 +27,7 @@ class CachedAverages {
                  std::vector<std::uint64_t> offsets);
 
   bool Has(int factor) const {
-    return factor < kLargestDirectFactor && (factors_ & static_cast<unsigned>(factor)) != 0;
+    return factor < kLargestMeasuredFactor && (factors_ & static_cast<unsigned>(factor)) != 0;
   }
   // The same values as ReadAverages. kInvalidArgument: the file is damaged. kNotFound: it was removed, or is no longer
   // accessible. kUnavailable: it cannot be opened now, because descriptors or memory have run out. Precondition:

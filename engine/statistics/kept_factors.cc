@@ -21,7 +21,7 @@ bool IsLargeWithoutOverviews(const RasterLayout& layout) {
 
 unsigned KeptFactors(const RasterLayout& layout) {
   unsigned factors = 0;
-  for (int factor = 2; factor < kLargestDirectFactor; factor *= 2) {
+  for (int factor = 2; factor < kLargestMeasuredFactor; factor *= 2) {
     if (factor / 2 < std::max(layout.width, layout.height) && IsFarFromItsStart(layout, factor)) {
       factors |= static_cast<unsigned>(factor);
     }
@@ -31,7 +31,7 @@ unsigned KeptFactors(const RasterLayout& layout) {
 
 bool KeepsCoarse(const RasterLayout& layout) {
   if (layout.overview_factors.empty()) return true;
-  for (int factor = kLargestDirectFactor; factor / 2 < std::max(layout.width, layout.height); factor *= 2) {
+  for (int factor = kLargestMeasuredFactor; factor / 2 < std::max(layout.width, layout.height); factor *= 2) {
     if (IsFarFromItsStart(layout, factor)) return true;
   }
   return false;

@@ -19,7 +19,7 @@ std::unique_ptr<MemoryAverages> MemoryAverages::Make(const RasterLayout& layout,
   const std::size_t most = budget->left() / kShare;
   std::vector<Level> levels;
   std::size_t bytes = 0;
-  for (int factor = kLargestDirectFactor / 2; factor > 1; factor /= 2) {
+  for (int factor = kLargestMeasuredFactor / 2; factor > 1; factor /= 2) {
     if ((kept & static_cast<unsigned>(factor)) == 0) continue;
     AveragesGrid grid{DivideUp(layout.columns, factor), DivideUp(layout.height, factor), {}};
     const std::size_t more = static_cast<std::size_t>(grid.columns * grid.rows) * sizeof(float);

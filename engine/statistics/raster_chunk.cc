@@ -16,7 +16,7 @@ namespace terrace::dem {
 namespace {
 
 // How far averages of the largest directly compared factor extend beyond a chunk.
-constexpr int kHalo = kLargestDirectFactor;
+constexpr int kHalo = kLargestMeasuredFactor;
 
 // The raster's factors from `least` to `most`.
 template <typename Visit>
@@ -288,7 +288,7 @@ Result<void> CompareAverages(GDALDataset& dataset, const RasterLayout& layout, c
   statistics.averages.clear();
   const unsigned kept = KeptFactors(layout);
   Result<void> result;
-  ForEachFactor(layout, 2, kLargestDirectFactor, [&](int factor) {
+  ForEachFactor(layout, 2, kLargestMeasuredFactor, [&](int factor) {
     if (!result) return;
     const auto averages = AverageAround(dataset, layout, samples, chunk, factor, stop);
     if (!averages) {
@@ -379,11 +379,11 @@ ChunkStatistics VoidStatistics(const Chunk& chunk, const RasterLayout& layout) {
   BlockRange voids;
   voids.has_voids = true;
   statistics.ranges.assign(blocks(RangeTable::kBlock), voids);
-  ForEachFactor(layout, 2, kLargestDirectFactor, [&](int factor) {
+  ForEachFactor(layout, 2, kLargestMeasuredFactor, [&](int factor) {
     statistics.errors.emplace_back(blocks(AveragingErrors::BlockPixels(factor)));
     statistics.averages.emplace_back();
   });
-  ForEachFactor(layout, 2 * kLargestDirectFactor, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
+  ForEachFactor(layout, 2 * kLargestMeasuredFactor, ChunkGrid::kSide, [&](int) { statistics.sums.emplace_back(); });
   return statistics;
 }
 
@@ -422,7 +422,7 @@ Result<ChunkStatistics> ReadChunkStatistics(GDALDataset& dataset, const RasterLa
   Chunk used = chunk;
   used.cols = std::min(chunk.cols, layout.columns - chunk.col);
   statistics.sums.clear();
-  ForEachFactor(layout, 2 * kLargestDirectFactor, ChunkGrid::kSide, [&](int factor) {
+  ForEachFactor(layout, 2 * kLargestMeasuredFactor, ChunkGrid::kSide, [&](int factor) {
     statistics.sums.push_back(used.cols > 0 && StartingFactor(layout, factor) == 1 ? SumsOf(samples, used, factor)
                                                                                    : std::vector<BlockSum>());
   });

@@ -16,7 +16,7 @@
 #include "engine/common/range_table.h"
 #include "engine/core/result.h"
 #include "engine/raster/block_averages.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/statistics/undeclared_nodata.h"
 
 namespace terrace::dem {
@@ -44,8 +44,8 @@ class ChunkGrid {
   int width_ = 0, height_ = 0, columns_ = 0, rows_ = 0;
 };
 
-// Averages of factors 2, 4, .. kLargestDirectFactor are compared with the samples directly.
-inline constexpr int kLargestDirectFactor = 64;
+// Averages of factors 2, 4, .. kLargestMeasuredFactor are compared with the samples directly.
+inline constexpr int kLargestMeasuredFactor = 64;
 
 // Voids first .. last of a row, relative to the chunk's first sample.
 struct VoidRun {
@@ -61,7 +61,7 @@ struct ChunkStatistics {
   BlockSum first_row, last_row;    // of the raster's first and last row within the chunk
   std::vector<BlockRange> ranges;  // by RangeTable block, row by row
   std::vector<VoidRun> voids;      // in the columns in use, row by row; empty if the whole chunk is void
-  // One entry per factor 2, 4, .. kLargestDirectFactor, up to the raster's largest factor. Errors are in metres, one
+  // One entry per factor 2, 4, .. kLargestMeasuredFactor, up to the raster's largest factor. Errors are in metres, one
   // per AveragingErrors block; a block of factor 64 is larger than a chunk, so its error is of the part in this chunk.
   std::vector<std::vector<float>> errors;
   std::vector<std::vector<float>> averages;  // row by row; empty if an overview has them and they are not stored

@@ -100,14 +100,14 @@ double CellError(const Surface& fine, const Surface& coarse, const Line* x, cons
 void AddFactor(const RasterLayout& layout, const CoarseAverages& coarse, int factor, AveragingErrors& errors) {
   const auto grid = [&](int of) -> const CoarseAverages::Grid& {
     std::size_t index = 0;
-    while ((kLargestDirectFactor << index) < of) ++index;
+    while ((kLargestMeasuredFactor << index) < of) ++index;
     return coarse.grids[index];
   };
-  const Surface near(grid(kLargestDirectFactor), layout.wraps), far(grid(factor), layout.wraps);
-  const auto columns = LinesOf(GridAxis(layout.columns, kLargestDirectFactor, layout.wraps),
+  const Surface near(grid(kLargestMeasuredFactor), layout.wraps), far(grid(factor), layout.wraps);
+  const auto columns = LinesOf(GridAxis(layout.columns, kLargestMeasuredFactor, layout.wraps),
                                GridAxis(layout.columns, factor, layout.wraps));
   const auto rows =
-      LinesOf(GridAxis(layout.height, kLargestDirectFactor, false), GridAxis(layout.height, factor, false));
+      LinesOf(GridAxis(layout.height, kLargestMeasuredFactor, false), GridAxis(layout.height, factor, false));
   const int pixels = AveragingErrors::BlockPixels(factor);
   AveragingErrors::Level differences{errors.level(factor).columns, errors.level(factor).rows, {}};
   differences.errors.resize(errors.level(factor).errors.size());
@@ -136,17 +136,18 @@ void AddFactor(const RasterLayout& layout, const CoarseAverages& coarse, int fac
   for (int y = 0; y < differences.rows; ++y) {
     for (int x = 0; x < differences.columns; ++x) {
       const double side = pixels, west = side * x, north = side * y;
-      const float own = errors.Largest(kLargestDirectFactor, west, north, west + side - 0.5, north + side - 0.5);
+      const float own = errors.Largest(kLargestMeasuredFactor, west, north, west + side - 0.5, north + side - 0.5);
       errors.Raise(factor, x, y, differences.errors[static_cast<std::size_t>(y * differences.columns + x)] + own);
     }
   }
 }
 
-// Raises the errors of factors above kLargestDirectFactor. Compares the surface between averages of such a factor with
-// the surface between averages of kLargestDirectFactor samples, and adds the known errors of the latter. Both surfaces
-// are bilinear between grid lines, so the difference is largest where grid lines cross. Evaluates all crossings.
+// Raises the errors of factors above kLargestMeasuredFactor. Compares the surface between averages of such a factor
+// with the surface between averages of kLargestMeasuredFactor samples, and adds the known errors of the latter. Both
+// surfaces are bilinear between grid lines, so the difference is largest where grid lines cross. Evaluates all
+// crossings.
 void AddCoarseErrors(const RasterLayout& layout, const CoarseAverages& coarse, AveragingErrors& errors) {
-  for (int factor = 2 * kLargestDirectFactor; factor <= errors.largest_factor(); factor *= 2) {
+  for (int factor = 2 * kLargestMeasuredFactor; factor <= errors.largest_factor(); factor *= 2) {
     AddFactor(layout, coarse, factor, errors);
   }
 }
@@ -176,7 +177,7 @@ bool IsStray(const RangeTable& overview, const RangeTable& samples, const Raster
 
 CoarseAverages CoarseAverages::ShapedFor(const RasterLayout& layout) {
   CoarseAverages coarse;
-  for (int factor = kLargestDirectFactor; factor <= AveragingErrors(layout.width, layout.height).largest_factor();
+  for (int factor = kLargestMeasuredFactor; factor <= AveragingErrors(layout.width, layout.height).largest_factor();
        factor *= 2) {
     Grid grid{DivideUp(layout.columns, factor), DivideUp(layout.height, factor), {}};
     grid.heights.resize(static_cast<std::size_t>(grid.columns * grid.rows), SampleRules::kVoid);
@@ -186,12 +187,12 @@ CoarseAverages CoarseAverages::ShapedFor(const RasterLayout& layout) {
 }
 
 bool CoarseAverages::Has(int factor) const {
-  return !grids.empty() && factor >= kLargestDirectFactor && (factor & (factor - 1)) == 0;
+  return !grids.empty() && factor >= kLargestMeasuredFactor && (factor & (factor - 1)) == 0;
 }
 
 std::vector<float> CoarseAverages::Read(int factor, const GridWindow& window) const {
   std::size_t index = 0;
-  while (index + 1 < grids.size() && (kLargestDirectFactor << index) < factor) ++index;
+  while (index + 1 < grids.size() && (kLargestMeasuredFactor << index) < factor) ++index;
   return grids[index].Read(window);
 }
 
@@ -260,7 +261,7 @@ void StatisticsAssembler::AddSums(const Chunk& chunk, const ChunkStatistics& chu
     }
   };
   for (std::size_t k = 0; k < statistics_.coarse.grids.size(); ++k) {
-    const int factor = kLargestDirectFactor << k;
+    const int factor = kLargestMeasuredFactor << k;
     CoarseAverages::Grid& grid = statistics_.coarse.grids[k];
     if (k == 0) {
       place(factor, chunk_statistics.averages.back(), [&](std::int64_t column, std::int64_t row, float height) {
@@ -282,7 +283,7 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
     // Adds sums of chunks row by row, in the order of BlockAverages.
     const int columns = DivideUp(layout_.columns, ChunkGrid::kSide), rows = DivideUp(layout_.height, ChunkGrid::kSide);
     for (std::size_t k = 0; k < coarse.grids.size(); ++k) {
-      const int chunks = (kLargestDirectFactor << k) / ChunkGrid::kSide;
+      const int chunks = (kLargestMeasuredFactor << k) / ChunkGrid::kSide;
       if (chunks < 2) continue;
       CoarseAverages::Grid& grid = coarse.grids[k];
       std::vector<BlockSum> sums(grid.heights.size());
@@ -297,9 +298,9 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
     AddCoarseErrors(layout_, coarse, statistics_.errors);
     return {};
   }
-  if (statistics_.errors.largest_factor() <= kLargestDirectFactor && !KeepsCoarse(layout_)) return {};
+  if (statistics_.errors.largest_factor() <= kLargestMeasuredFactor && !KeepsCoarse(layout_)) return {};
   CoarseAverages overviews = CoarseAverages::ShapedFor(layout_);
-  int factor = kLargestDirectFactor;
+  int factor = kLargestMeasuredFactor;
   for (CoarseAverages::Grid& grid : overviews.grids) {
     auto heights = ReadAverages(dataset, layout_, factor, {0, 0, grid.columns, grid.rows}, stop);
     if (!heights) return tl::unexpected(heights.error());

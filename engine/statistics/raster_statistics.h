@@ -13,7 +13,7 @@
 #include "engine/common/content_hash.h"
 #include "engine/common/range_table.h"
 #include "engine/core/result.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/statistics/averaging_errors.h"
 #include "engine/statistics/raster_chunk.h"
 #include "engine/statistics/rim_voids.h"
@@ -30,8 +30,8 @@ struct AveragesGrid {
   std::vector<float> Read(const GridWindow& window) const;
 };
 
-// All averages of factors kLargestDirectFactor and above: at most a 4096th of the raster's samples. Empty for a raster
-// whose overviews have them (KeepsCoarse).
+// All averages of factors kLargestMeasuredFactor and above: at most a 4096th of the raster's samples. Empty for a
+// raster whose overviews have them (KeepsCoarse).
 class CoarseAverages {
  public:
   using Grid = AveragesGrid;
@@ -43,7 +43,7 @@ class CoarseAverages {
   // The result of ReadAverages. Precondition: Has(factor).
   std::vector<float> Read(int factor, const GridWindow& window) const;
 
-  std::vector<Grid> grids;  // of factor kLargestDirectFactor, twice that, ..
+  std::vector<Grid> grids;  // of factor kLargestMeasuredFactor, twice that, ..
 };
 
 struct RasterStatistics {

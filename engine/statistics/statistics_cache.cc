@@ -43,7 +43,7 @@ std::string HeaderOf(const StatisticsKey& key) {
   writer.Put(static_cast<std::uint32_t>(key.kept_factors()));
   writer.Put(key.hash);
   writer.Put<std::uint32_t>(ChunkGrid::kSide);
-  writer.Put<std::uint32_t>(kLargestDirectFactor);
+  writer.Put<std::uint32_t>(kLargestMeasuredFactor);
   writer.Put(static_cast<std::uint32_t>(detected.size()));
   writer.PutBytes(detected);
   std::string bytes = writer.Take();
@@ -96,7 +96,7 @@ std::string EncodeCachedChunk(std::uint32_t index, const ChunkStatistics& chunk_
   const std::string statistics = chunk_statistics.is_void() ? std::string() : EncodeChunk(chunk_statistics);
   ByteWriter averages;
   if (chunk_statistics.has_averages(factors)) {
-    for (std::size_t k = 0; (2 << k) < kLargestDirectFactor; ++k) {
+    for (std::size_t k = 0; (2 << k) < kLargestMeasuredFactor; ++k) {
       if ((factors & (2U << k)) == 0) continue;
       const std::string_view floats(reinterpret_cast<const char*>(chunk_statistics.averages[k].data()),
                                     chunk_statistics.averages[k].size() * sizeof(float));

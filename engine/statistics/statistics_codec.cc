@@ -65,11 +65,11 @@ class Reader {
 template <typename Archive, typename Ranges>
 void RangeFields(Archive& archive, Ranges& ranges) {
   for (auto& range : ranges) {
-    auto voids = static_cast<std::uint8_t>((range.has_voids ? 1 : 0) | (range.has_holes ? 2 : 0));
+    auto voids = static_cast<std::uint8_t>((range.has_voids ? 1 : 0) | (range.has_enclosed_voids ? 2 : 0));
     archive(range.min, range.max, voids);
     if constexpr (Archive::kReads) {
       range.has_voids = (voids & 1) != 0;
-      range.has_holes = (voids & 2) != 0;
+      range.has_enclosed_voids = (voids & 2) != 0;
     }
   }
 }
@@ -152,7 +152,7 @@ std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& 
     chunk_statistics.averages.back().resize(AveragesIn(chunk, layout, 1 << chunk_statistics.averages.size()));
   }
   for (std::size_t k = 0; k < chunk_statistics.sums.size(); ++k) {
-    chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestDirectFactor << (k + 1)));
+    chunk_statistics.sums[k].resize(AveragesIn(chunk, layout, kLargestMeasuredFactor << (k + 1)));
   }
   Reader reader(bytes);
   ChunkFields(reader, chunk_statistics);

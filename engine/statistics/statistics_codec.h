@@ -11,7 +11,7 @@
 
 namespace terrace::dem {
 
-// Without averages of factors below kLargestDirectFactor, which the cache stores separately.
+// Without averages of factors below kLargestMeasuredFactor, which the cache stores separately.
 std::string EncodeChunk(const ChunkStatistics& chunk_statistics);
 // Nothing if the bytes are not a chunk of this shape.
 std::optional<ChunkStatistics> DecodeChunk(std::string_view bytes, const Chunk& chunk, const RasterLayout& layout);

@@ -67,9 +67,9 @@ std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token
   json["extensions"] = Json::array();
   if (layer.normals) json["extensions"].push_back("octvertexnormals");
   if (layer.water_mask) json["extensions"].push_back("watermask");
-  if (layer.metadata_levels > 0) {
+  if (layer.metadata_availability > 0) {
     json["extensions"].push_back("metadata");
-    json["metadataAvailability"] = layer.metadata_levels;
+    json["metadataAvailability"] = layer.metadata_availability;
   }
   // Names and attributions come from files: bytes that are not UTF-8 become U+FFFD instead of an exception.
   std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -18,14 +18,14 @@ struct LayerDescription {
   // Degrees. west > east, or east > 180, is a box across the antimeridian: layer.json then spans all longitudes,
   // because its readers know only boxes with west < east.
   geo::GeoBounds bounds;
-  bool normals = true;      // tiles have them on request
-  bool water_mask = false;  // tiles have it on request
-  int metadata_levels = 0;  // tiles at multiples of this level have metadata on request; 0: none
-  std::string tile_query;   // appended to the tile template's query: "error=5&atleast=1"; may be empty
+  bool normals = true;            // tiles have them on request
+  bool water_mask = false;        // tiles have it on request
+  int metadata_availability = 0;  // tiles at multiples of this level have metadata on request; 0: none
+  std::string tile_query;         // appended to the tile template's query: "error=5&atleast=1"; may be empty
 };
 
 // UTF-8 JSON; empty if a stop was requested. `available` must be complete: it contains both roots and every ancestor of
-// an available tile. It is written for any `metadata_levels`: CesiumJS and cesium-native ignore it if tiles have
+// an available tile. It is written for any `metadata_availability`: CesiumJS and cesium-native ignore it if tiles have
 // metadata, and other clients read nothing else. Precondition: available is not empty.
 std::string EncodeLayerJson(const LayerDescription& layer, const std::stop_token& stop = {});
 

@@ -24,9 +24,9 @@ Json Below(const std::vector<geo::TileRange>& ranges, const geo::TileKey& key, i
 
 }  // namespace
 
-bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int max_source_level,
+bool CarriesMetadata(const geo::TileKey& key, int metadata_availability, int max_source_level,
                      std::span<const std::vector<geo::TileRange>> available) {
-  if (metadata_levels <= 0 || key.level % metadata_levels != 0) return false;
+  if (metadata_availability <= 0 || key.level % metadata_availability != 0) return false;
   if (key.level < max_source_level) return true;
   const int below = key.level + 1;
   return below < static_cast<int>(available.size()) &&
@@ -36,8 +36,8 @@ bool CarriesMetadata(const geo::TileKey& key, int metadata_levels, int max_sourc
 }
 
 std::string EncodeTileMetadata(const geo::TileKey& key, std::span<const std::vector<geo::TileRange>> available,
-                               int metadata_levels) {
-  const int deepest = std::min(key.level + metadata_levels, static_cast<int>(available.size()) - 1);
+                               int metadata_availability) {
+  const int deepest = std::min(key.level + metadata_availability, static_cast<int>(available.size()) - 1);
   Json levels = Json::array();
   for (int level = key.level + 1; level <= deepest; ++level) {
     levels.push_back(Below(available[static_cast<std::size_t>(level)], key, level));

@@ -46,8 +46,8 @@ Result<void> ReadQuantizedMesh(std::string_view query, const RequestFields& fiel
   tile.extensions.normals = wanted.normals && (!dataset.only_archive || dataset.only_archive->extent().normals);
   tile.extensions.water_mask = wanted.water_mask && dataset.has_water;
   tile.extensions.metadata =
-      wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_levels, dataset.error_scale.max_source_level,
-                                                dataset.available);
+      wanted.metadata && proto::CarriesMetadata(tile.key, dataset.metadata_availability,
+                                                dataset.error_scale.max_source_level, dataset.available);
   return {};
 }
 

@@ -26,7 +26,7 @@ std::string WriteLayer(const DatasetView& dataset, std::string tile_query, const
   layer.available = dataset.available;
   layer.bounds = dataset.bounds;
   layer.water_mask = dataset.has_water;
-  layer.metadata_levels = dataset.metadata_levels;
+  layer.metadata_availability = dataset.metadata_availability;
   if (dataset.only_archive) layer.normals = dataset.only_archive->extent().normals;
   layer.tile_query = std::move(tile_query);
   return proto::EncodeLayerJson(layer, stop);

@@ -46,7 +46,7 @@ void SetExtent(const tiler::Dataset& dataset, DatasetView& view) {
   view.sources = extent.sources;
   view.has_water = extent.water_mask;
   view.texture = extent.texture;
-  view.metadata_levels = extent.metadata_levels;
+  view.metadata_availability = extent.metadata_availability;
   view.floor_m = extent.floor_m;
   view.min_mercator_depth = extent.min_mercator_depth;
   view.max_mercator_depth = extent.max_mercator_depth;
@@ -84,7 +84,7 @@ DatasetView ViewOf(const std::shared_ptr<const tiler::TilePipeline>& pipeline, c
     view.imagery = dataset.imagery.image->extent();
     view.imagery_attribution = dataset.imagery.attribution;
   }
-  view.metadata_levels = dataset.metadata_levels;
+  view.metadata_availability = dataset.metadata_availability;
   view.floor_m = info.floor;
   view.max_mercator_depth = info.max_mercator_depth;
   return view;

@@ -47,7 +47,7 @@ struct DatasetView {
   std::optional<proto::TextureFormat> texture;   // of GLB tiles, for requests that name none; nothing: no imagery
   std::optional<dem::ImageExtent> imagery = {};  // of the image, for map tiles; nothing: none
   std::string imagery_attribution = {};
-  int metadata_levels = 0;                             // tiles at multiples of this level have metadata; 0: none
+  int metadata_availability = 0;                       // tiles at multiples of this level have metadata; 0: none
   int min_mercator_depth = 0, max_mercator_depth = 1;  // of the geo::MercatorGrids of height tiles
   // Of height tiles; nothing: `bounds`.
   std::optional<dem::GeoBounds> height_tile_bounds;

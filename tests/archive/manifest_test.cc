@@ -21,7 +21,7 @@ Manifest FullManifest() {
   manifest.dataset.bounds = {7.999583333333333, 46, 9.1, 47.3};
   manifest.dataset.heights = {-12.3456789, 4634.1};
   manifest.dataset.floor_m = 0.1;
-  manifest.dataset.metadata_levels = 5;
+  manifest.dataset.metadata_availability = 5;
   manifest.dataset.max_level = manifest.dataset.max_source_level = 13;
   manifest.dataset.sources = 4;
   manifest.kind.coding = tiler::Coding::kGzip;

@@ -47,7 +47,7 @@ TEST(LayerJson, NamesTheExtensionsThatTilesHave) {
   Json json = Json::parse(EncodeLayerJson(layer));
   EXPECT_EQ(json.at("extensions"), Json::array({"octvertexnormals", "watermask"}));
   EXPECT_FALSE(json.contains("metadataAvailability"));
-  layer.metadata_levels = 4;
+  layer.metadata_availability = 4;
   json = Json::parse(EncodeLayerJson(layer));
   EXPECT_EQ(json.at("extensions"), Json::array({"octvertexnormals", "watermask", "metadata"}));
   EXPECT_EQ(json.at("metadataAvailability"), 4);

@@ -17,7 +17,7 @@ const TilePipeline& Earth() {
     std::vector<Dataset> datasets;
     for (int i = 0; i < 2; ++i) datasets.push_back(OpenSample("etopo5"));
     datasets[1].water.sea_level_m = 0;
-    datasets[1].metadata_levels = 2;
+    datasets[1].metadata_availability = 2;
     return new TilePipeline(std::move(datasets));
   }();
   return *pipeline;

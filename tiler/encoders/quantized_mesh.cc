@@ -45,7 +45,7 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
   proto::TileExtensions extensions = request.extensions;
   extensions.water_mask = extensions.water_mask && dataset.water.any();
   extensions.metadata =
-      extensions.metadata && proto::CarriesMetadata(request.key, dataset.metadata_levels,
+      extensions.metadata && proto::CarriesMetadata(request.key, dataset.metadata_availability,
                                                     dataset.model->max_source_level(), dataset.model->Availability());
   if (extensions.water_mask) {
     Result<proto::WaterMask> mask = WaterMaskOf(dataset, samples, stop);
@@ -53,8 +53,8 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
     tile.water_mask = *std::move(mask);
   }
   if (extensions.metadata) {
-    tile.metadata =
-        proto::EncodeTileMetadata(request.key, dataset.model->AvailabilityBelow(request.key), dataset.metadata_levels);
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.model->AvailabilityBelow(request.key),
+                                              dataset.metadata_availability);
   }
   return extensions;
 }

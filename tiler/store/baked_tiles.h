@@ -28,7 +28,7 @@ struct BakedExtent {
   int min_mercator_depth = 0, max_mercator_depth = 0;  // of the height tiles in the archive
   dem::GeoBounds height_tile_bounds;                   // of these tiles, within `bounds`
   bool normals = false, water_mask = false;            // extensions of quantized-mesh tiles
-  int metadata_levels = 0;                             // tiles at multiples of it have metadata; 0: none
+  int metadata_availability = 0;                       // tiles at multiples of it have metadata; 0: none
   std::vector<int> error_steps;                        // of tiles with a mesh, by level; empty: 0
   std::optional<proto::TextureFormat> texture;         // of GLB tiles
 };

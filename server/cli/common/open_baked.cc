@@ -149,7 +149,7 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
     const tiler::TileRequest& kind = opened->manifest().kind;
     if (kind.format == tiler::TileFormat::kGlb) dataset.glb.compression = kind.compression;
   }
-  dataset.metadata_levels = baked.metadata_levels;
+  dataset.metadata_availability = baked.metadata_availability;
   dataset.generation = GenerationOf(*archives);
   dataset.baked = archive::MakeBakedTiles(*std::move(archives));
   return dataset;

@@ -79,9 +79,9 @@ std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dat
       dataset.error_fraction, static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
       static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
       water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
-      dataset.metadata_levels, imagery.image ? imagery.image->fingerprint() : 0, static_cast<int>(imagery.texture),
-      imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution, dataset.attribution.size(),
-      dataset.attribution);
+      dataset.metadata_availability, imagery.image ? imagery.image->fingerprint() : 0,
+      static_cast<int>(imagery.texture), imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution,
+      dataset.attribution.size(), dataset.attribution);
   return XXH3_64bits(text.data(), text.size());
 }
 
@@ -128,7 +128,7 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
   dataset.model = std::move(model);
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
-  dataset.metadata_levels = wanted.metadata_availability;
+  dataset.metadata_availability = wanted.metadata_availability;
   dataset.generation = GenerationOf(wanted, dataset, version, dataset.model->fingerprint());
   if (dataset.model->info().edits > 0) {
     dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.model->unedited_fingerprint());

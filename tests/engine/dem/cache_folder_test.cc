@@ -21,7 +21,7 @@
 #include <utility>
 
 #include "engine/gdal/raster_file.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/sources/prepare.h"
 #include "engine/sources/raster_source.h"
 #include "engine/statistics/kept_factors.h"

@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "engine/crs/level_plan.h"
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 #include "engine/sources/raster_source.h"
 #include "tests/engine/dem/dem_fixture.h"
 

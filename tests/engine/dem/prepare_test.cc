@@ -177,7 +177,7 @@ void ExpectErrorsHold(const std::string& path) {
       const float bound = source->statistics()->errors.level(factor).errors[i], real = truth.level(factor).errors[i];
       ASSERT_GE(bound * 1.00001 + 1e-3, real) << path << " factor " << factor << " block " << i;
       most = std::max(most, double{bound} - real);
-      if (factor <= kLargestDirectFactor) {
+      if (factor <= kLargestMeasuredFactor) {
         EXPECT_NEAR(bound, real, 1e-3 + 1e-5 * real) << path << " factor " << factor;
       }
     }

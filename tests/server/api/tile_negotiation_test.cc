@@ -93,7 +93,7 @@ TEST(NegotiateTile, GivesNoExtensionThatTheTileHasNot) {
   datasets[0].name = "dry";
   datasets[1].name = "wet";
   datasets[1].has_water = true;
-  datasets[1].metadata_levels = 2;
+  datasets[1].metadata_availability = 2;
   datasets[1].error_scale.max_source_level = 2;
   for (DatasetView& dataset : datasets) dataset.available = {{{0, 0, 1, 0}}, {{0, 0, 3, 1}}, {{0, 0, 7, 3}}};
   Request request;

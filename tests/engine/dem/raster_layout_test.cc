@@ -1,4 +1,4 @@
-#include "engine/raster/sample_grid.h"
+#include "engine/raster/raster_layout.h"
 
 #include <gdal_priv.h>
 
