@@ -136,7 +136,7 @@ LIBRARIES = [
     Library("clocks", r"(chrono|ctime)", rf"(config|bake|fly/(flight|http)|tiler|redis|server|{DEM_FILES})/|engine/core/elapsed_time\.h"),
     Library("files", r"(filesystem|fstream)", rf"(config/|{DEM_FILES}/|archive/|bake/|server/|proto/gltf/mesh_file)"),
     Library("memory from the system", r"sys/mman\.h|sanitizer/asan_interface\.h", r"(engine/tin/mesh/spare_blocks|server/.*)\.cc"),
-    Library("the operating system", r"(unistd|malloc|fcntl|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",
+    Library("the operating system", r"(unistd|malloc|fcntl|dlfcn|poll|glob|signal|dirent|pthread|elf|link|netdb)\.h|(sys|arpa|netinet|linux)/.*",
             rf"(config|{DEM_FILES}|tiler|archive|bake|redis|server)/.*\.cc"),
     Library("the standard library", r"[a-z_0-9]+|(stdint|immintrin)\.h", r"."),
 ]

@@ -142,9 +142,10 @@ struct RasterInfo {
   std::optional<double> nodata;
   std::string found_voids;  // detected nodata values, for people; empty: none
   std::vector<int> overview_factors;
-  std::string overviews_unused;  // why overviews are ignored, with the remedy; empty: none are
-  std::string wide_blocks;       // why preparing it decodes blocks many times, with the remedy; empty: it does not
-  std::string transform;         // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  std::vector<std::string> warnings;  // what else people should know, each with the remedy
+  std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
+  std::string wide_blocks;            // why preparing it decodes blocks many times, with the remedy; empty: it does not
+  std::string transform;              // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
   bool is_large_without_overviews = false;    // kMaxSamplesWithoutAverages (statistics/kept_factors.h)
   int min_kept_factor = 0;                    // smallest factor of stored averages; 0: none
   bool has_averages_in_cache_folder = false;  // false: in memory

@@ -7,8 +7,10 @@
 #include <map>
 #include <new>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 
 #include "engine/core/plain_number.h"
@@ -146,6 +148,21 @@ double CellOf(const std::string& file) {
 
 }  // namespace
 
+std::optional<std::string> NameOfDepths(const std::string& vertical_crs) {
+  const ProjContextPtr context = MakeProjContext();
+  const ProjObjectPtr vertical = VerticalPart(context.get(), vertical_crs);
+  if (vertical == nullptr) return std::nullopt;
+  const ProjObjectPtr axes(proj_crs_get_coordinate_system(context.get(), vertical.get()));
+  const char* direction = nullptr;
+  if (axes == nullptr || proj_cs_get_axis_info(context.get(), axes.get(), 0, nullptr, nullptr, &direction, nullptr,
+                                               nullptr, nullptr, nullptr) == 0) {
+    return std::nullopt;
+  }
+  if (direction == nullptr || std::string_view(direction) != "down") return std::nullopt;
+  const char* const name = proj_get_name(vertical.get());
+  return name == nullptr ? "unnamed" : name;
+}
+
 bool Covers(const geo::GeoBounds& area, Position degrees) {
   const auto& [west, south, east, north] = area;
   const double longitude = WithinOneTurn(degrees.x);
@@ -242,7 +259,18 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Posi
                   "+multiplier=1 +step +proj=unitconvert +xy_in=rad +xy_out=deg",
                   std::filesystem::absolute(path, ignored).string()));
   geoid->FindGrid();
-  return Checked(geoid, centre);
+  auto checked = Checked(geoid, centre);
+  if (!checked) return checked;
+  const double undulation = Reader(*geoid).At(centre);
+  constexpr double kMaxUndulation = 200;  // metres; on Earth -107 to 86
+  if (std::abs(undulation) > kMaxUndulation) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: its value at the centre of the source is {} m; undulations are from -107 to 86 m: give a grid "
+        "of undulations in metres",
+        path, PlainNumber(undulation, 2));
+  }
+  return checked;
 }
 
 Result<void> Geoid::AddTo(ContentHasher& hasher, const FileContentOptions& options) const {
@@ -267,8 +295,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
                      PlainNumber(centre.x), PlainNumber(centre.y));
   }
   if (above < base) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{} counts downwards; make heights of the depths, for instance with `gdal_calc.py --calc=-A`",
+    return MakeError(ErrorCode::kInvalidArgument, "{}: its operation makes depths of heights, not heights",
                      geoid->name_);
   }
   return geoid;

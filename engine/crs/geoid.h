@@ -7,6 +7,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "engine/core/result.h"
@@ -21,6 +22,10 @@ namespace terrace::dem {
 // Whether an area contains a position. Longitudes count modulo 360 degrees.
 bool Covers(const geo::GeoBounds& area, Position degrees);
 
+// Returns the name of a vertical reference system, in a form as for Geoid::OfCrs, that counts downwards, as depths do.
+// Nothing: it has heights, or PROJ does not know it.
+std::optional<std::string> NameOfDepths(const std::string& vertical_crs);
+
 // Thread-safe: every call borrows a PROJ context of its own.
 class Geoid {
  public:
@@ -29,7 +34,8 @@ class Geoid {
   // operation. kInvalidArgument: a grid is missing, and the message says where to get it; or PROJ has no operation.
   static Result<std::shared_ptr<const Geoid>> OfCrs(const std::string& vertical_crs, Position centre);
 
-  // Opens a file of undulations above the WGS 84 ellipsoid: .gtx, or GeoTIFF as on cdn.proj.org.
+  // Opens a file of undulations above the WGS 84 ellipsoid, in metres: .gtx, or GeoTIFF as on cdn.proj.org.
+  // kInvalidArgument: PROJ cannot read it, or no undulation is as large as its value at `centre`.
   static Result<std::shared_ptr<const Geoid>> OfGrid(const std::string& path, Position centre);
 
   // Returns the geoid's height above the ellipsoid in metres; NaN where the geoid is not known. The result depends only

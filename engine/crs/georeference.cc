@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+#include <vector>
 
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/sample_rules.h"
@@ -102,6 +103,14 @@ std::pair<std::string, std::string> VerticalPart(const OGRSpatialReference& srs)
   return {};
 }
 
+// Whether the file's x is the latitude or northing, which most formats of GDAL put into y.
+bool HasNorthingFirst(const OGRSpatialReference& srs) {
+  OGRSpatialReference usual = srs;
+  usual.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
+  const std::vector<int>&axes = srs.GetDataAxisToSRSAxisMapping(), &usual_axes = usual.GetDataAxisToSRSAxisMapping();
+  return axes.size() >= 2 && usual_axes.size() >= 2 && axes[0] == usual_axes[1] && axes[1] == usual_axes[0];
+}
+
 }  // namespace
 
 Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& path) {
@@ -114,14 +123,24 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
           ErrorCode::kInvalidArgument,
           "{}: is placed by ground control points only; resample it with `gdalwarp -t_srs EPSG:4326 in out`", path);
     }
+    if (dataset.GetMetadata("RPC") != nullptr) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "{}: is placed by rational polynomials (RPC) only; resample it with `gdalwarp -rpc -t_srs "
+                       "EPSG:4326 in out`",
+                       path);
+    }
     return MakeError(
         ErrorCode::kInvalidArgument,
         "{}: has no georeference; if you know where it lies, add one with `gdal_translate -a_srs EPSG:XXXX "
         "-a_ullr west north east south in out`; `terrace mesh` needs none",
         path);
   }
-  if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());
   const OGRSpatialReference* srs = dataset.GetSpatialRef();
+  // Everything below takes x for the longitude or easting.
+  if (srs != nullptr && HasNorthingFirst(*srs)) {
+    std::swap_ranges(self.to_crs_.begin(), self.to_crs_.begin() + 3, self.to_crs_.begin() + 3);
+  }
+  if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());
   if (srs == nullptr || srs->IsEmpty()) {
     return MakeError(
         ErrorCode::kInvalidArgument,
@@ -215,10 +234,11 @@ Result<void> Georeference::ReadCrs(const OGRSpatialReference& srs, const std::st
   const OGRSpatialReference horizontal = HorizontalPart(srs);
   horizontal_wkt_ = CanonicalWkt(horizontal);
   crs_ = NameAndCode(vertical_datum_.empty() ? horizontal : srs);
-  if (horizontal.IsGeographic() == 0 && horizontal.IsProjected() == 0) {
+  is_geographic_ = horizontal.IsGeographic() != 0;
+  if (!is_geographic_ && horizontal.IsProjected() == 0) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: its coordinate reference system \"{}\" is not tied to the Earth; assign the right one with "
-                     "`gdal_translate -a_srs EPSG:XXXX in out`",
+                     "{}: its coordinate reference system \"{}\" has neither longitudes and latitudes nor eastings and "
+                     "northings; assign the right one with `gdal_translate -a_srs EPSG:XXXX in out`",
                      path, crs_);
   }
   const Position centre = Apply(to_crs_, {width_ / 2.0, height_ / 2.0});

@@ -63,6 +63,8 @@ class Georeference {
 
   // Whether pixel positions are an affine function of degrees; then neither PROJ nor interpolation is needed.
   bool is_affine() const { return projector_ == nullptr; }
+  // Whether the CRS is geographic: its coordinates are longitudes and latitudes.
+  bool is_geographic() const { return is_geographic_; }
   // Whether the CRS is geographic and the raster is not rotated: columns follow meridians. Rows may run either way.
   bool is_geographic_grid() const { return period_ > 0; }
   bool columns_run_east() const { return to_crs_[1] > 0; }
@@ -92,6 +94,9 @@ class Georeference {
   std::string transform() const { return projector_ == nullptr ? "" : projector_->description(); }
   std::string pipeline() const { return projector_ == nullptr ? "" : projector_->pipeline(); }
 
+  // Whether all corners are coordinates that longitudes and latitudes could have.
+  bool MayBeInDegrees() const;
+
   // Adds to a hash everything that the positions of pixels depend on, including the PROJ operation and its grids, which
   // depend on the installation. Errors: those of HashFiles.
   Result<void> AddTo(ContentHasher& hasher, const FileContentOptions& options) const;
@@ -100,7 +105,6 @@ class Georeference {
 
  private:
   Result<void> SetAffine(const std::string& path);
-  bool MayBeInDegrees() const;
   Result<void> ReadCrs(const OGRSpatialReference& srs, const std::string& path);
   void FindPeriod(const OGRSpatialReference& srs);
   void FindTurn();
@@ -113,6 +117,7 @@ class Georeference {
   // 360 degrees in units of the CRS, if the CRS is geographic or continues beyond the antimeridian; else 0.
   double full_circle_ = 0;
   double centre_x_ = 0;  // of the raster, in the same units
+  bool is_geographic_ = false;
   double period_ = 0;
   int wrap_columns_ = 0;
   std::shared_ptr<const Projector> projector_;  // null: the CRS is WGS 84 longitude and latitude

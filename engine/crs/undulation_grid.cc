@@ -11,6 +11,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/gdal/driver_list.h"
 #include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
 
 namespace terrace::dem {
 namespace {
@@ -106,9 +107,7 @@ Result<std::vector<float>> UndulationGrid::Read(int column, int row, int columns
   std::vector<float> heights(Area(columns, rows));
   {
     const std::lock_guard lock(mutex_);
-    ForgetGdalError();
-    if (dataset_->GetRasterBand(band_)->RasterIO(GF_Read, column, row, columns, rows, heights.data(), columns, rows,
-                                                 GDT_Float32, 0, 0, nullptr) != CE_None) {
+    if (!ReadRaw(*dataset_->GetRasterBand(band_), column, row, columns, rows, GDT_Float32, heights.data())) {
       return MakeError(ErrorCode::kUnavailable, "the grid of undulations {} cannot be read ({}); check the file", path_,
                        TakeGdalError());
     }

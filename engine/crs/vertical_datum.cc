@@ -19,6 +19,16 @@ Result<VerticalDatum> Above(Result<std::shared_ptr<const Geoid>> geoid) {
   return VerticalDatum{std::move(name), *std::move(geoid)};
 }
 
+Result<VerticalDatum> AboveCrs(const std::string& vertical_crs, Position centre) {
+  if (const auto depths = NameOfDepths(vertical_crs)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{} counts downwards; make heights of the depths with `gdal_calc.py -A in --outfile=out "
+                     "--calc=-A`, and let `vertical` say what the heights count from: the copy still states depths",
+                     *depths);
+  }
+  return Above(Geoid::OfCrs(vertical_crs, centre));
+}
+
 }  // namespace
 
 Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georeference& stated, Position centre) {
@@ -26,7 +36,7 @@ Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georefere
   if (wanted == "ellipsoid") return VerticalDatum{"ellipsoid", nullptr};
   if (wanted == "egm96") return Above(Geoid::OfCrs("EPSG:5773", centre));
   if (wanted == "egm2008") return Above(Geoid::OfCrs("EPSG:3855", centre));
-  if (wanted.starts_with("EPSG:")) return Above(Geoid::OfCrs(wanted, centre));
+  if (wanted.starts_with("EPSG:")) return AboveCrs(wanted, centre);
   if (wanted != "crs") {
     std::error_code ignored;
     if (std::filesystem::exists(wanted, ignored)) {
@@ -34,7 +44,7 @@ Result<VerticalDatum> ResolveVertical(const std::string& wanted, const Georefere
     }
     return Above(Geoid::OfGrid(wanted, centre));
   }
-  if (!stated.vertical_crs().empty()) return Above(Geoid::OfCrs(stated.vertical_crs(), centre));
+  if (!stated.vertical_crs().empty()) return AboveCrs(stated.vertical_crs(), centre);
   return VerticalDatum{stated.vertical_datum(), nullptr};
 }
 

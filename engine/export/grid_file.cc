@@ -27,9 +27,17 @@ class MemoryFile {
   }
   MemoryFile(const MemoryFile&) = delete;
   MemoryFile& operator=(const MemoryFile&) = delete;
-  ~MemoryFile() { VSIUnlink(path_.c_str()); }
+  ~MemoryFile() {
+    VSIUnlink(path_.c_str());
+    VSIUnlink(sidecar().c_str());
+  }
 
   const char* path() const { return path_.c_str(); }
+  // Whether GDAL has written something that the format cannot contain beside the file.
+  bool has_sidecar() const {
+    VSIStatBufL unused;
+    return VSIStatL(sidecar().c_str(), &unused) == 0;
+  }
   std::string Bytes() const {
     vsi_l_offset size = 0;
     const GByte* const bytes = VSIGetMemFileBuffer(path_.c_str(), &size, FALSE);
@@ -37,6 +45,8 @@ class MemoryFile {
   }
 
  private:
+  std::string sidecar() const { return path_ + ".aux.xml"; }
+
   std::string path_;
 };
 
@@ -75,6 +85,11 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
     dataset->GetRasterBand(1)->SetNoDataValue(std::numeric_limits<double>::quiet_NaN());
     dataset->GetRasterBand(1)->SetUnitType("metre");
     if (WriteBand(grid, *dataset, heights, GDT_Float32) != CE_None) return CannotWrite("GTiff");
+  }
+  if (file.has_sidecar()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "format: a GeoTIFF cannot state EPSG:{}; choose another crs, or another format, such as f32",
+                     grid.epsg);
   }
   std::string bytes = file.Bytes();
   return bytes.empty() ? Result<std::string>(CannotWrite("GTiff")) : Result<std::string>(std::move(bytes));

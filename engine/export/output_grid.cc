@@ -29,7 +29,8 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
   OGRSpatialReference srs;
   const bool is_read = srs.importFromWkt(grid.wkt.c_str()) == OGRERR_NONE;
   if (!is_read || srs.IsCompound() || !(srs.IsProjected() || srs.IsGeographic()) || srs.GetAxesCount() != 2) {
-    return Invalid(fmt::format("crs: EPSG:{} has no easting and northing, nor longitude and latitude", epsg));
+    return Invalid(
+        fmt::format("crs: EPSG:{} is no system of two axes, eastings and northings or longitudes and latitudes", epsg));
   }
   grid.is_geographic = srs.IsGeographic() != 0;
   const char* unit = nullptr;

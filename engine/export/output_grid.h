@@ -38,8 +38,8 @@ struct GridRequest {
   std::optional<double> spacing = {};
 };
 
-// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has no easting and northing; the box
-// is empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
+// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has not two axes; the box is
+// empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
 Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes);
 
 // Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS
@@ -52,10 +52,10 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
 // there, or if the area crosses the antimeridian or touches a pole.
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
-// A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kUnavailable: GDAL
-// cannot write it.
+// A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kInvalidArgument, with
+// a message for clients: the format has no way to state the CRS. kUnavailable: GDAL cannot write it.
 Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights);
-// A grey image of 16 bits. `values`: one per node. Errors: as above.
+// A grey image of 16 bits. `values`: one per node. kUnavailable: GDAL cannot write it.
 Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values);
 
 }  // namespace terrace::dem

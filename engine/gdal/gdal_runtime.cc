@@ -4,6 +4,7 @@
 #include <cpl_error.h>
 #include <cpl_string.h>
 #include <cpl_vsi_virtual.h>
+#include <dlfcn.h>
 #include <fmt/format.h>
 #include <gdal.h>
 #include <ogr_srs_api.h>
@@ -32,10 +33,16 @@ constexpr GIntBig kBlockCacheBytes = GIntBig{256} << 20;  // unless SetGdalCache
 std::atomic<std::uint64_t> errors{0}, warnings{0};
 
 thread_local std::string last_error;
+thread_local std::vector<std::string> first_warnings;
 
-// GDAL's handler prints messages and stops after 1,000 of them; this one stores the last message for our Errors.
-void CPL_STDCALL KeepLastError(CPLErr severity, CPLErrorNum, const char* message) {
-  if (severity == CE_Warning) ++warnings;
+// GDAL's handler prints messages and stops after 1,000 of them; this one stores messages for our errors and warnings.
+void CPL_STDCALL KeepMessage(CPLErr severity, CPLErrorNum, const char* message) {
+  if (severity == CE_Warning) {
+    ++warnings;
+    constexpr std::size_t kMaxWarnings = 8;
+    const bool is_known = std::ranges::find(first_warnings, message) != first_warnings.end();
+    if (!is_known && first_warnings.size() < kMaxWarnings) first_warnings.emplace_back(message);
+  }
   if (severity < CE_Failure) return;
   ++errors;
   last_error = message;
@@ -60,13 +67,22 @@ class Closed : public VSIFilesystemHandler {
   }
 };
 
+// The HDF5 library, which reads netCDF, prints each error to stderr, on each thread that has not switched this off.
+// GDAL links it; this program need not.
+bool SilenceHdf5() {
+  using SetPrinter = int (*)(std::int64_t stack, void* function, void* data);  // H5Eset_auto2; both may be null
+  const auto set_printer = reinterpret_cast<SetPrinter>(::dlsym(RTLD_DEFAULT, "H5Eset_auto2"));
+  return set_printer != nullptr && set_printer(/*stack=*/0, nullptr, nullptr) >= 0;
+}
+
 void InitOnce() {
-  CPLSetErrorHandler(KeepLastError);
+  CPLSetErrorHandler(KeepMessage);
   CPLSetConfigOption("GDAL_VRT_ENABLE_PYTHON", "NO");
   CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
   // Without this setting, GDAL ignores the vertical datum of GeoTIFFs before version 1.1.
   CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
   OSRSetPROJEnableNetwork(0);
+  proj_log_level(nullptr, PJ_LOG_NONE);  // of the default context, which proj_grid_info uses
   GDALSetCacheMax64(kBlockCacheBytes);
   // Settings come from terrace's configuration, not from GDAL's own files.
   CPLSetConfigOption("GDAL_CONFIG_FILE", "/dev/null");
@@ -127,6 +143,14 @@ std::string TakeGdalError() {
   return last_error.empty() ? std::string("no further detail") : std::exchange(last_error, {});
 }
 
-void ForgetGdalError() { last_error.clear(); }
+void ForgetGdalError() {
+  // On each thread that calls GDAL.
+  [[maybe_unused]] static thread_local const bool is_silent = SilenceHdf5();
+  last_error.clear();
+}
+
+bool HasGdalError() { return !last_error.empty(); }
+
+std::vector<std::string> TakeGdalWarnings() { return std::exchange(first_warnings, {}); }
 
 }  // namespace terrace::dem

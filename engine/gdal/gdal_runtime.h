@@ -40,5 +40,10 @@ void GuardNetwork(const std::vector<std::string>& allowed_prefixes);
 // ForgetGdalError before library calls that can fail, so that an older message is not reported for a newer error.
 std::string TakeGdalError();
 void ForgetGdalError();
+// Whether TakeGdalError would return an error.
+bool HasGdalError();
+
+// The first warnings of GDAL on this thread since the previous call, each once, at most eight.
+std::vector<std::string> TakeGdalWarnings();
 
 }  // namespace terrace::dem

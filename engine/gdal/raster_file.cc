@@ -239,15 +239,20 @@ Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path)
 }
 
 Error CannotOpen(const std::string& path, const std::string& problem) {
-  if (const auto format = LeftOutDriverOf(path)) {
+  const LookUpSidecars looked_up(path);
+  const bool is_of_allowed = GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
+  if (const auto format = LeftOutDriverOf(path); format && !is_of_allowed) {
     return {ErrorCode::kInvalidArgument,
             fmt::format("{}: its format, {}, is not among the allowed_drivers; add \"{}\" to them, or convert the file "
                         "with `gdal_translate in out.tif`",
                         path, *format, *format)};
   }
+  const std::string ending = CPLGetExtension(path.c_str());
+  const bool is_packed = EQUAL(ending.c_str(), "zip") || EQUAL(ending.c_str(), "gz") || EQUAL(ending.c_str(), "tar");
   return {ErrorCode::kInvalidArgument,
-          fmt::format("{}: cannot be opened as a raster ({}); check the file with `gdalinfo {}` and its permissions",
-                      path, problem, path)};
+          fmt::format("{}: cannot be opened as a raster ({}); {}", path, problem,
+                      is_packed ? "extract the raster from it"
+                                : fmt::format("check the file with `gdalinfo {}` and its permissions", path))};
 }
 
 Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) {
@@ -314,10 +319,17 @@ bool IsRaster(const std::string& path) {
 GDALDatasetUniquePtr ReopenRaster(const std::string& path, int overview) {
   InitGdal();
   ForgetGdalError();
-  const LookUpSidecars looked_up(path);
   const std::string level = fmt::format("OVERVIEW_LEVEL={}", overview);
   const char* const options[] = {overview < 0 ? nullptr : level.c_str(), nullptr};
-  return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags, nullptr, options));
+  const auto open = [&] { return GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), kOpenFlags, nullptr, options)); };
+  {
+    const LookUpSidecars looked_up(path);
+    if (GDALDatasetUniquePtr dataset = open()) return dataset;
+  }
+  // By name, GDAL does not find dem.HDR, the header of dem.bil; in a listing, it does.
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(std::filesystem::path(path).replace_extension("HDR"), ignored)) return nullptr;
+  return open();
 }
 
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
@@ -333,6 +345,12 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
   if (overview >= 0) return dataset;
   if (auto sidecars = CheckSidecarsAreRead(*dataset, path); !sidecars) return tl::unexpected(sidecars.error());
   return dataset;
+}
+
+bool ReadRaw(GDALRasterBand& band, int col, int row, int cols, int rows, GDALDataType type, void* out) {
+  ForgetGdalError();
+  return band.RasterIO(GF_Read, col, row, cols, rows, out, cols, rows, type, 0, 0, nullptr) == CE_None &&
+         !HasGdalError();
 }
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {

@@ -17,6 +17,10 @@ namespace terrace::dem {
 // full raster; -1: the full raster.
 Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview = -1);
 
+// Reads a rectangle of a band as `type`, row by row from the north, without rescaling. False: it cannot be read;
+// TakeGdalError says why. Of a damaged block, some drivers of GDAL report an error, fill in zeros and return success.
+bool ReadRaw(GDALRasterBand& band, int col, int row, int cols, int rows, GDALDataType type, void* out);
+
 // Clears what GDAL has cached of remote files: of the raster, or of the parts of a VRT. Call before a dataset is
 // reopened, so that the current content is read.
 void ForgetRemote(const std::string& path);

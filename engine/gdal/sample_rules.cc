@@ -90,6 +90,7 @@ std::string WhyOverviewsLackMasks(GDALRasterBand& band) {
 std::optional<double> MetresPerUnit(const std::string& unit) {
   std::string name;
   for (const char c : unit) {
+    if (std::isdigit(static_cast<unsigned char>(c))) return std::nullopt;  // "0.1 m"
     if (std::isalpha(static_cast<unsigned char>(c)))
       name += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
   }
@@ -100,10 +101,10 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
   };
   constexpr Unit kUnits[] = {
       {1, "  m metre metres meter meters "},
-      {.01, " cm centimetre centimeter "},
-      {.001, " mm millimetre millimeter "},
-      {1000, " km kilometre kilometer "},
-      {.1, " decimetre dm decimeter "},
+      {.01, " cm centimetre centimeter centimetres centimeters "},
+      {.001, " mm millimetre millimeter millimetres millimeters "},
+      {1000, " km kilometre kilometer kilometres kilometers "},
+      {.1, " dm decimetre decimeter decimetres decimeters "},
       {kFoot, " ft foot feet internationalfoot "},
       {kSurveyFoot, " ussurveyfoot footussurvey ftus usft ussurveyfeet footus surveyfoot feetus usfeet usfoot "},
       {3 * kFoot, " yard yards "},
@@ -195,15 +196,12 @@ Result<void> VisitSamples(GDALRasterBand& band, const SampleRules& rules, int co
   for (int done = 0; done < rows; done += rows_at_once) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading heights was stopped");
     const int count = std::min(rows_at_once, rows - done);
-    ForgetGdalError();
-    CPLErr status = band.RasterIO(GF_Read, col, row + done, cols, count, raw.get(), cols, count, type, 0, 0, nullptr);
-    if (status == CE_None && rules.has_mask) {
+    bool is_read = ReadRaw(band, col, row + done, cols, count, type, raw.get());
+    if (is_read && rules.has_mask) {
       GDALRasterBand* const valid = MaskOf(band);
-      status = valid == nullptr ? CE_Failure
-                                : valid->RasterIO(GF_Read, col, row + done, cols, count, mask.data(), cols, count,
-                                                  GDT_Byte, 0, 0, nullptr);
+      is_read = valid != nullptr && ReadRaw(*valid, col, row + done, cols, count, GDT_Byte, mask.data());
     }
-    if (status != CE_None) {
+    if (!is_read) {
       return MakeError(ErrorCode::kUnavailable, "rows {}..{} cannot be read ({})", row + done, row + done + count - 1,
                        TakeGdalError());
     }

@@ -104,7 +104,8 @@ class Checker {
     }
     std::error_code error;
     const fs::path real = fs::canonical(part, error);
-    if (error) return fail(fmt::format("{}: is no file on this machine", part.string()));
+    if (error)
+      return fail(fmt::format("{}: is no file on this machine; copy it there, or make the VRT anew", part.string()));
     if (!HasDataRoots() && !IsInside(real, top_)) {
       return fail(fmt::format("{}: lies outside of the VRT's folder; name that folder in data_roots", part.string()));
     }

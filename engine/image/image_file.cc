@@ -2,13 +2,26 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <utility>
 
 #include "engine/common/dem_types.h"
+#include "engine/core/parse_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
 
 namespace terrace::dem {
+namespace {
+
+// The value of a band's brightest pixels. Files may state that samples have fewer bits than their type.
+std::uint32_t LargestLevel(GDALRasterBand& band) {
+  const int all = band.GetRasterDataType() == GDT_Byte ? 8 : 16;
+  const char* const stated = band.GetMetadataItem("NBITS", "IMAGE_STRUCTURE");
+  const int bits = stated == nullptr ? all : ParseNumber<int>(stated).value_or(all);
+  return (std::uint32_t{1} << (bits >= 1 && bits <= all ? bits : all)) - 1;
+}
+
+}  // namespace
 
 Result<ImageFile> ImageFile::Open(const std::string& path, int overview) {
   auto dataset = OpenRaster(path, overview);
@@ -77,7 +90,6 @@ void ImageFile::FindMasks() {
 }
 
 Result<void> ImageFile::Read(int col, int row, int cols, int rows, Rgba* out) {
-  ForgetGdalError();
   const std::size_t pixels = Area(cols, rows);
   levels_.resize(pixels);
   bool is_read = ReadMasks(col, row, cols, rows, out);
@@ -94,9 +106,7 @@ Result<void> ImageFile::Read(int col, int row, int cols, int rows, Rgba* out) {
 // Reads into levels_, then copies to the pixels.
 bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, Rgba* out) {
   GDALRasterBand& band = *bands_[static_cast<std::size_t>(i)];
-  if (band.RasterIO(GF_Read, col, row, cols, rows, levels_.data(), cols, rows, GDT_UInt16, 0, 0, nullptr) != CE_None) {
-    return false;
-  }
+  if (!ReadRaw(band, col, row, cols, rows, GDT_UInt16, levels_.data())) return false;
   if (!palette_.empty()) {
     for (std::size_t k = 0; k < levels_.size(); ++k) {
       const bool is_there = out[k][3] != 0 && levels_[k] < palette_.size();
@@ -105,9 +115,10 @@ bool ImageFile::ReadBand(int i, int col, int row, int cols, int rows, Rgba* out)
     }
     return true;
   }
-  const bool is_wide = band.GetRasterDataType() != GDT_Byte, is_grey = bands_[0] == bands_[1];
+  const bool is_grey = bands_[0] == bands_[1];
+  const std::uint32_t largest = LargestLevel(band);
   for (std::size_t k = 0; k < levels_.size(); ++k) {
-    const auto level = static_cast<std::uint8_t>(is_wide ? (levels_[k] + 128) / 257 : levels_[k]);  // 65535 = 255 * 257
+    const auto level = static_cast<std::uint8_t>(std::min((levels_[k] * 255 + largest / 2) / largest, 255U));
     if (is_grey) {
       out[k] = {level, level, level, out[k][3]};
     } else {
@@ -121,10 +132,7 @@ bool ImageFile::ReadMasks(int col, int row, int cols, int rows, Rgba* out) {
   const std::uint8_t without_masks = masks_.empty() ? 255 : 0;
   std::fill(out, out + levels_.size(), Rgba{0, 0, 0, without_masks});
   for (GDALRasterBand* const mask : masks_) {
-    if (mask->RasterIO(GF_Read, col, row, cols, rows, levels_.data(), cols, rows, GDT_UInt16, 0, 0, nullptr) !=
-        CE_None) {
-      return false;
-    }
+    if (!ReadRaw(*mask, col, row, cols, rows, GDT_UInt16, levels_.data())) return false;
     for (std::size_t k = 0; k < levels_.size(); ++k) {
       if (levels_[k] != 0) out[k][3] = 255;
     }

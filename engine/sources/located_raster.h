@@ -5,6 +5,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "engine/core/result.h"
 #include "engine/crs/georeference.h"
@@ -18,6 +19,7 @@ struct LocatedRaster {
   StampedFiles files;
   Georeference georeference;
   SourceSpacing spacing;
+  std::vector<std::string> warnings;  // of GDAL, when it opened the dataset
 };
 
 // `before`: the stamp of `path` before the dataset was opened. `bands`: in so many bands, from the first on, every

@@ -16,6 +16,7 @@
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
 #include "engine/sources/located_raster.h"
+#include "engine/sources/raster_warnings.h"
 
 namespace terrace::dem {
 namespace {
@@ -69,10 +70,15 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, RasterLayout& layout) 
 
 // The same, based on the statistics of the raster and its overviews.
 std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics& statistics, RasterLayout& layout) {
-  if (layout.overview_factors.empty() || statistics.voids == 0) return {};
+  if (layout.overview_factors.empty()) return {};
+  if (statistics.voids == 0 && !statistics.has_stray_overviews) return {};
   const auto declared = DeclaredNodata(HeightBand(dataset));
   std::string why;
-  if (layout.rules.nodata && !declared && !layout.rules.has_mask) {
+  if (statistics.voids == 0) {
+    why =
+        "they have heights that the raster has not there, as if it was changed after they were made; make them anew "
+        "with `gdaladdo -clean file` and `gdaladdo -r average file`";
+  } else if (layout.rules.nodata && !declared && !layout.rules.has_mask) {
     why =
         "they were made of voids too, which are not declared; declare them in a copy with "
         "`gdal_translate -a_nodata -32768 in out` and make its overviews";
@@ -140,13 +146,10 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   if (!info.overviews_unused.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path, "its overviews are not used: {}", info.overviews_unused);
   }
-  // One more column is allowed, for grids with nodes at -180 and at 180 degrees.
-  if (const int beyond = layout.width - layout.columns; beyond > 1) {
-    LogSource(
-        SourceLog::Level::kWarn, info.path,
-        "reaches more than once around the Earth: its last {} columns are taken for duplicates of its first and are "
-        "not read",
-        beyond);
+  for (const std::string& warning : info.warnings) {
+    // Warnings that differ in numbers and names are of one kind.
+    const std::string kind = warning.substr(0, warning.find_first_of("0123456789\"("));
+    SourceLog::Write(SourceLog::Level::kWarn, kind, info.path, warning);
   }
   if (!info.picture_part.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path,
@@ -160,27 +163,11 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
   }
 }
 
-void LogVertical(const std::string& path, const VerticalDatum& vertical, const std::string& unit) {
-  if (!vertical.is_known()) {
-    LogSource(
-        SourceLog::Level::kWarn, path,
-        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
-        "sea level, set `vertical`, as in --vertical egm96");
-  } else if (vertical.geoid) {
-    LogSource(SourceLog::Level::kInfo, path,
-              "heights are above {}, converted to the ellipsoid by PROJ operation \"{}\"", vertical.name,
-              vertical.geoid->description());
-    LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
-    // Some programs write feet in places that GDAL does not read.
-    const auto stated = MetresPerUnit(unit), counted = MetresPerUnit(vertical.geoid->unit());
-    if (!unit.empty() && !vertical.geoid->unit().empty() && stated && counted && *stated != *counted) {
-      LogSource(SourceLog::Level::kWarn, path,
-                "the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is what "
-                "they "
-                "are, say so with `gdal_edit.py -units \"{}\" file`",
-                unit, vertical.name, vertical.geoid->unit(), vertical.geoid->unit());
-    }
-  }
+void LogVertical(const std::string& path, const VerticalDatum& vertical) {
+  if (!vertical.geoid) return;
+  LogSource(SourceLog::Level::kInfo, path, "heights are above {}, converted to the ellipsoid by PROJ operation \"{}\"",
+            vertical.name, vertical.geoid->description());
+  LogSource(SourceLog::Level::kDebug, path, "{}", vertical.geoid->pipeline());
 }
 
 constexpr const char* kGone = "a file is gone or cannot be read";
@@ -221,7 +208,14 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->FillInfo(dataset, path, *prepared);
   source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.seconds_to_open = SecondsSince(start);
-  source->LogOpened(dataset, prepared->statistics.rim_voids.is_everything());
+  source->info_.warnings = std::move(located->warnings);
+  std::ranges::move(WarningsOf(dataset, source->georeference_, source->vertical_, options.vertical, source->layout_),
+                    std::back_inserter(source->info_.warnings));
+  if (prepared->statistics.rim_voids.is_everything()) {
+    source->info_.warnings.push_back(
+        "its voids are too ragged to tell holes from collars around the data: none of them is smoothed over");
+  }
+  source->LogOpened(dataset);
   if (auto unchanged = source->CheckUnchanged(); !unchanged) return tl::unexpected(unchanged.error());
   source->KeepStatistics(*std::move(prepared), prepare, std::move(pages));
   return source;
@@ -282,16 +276,12 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   info_.hole_samples = statistics.hole_samples;
 }
 
-void RasterSource::LogOpened(GDALDataset& dataset, bool has_ragged_voids) const {
+void RasterSource::LogOpened(GDALDataset& dataset) const {
   LogWhatMatters(dataset, info_, georeference_, layout_);
-  LogVertical(info_.path, vertical_, layout_.rules.unit);
+  LogVertical(info_.path, vertical_);
   if (!info_.found_voids.empty()) {
     LogSource(SourceLog::Level::kWarn, info_.path,
               "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", info_.found_voids);
-  }
-  if (has_ragged_voids) {
-    LogSource(SourceLog::Level::kWarn, info_.path,
-              "its voids are too ragged to tell holes from collars around the data: none of them is smoothed over");
   }
 }
 

@@ -122,7 +122,7 @@ class RasterSource {
   Result<PreparedRaster> Prepare(GDALDataset& dataset, const std::string& path, const PrepareOptions& options,
                                  std::string& overviews_unused);
   void FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared);
-  void LogOpened(GDALDataset& dataset, bool has_ragged_voids) const;
+  void LogOpened(GDALDataset& dataset) const;
   void KeepStatistics(PreparedRaster prepared, const PrepareOptions& prepare, std::shared_ptr<StatisticsPages> pages);
   Result<RasterStatistics> ReadStatistics() const;
   void LoseCache(const Error& error) const;

@@ -313,13 +313,9 @@ Result<void> StatisticsAssembler::FinishCoarse(GDALDataset& dataset, const std::
 }
 
 Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::stop_token& stop) {
-  // Overviews of a raster without voids are used in any case (RasterSource).
-  const bool is_compared = !layout_.overview_factors.empty() && statistics_.voids > 0;
-  RangeTable samples(layout_.width, layout_.height);
-  if (is_compared) {
-    samples = statistics_.table;
-    samples.Finish();
-  }
+  if (layout_.overview_factors.empty()) return {};
+  RangeTable samples = statistics_.table;
+  samples.Finish();
   for (const int factor : layout_.overview_factors) {
     RangeTable overview(layout_.width, layout_.height);
     content_.Add(factor);
@@ -331,10 +327,10 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
         if (!heights) return tl::unexpected(heights.error());
         content_.AddBytes(heights->data(), heights->size() * sizeof(float));
         statistics_.table.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
-        if (is_compared) overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
+        overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
       }
     }
-    statistics_.has_stray_overviews |= is_compared && IsStray(overview, samples, layout_, factor);
+    statistics_.has_stray_overviews |= IsStray(overview, samples, layout_, factor);
   }
   return {};
 }
@@ -347,8 +343,11 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
         ErrorCode::kNotFound,
         "has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
         "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
-        "need `-a_scale FACTOR`, the metres of one{}",
+        "need `-a_scale FACTOR`, the metres of one{}{}",
         PlainNumber(kMaxAbsHeight),
+        MetresPerUnit(layout_.rules.unit)
+            ? ""
+            : fmt::format("; the file's unit \"{}\" is not known, and counts as metres", layout_.rules.unit),
         layout_.rules.extra_nodata.empty() && layout_.rules.void_margin <= 0
             ? ""
             : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "

@@ -69,7 +69,7 @@ Result<void> SetCrs(const std::optional<std::string>& text, dem::GridRequest& gr
   std::string_view code = *text;
   const bool is_epsg = code.size() > 5 && EqualsIgnoringCase(code.substr(0, 5), "EPSG:");
   const auto number = is_epsg ? PlainDecimal(code.substr(5), /*max_digits=*/6) : std::nullopt;
-  if (!number) return InvalidGrid("crs must be EPSG: and a number, such as EPSG:32611");
+  if (!number) return InvalidGrid("crs must be EPSG: and a number of at most six digits, such as EPSG:32611");
   grid.epsg = static_cast<int>(*number);
   return {};
 }

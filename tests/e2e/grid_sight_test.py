@@ -191,7 +191,7 @@ class GridsAndSight(unittest.TestCase):
                 ("bbox=7,46,8,47&width=1000000000&height=1000000000", "more than max_mesh_samples"),
                 ("bbox=7,46,8,47&spacing=1e-9", "more than max_mesh_samples"),
                 ("bbox=7,46,8,47&width=9&height=9&crs=EPSG:99999", "PROJ knows no EPSG:99999"),
-                ("bbox=7,46,8,47&width=9&height=9&crs=EPSG:5773", "no easting and northing"),
+                ("bbox=7,46,8,47&width=9&height=9&crs=EPSG:5773", "is no system of two axes"),
                 ("bbox=5e8,0,6e8,1e6&width=9&height=9&crs=EPSG:32632", "no place on Earth"),
                 ("bbox=7,47,8,46&width=9&height=9", "bbox is empty"),
                 ("bbox=7,46,8,97&width=9&height=9", "latitudes")):

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -57,11 +58,6 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   } else if (!info.overviews_unused.empty()) {
     advice.push_back("overviews not used: " + info.overviews_unused);
   }
-  if (info.datum_in_use.empty()) {
-    advice.push_back(
-        "no vertical datum stated: heights are taken as metres above the WGS 84 ellipsoid; if they are above mean "
-        "sea level, add --vertical egm96 or another datum; otherwise they are off by up to 100 m");
-  }
   if (!info.knows_height_unit) {
     advice.push_back(
         fmt::format("height unit \"{}\" is not known, heights are taken as metres: state metres a unit with "
@@ -69,6 +65,7 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
                     info.height_unit));
   }
   if (!info.heights_doubted.empty()) advice.push_back(info.heights_doubted);
+  std::ranges::copy(info.warnings, std::back_inserter(advice));
   if (!info.wide_blocks.empty()) advice.push_back(info.wide_blocks);
   if (info.driver == "VRT") {
     advice.push_back(

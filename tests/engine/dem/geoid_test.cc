@@ -124,6 +124,9 @@ TEST(Geoid, RefusesGridFilesWithTheReason) {
   EXPECT_NE(Geoid::OfGrid(dir.File("text.gtx"), {8, 46}).error().message.find("cannot read"), std::string::npos);
   std::ofstream(dir.File("a,b.gtx")) << "x";
   EXPECT_NE(Geoid::OfGrid(dir.File("a,b.gtx"), {8, 46}).error().message.find("rename"), std::string::npos);
+  const std::string heights = WriteGtx(dir, "heights.gtx", {.value = [](int, int) { return 467.0f; }});
+  const std::string message = Geoid::OfGrid(heights, {8, 46}).error().message;
+  EXPECT_NE(message.find("is 467 m; undulations are"), std::string::npos) << message;
 }
 
 }  // namespace

@@ -338,6 +338,26 @@ TEST(Overviews, MadeOfVoidsAreNotUsed) {
   }
 }
 
+// Programs that write samples do not write the overviews anew.
+TEST(Overviews, OlderThanTheSamplesAreNotUsed) {
+  const TempDir dir;
+  const std::string path = WriteRaster(dir, RampSpec(200, 150));
+  EXPECT_EQ(OpenRasterOrFail(path)->info().overviews_unused, "");
+  {
+    const GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str(), GDAL_OF_UPDATE));
+    ASSERT_NE(file, nullptr);
+    std::vector<float> heights;
+    for (int i = 0; i < 200 * 150; ++i) heights.push_back(static_cast<float>(Ramp(i % 200, i / 200) + 1500));
+    ASSERT_EQ(file->GetRasterBand(1)->RasterIO(GF_Write, 0, 0, 200, 150, heights.data(), 200, 150, GDT_Float32, 0, 0,
+                                               nullptr),
+              CE_None);
+  }
+  const auto raster = OpenRasterOrFail(path);
+  EXPECT_NE(raster->info().overviews_unused.find("as if it was changed after they were made"), std::string::npos)
+      << raster->info().overviews_unused;
+  EXPECT_TRUE(raster->info().overview_factors.empty());
+}
+
 // Kernels with negative weights exceed the range of heights beside cliffs. It does not mean that voids were averaged.
 TEST(Overviews, OfCliffsByKernelsThatOvershootAreUsed) {
   for (const char* resampling : {"AVERAGE", "CUBIC", "LANCZOS"}) {

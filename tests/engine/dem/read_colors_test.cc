@@ -21,6 +21,7 @@ struct ColorSpec {
   std::optional<double> nodata = {};
   bool has_alpha = false;  // the last band
   bool has_palette = false;
+  const char* bits = nullptr;  // "12": so many of a sample are used
   // Raw value of column, row and band, counted from 0.
   std::function<int(int, int, int)> value = [](int, int, int) { return 0; };
 };
@@ -31,7 +32,10 @@ std::string WriteColors(const TempDir& dir, ColorSpec spec, const std::string& n
   GDALAllRegister();
   const std::string path = dir.File(name);
   GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("GTiff");
-  GDALDatasetUniquePtr dataset(driver->Create(path.c_str(), spec.width, spec.height, spec.bands, spec.type, nullptr));
+  CPLStringList options;
+  if (spec.bits != nullptr) options.SetNameValue("NBITS", spec.bits);
+  GDALDatasetUniquePtr dataset(
+      driver->Create(path.c_str(), spec.width, spec.height, spec.bands, spec.type, options.List()));
   if (spec.georeferenced) dataset->SetGeoTransform(spec.geo_transform.data());
   if (!spec.crs.empty()) {
     OGRSpatialReference srs;
@@ -214,6 +218,9 @@ TEST(ReadImage, KnowsEveryKindOfBands) {
   EXPECT_EQ(pixel({.bands = 1, .nodata = 2, .has_palette = true, .value = index}, 2, 0)[3], 0);
   EXPECT_EQ(pixel({.bands = 3, .type = GDT_UInt16, .value = [](int, int, int band) { return band * 32767; }}, 0, 0),
             (Rgba{0, 127, 255, 255}));
+  const ColorSpec wide{
+      .type = GDT_UInt16, .bits = "12", .value = [](int, int, int band) { return (4096 * band - band) / 2; }};
+  EXPECT_EQ(pixel(wide, 0, 0), (Rgba{0, 127, 255, 255}));
   // A nodata value in one band is a dark colour; in all bands it is no colour.
   EXPECT_EQ(pixel({.nodata = 0, .value = [](int, int, int band) { return band; }}, 0, 0), (Rgba{0, 1, 2, 255}));
   EXPECT_EQ(pixel({.nodata = 0}, 0, 0)[3], 0);

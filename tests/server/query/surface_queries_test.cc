@@ -187,9 +187,9 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   request.epsg = 99999;
   ExpectSays(dem::PlanOutputGrid(request, 100), "PROJ knows no EPSG:99999");
   request.epsg = 5773;  // EGM96 heights
-  ExpectSays(dem::PlanOutputGrid(request, 100), "has no easting and northing");
+  ExpectSays(dem::PlanOutputGrid(request, 100), "is no system of two axes");
   request.epsg = 4978;  // geocentric
-  ExpectSays(dem::PlanOutputGrid(request, 100), "has no easting and northing");
+  ExpectSays(dem::PlanOutputGrid(request, 100), "is no system of two axes");
   // Half a million kilometres east of zone 11.
   const auto far = dem::PlanOutputGrid({32611, 5e8, 0, 6e8, 1e6, 10, 10, {}}, 100);
   ASSERT_TRUE(far) << far.error().message;

@@ -1,0 +1,93 @@
+#include "engine/sources/raster_warnings.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "engine/core/plain_number.h"
+#include "engine/crs/geoid.h"
+#include "engine/gdal/sample_rules.h"
+
+namespace terrace::dem {
+namespace {
+
+// The latitude beyond a pole, farther than a pixel, that the rows of a geographic raster reach; 0: none.
+double BeyondPole(const Georeference& georeference) {
+  if (!georeference.is_geographic_grid()) return 0;
+  std::array<Position, 2> ends{{{0, 0}, {0, static_cast<double>(georeference.height())}}};
+  georeference.ToDegrees(ends);
+  const double latitude = std::abs(ends[0].y) > std::abs(ends[1].y) ? ends[0].y : ends[1].y;
+  const double pixel = std::abs(ends[1].y - ends[0].y) / georeference.height();
+  return std::abs(latitude) > 90 + pixel ? latitude : 0;
+}
+
+void WarnOfPosition(const Georeference& georeference, const RasterLayout& layout, std::vector<std::string>& warnings) {
+  // One more column is allowed, for grids with nodes at -180 and at 180 degrees.
+  if (const int beyond = layout.width - layout.columns; beyond > 1) {
+    warnings.push_back(fmt::format(
+        "reaches more than once around the Earth: its last {} columns are taken for duplicates of its first "
+        "and are not read",
+        beyond));
+  }
+  if (const double latitude = BeyondPole(georeference); latitude != 0) {
+    warnings.push_back(
+        fmt::format("reaches beyond a pole, to latitude {}: rows beyond it are not read; if the georeference is wrong, "
+                    "correct it with `gdal_translate -a_ullr west north east south in out`",
+                    PlainNumber(latitude)));
+  }
+  constexpr double kSmallestPixel = 0.05;  // metres or feet; of degrees, five kilometres
+  if (!georeference.is_geographic() && georeference.MayBeInDegrees() &&
+      std::max(georeference.pixel_width(), georeference.pixel_height()) < kSmallestPixel) {
+    warnings.push_back(
+        fmt::format("has pixels of {} {} near the origin of {}: if its coordinates are degrees, state that with "
+                    "`gdal_translate -a_srs EPSG:4326 in out`",
+                    PlainNumber(georeference.pixel_width()), georeference.pixel_unit(), georeference.crs()));
+  }
+}
+
+void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const VerticalDatum& vertical,
+                 const std::string& wanted_vertical, const RasterLayout& layout, std::vector<std::string>& warnings) {
+  if (!vertical.is_known()) {
+    const char* const dted = dataset.GetMetadataItem("DTED_VerticalDatum");  // also in files made of DTED
+    warnings.push_back(
+        fmt::format("no vertical datum stated{}: heights are taken as metres above the WGS 84 ellipsoid; if they are "
+                    "above mean sea level, set `vertical`, as in --vertical egm96; otherwise they are off by up to 100 "
+                    "m",
+                    dted == nullptr || *dted == '\0'
+                        ? ""
+                        : fmt::format(" but by its DTED header ({}; E96 and MSL are mean sea level)", dted)));
+  }
+  if (wanted_vertical != "crs" && !georeference.vertical_crs().empty()) {
+    if (const auto depths = NameOfDepths(georeference.vertical_crs())) {
+      warnings.push_back(
+          fmt::format("its reference system has depths ({}), but `vertical` takes its samples for heights; if they are "
+                      "not negated yet, negate them with `gdal_calc.py -A in --outfile=out --calc=-A`",
+                      *depths));
+    }
+  }
+  if (!vertical.geoid) return;
+  // Some programs write feet in places that GDAL does not read.
+  const std::string &unit = layout.rules.unit, &counted = vertical.geoid->unit();
+  const auto metres = MetresPerUnit(unit), counted_metres = MetresPerUnit(counted);
+  if (!unit.empty() && !counted.empty() && metres && counted_metres && *metres != *counted_metres) {
+    warnings.push_back(
+        fmt::format("the file states heights in \"{}\", and they are taken for that; {} counts in \"{}\": if that is "
+                    "what they are, say so with `gdal_edit.py -units \"{}\" file`",
+                    unit, vertical.name, counted, counted));
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> WarningsOf(GDALDataset& dataset, const Georeference& georeference,
+                                    const VerticalDatum& vertical, const std::string& wanted_vertical,
+                                    const RasterLayout& layout) {
+  std::vector<std::string> warnings;
+  WarnOfPosition(georeference, layout, warnings);
+  WarnOfDatum(dataset, georeference, vertical, wanted_vertical, layout, warnings);
+  return warnings;
+}
+
+}  // namespace terrace::dem

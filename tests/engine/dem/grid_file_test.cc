@@ -1,0 +1,29 @@
+#include <cpl_string.h>
+#include <cpl_vsi.h>
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "engine/export/output_grid.h"
+
+namespace terrace::dem {
+namespace {
+
+// GDAL writes such a system beside the file, where a reply has no place for it.
+TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
+  const GridRequest equal_earth{
+      .epsg = 8857, .west = 1e6, .south = 5e6, .east = 1.2e6, .north = 5.2e6, .columns = 2, .rows = 2};
+  const auto plan = PlanOutputGrid(equal_earth, 100);
+  ASSERT_TRUE(plan) << plan.error().message;
+  const std::vector<float> heights(4, 1.0F);
+  const auto file = WriteGeoTiff(*plan, heights);
+  ASSERT_FALSE(file);
+  EXPECT_EQ(file.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(file.error().message.find("cannot state EPSG:8857"), std::string::npos) << file.error().message;
+  char** const left = VSIReadDir("/vsimem/");
+  EXPECT_EQ(CSLCount(left), 0);
+  CSLDestroy(left);
+}
+
+}  // namespace
+}  // namespace terrace::dem
