@@ -44,7 +44,8 @@ TEST(OpenErrors, OfferGeoreferencing) {
                 {"no georeference", "gdal_translate -a_srs EPSG:XXXX -a_ullr west north east south in out"});
   ExpectRefused(WriteRaster(dir, {.geo_transform = {7, .1, 0, 47, 0, -.1}, .crs = ""}),
                 {"no coordinate reference system", "gdal_translate -a_srs EPSG:XXXX in out", "XXXX is 4326"});
-  ExpectRefused(WriteRaster(dir, {.crs = "LOCAL_CS[\"site grid\",UNIT[\"metre\",1]]"}), {"neither longitudes and latitudes nor eastings and northings"});
+  ExpectRefused(WriteRaster(dir, {.crs = "LOCAL_CS[\"site grid\",UNIT[\"metre\",1]]"}),
+                {"neither longitudes and latitudes nor eastings and northings"});
 }
 
 TEST(OpenErrors, AreNotAboutSidecarsOfAFolder) {
