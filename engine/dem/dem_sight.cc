@@ -52,7 +52,7 @@ Result<std::vector<SightAnswer>> ElevationModel::LookAlong(std::span<const Sight
           ErrorCode::kInvalidArgument,
           "ray {}: the dataset's edits change the ground below it, which lines of sight over the sources do "
           "not see; ask for surface=served",
-          i);
+          i + 1);
     }
     const std::vector<std::size_t> order =
         impl_->grids.size() == 1 ? std::vector<std::size_t>{0} : impl_->GridsAt(BoxAround(pieces));

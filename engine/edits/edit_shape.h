@@ -24,6 +24,8 @@ class EditRow {
   EditRow(const Edit& edit, double y, double margin_m = 0);
   EditPlace At(double x) const;
   double y() const { return y_; }
+  // Where the row enters and leaves polygons, in turns, ascending.
+  const std::vector<double>& crossings() const { return crossings_; }
 
  private:
   struct Edge {
@@ -33,8 +35,8 @@ class EditRow {
   };
   const Edit& edit_;
   double y_, margin_m_, reach_m_;
-  std::vector<double> crossings_;  // of rings, ascending
-  std::vector<Edge> edges_;        // within reach of the row
+  std::vector<double> crossings_;
+  std::vector<Edge> edges_;  // within reach of the row
 };
 
 // The height that the edit aims at. Precondition: flatten, slope, carve or raise.

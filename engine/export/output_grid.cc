@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "engine/core/plain_number.h"
 #include "engine/crs/projector.h"
@@ -15,11 +16,17 @@ namespace {
 
 // A position that comes back farther away than this has no inverse. In units of a projected CRS, or 10^-5 degrees.
 constexpr double kReturn = 1;
-// Nodes between two that are transformed back.
-constexpr std::size_t kCheckPeriod = 61;
 
 tl::unexpected<Error> Invalid(std::string message) {
   return tl::unexpected(Error{ErrorCode::kInvalidArgument, std::move(message)});
+}
+
+// Around a pole both axes have the same direction.
+bool RunsEastAndNorth(const OGRSpatialReference& srs) {
+  OGRAxisOrientation first = OAO_Other, second = OAO_Other;
+  srs.GetAxis(nullptr, 0, &first);
+  srs.GetAxis(nullptr, 1, &second);
+  return first == second || (first != OAO_West && first != OAO_South && second != OAO_West && second != OAO_South);
 }
 
 Result<void> SetCrs(int epsg, OutputGrid& grid) {
@@ -32,10 +39,18 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
     return Invalid(
         fmt::format("crs: EPSG:{} is no system of two axes, eastings and northings or longitudes and latitudes", epsg));
   }
+  if (!RunsEastAndNorth(srs)) {
+    return Invalid(
+        fmt::format("crs: the axes of EPSG:{} run west or south; choose a system of eastings and northings", epsg));
+  }
   grid.is_geographic = srs.IsGeographic() != 0;
   const char* unit = nullptr;
   if (grid.is_geographic) {
-    srs.GetAngularUnits(&unit);
+    constexpr double kDegree = std::numbers::pi / 180;
+    if (std::abs(srs.GetAngularUnits(&unit) - kDegree) > 1e-9) {
+      return Invalid(fmt::format("crs: EPSG:{} counts in {}; choose a system in degrees or metres", epsg,
+                                 unit != nullptr ? unit : "an unknown unit"));
+    }
   } else {
     srs.GetLinearUnits(&unit);
   }
@@ -107,24 +122,24 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
   if (grid.epsg != kWgs84) {
     const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
     if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
-    std::vector<Position> kept, back;
-    for (std::size_t i = 0; i < nodes.size(); i += kCheckPeriod) kept.push_back(nodes[i]);
+    const std::vector<Position> wanted = nodes;
+    std::vector<Position> back;
+    back.reserve(nodes.size());
     constexpr std::size_t kBatch = 4096;
     for (std::size_t done = 0; done < nodes.size(); done += kBatch) {
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "placing a grid was stopped");
-      (*projector)->Inverse(std::span(nodes).subspan(done, std::min(kBatch, nodes.size() - done)));
+      const auto batch = std::span(nodes).subspan(done, std::min(kBatch, nodes.size() - done));
+      (*projector)->Inverse(batch);
+      back.insert(back.end(), batch.begin(), batch.end());
+      (*projector)->Forward(std::span(back).subspan(done));
     }
-    for (std::size_t i = 0; i < nodes.size(); i += kCheckPeriod) back.push_back(nodes[i]);
-    (*projector)->Forward(back);
     const double farthest = grid.is_geographic ? kReturn * 1e-5 : kReturn;
     const auto is_back = [&](std::size_t i) {
-      const double off_x = back[i].x - kept[i].x;
-      return std::hypot(grid.is_geographic ? std::remainder(off_x, 360) : off_x, back[i].y - kept[i].y) <= farthest;
+      const double off_x = back[i].x - wanted[i].x;
+      return std::hypot(grid.is_geographic ? std::remainder(off_x, 360) : off_x, back[i].y - wanted[i].y) <= farthest;
     };
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-      const bool is_place =
-          !std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 && (i % kCheckPeriod != 0 || is_back(i / kCheckPeriod));
-      if (is_place) continue;
+      if (!std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 && is_back(i)) continue;
       return Invalid(
           fmt::format("bbox: EPSG:{} has no place on Earth for column {}, row {} of the grid; choose a bbox "
                       "within the area that the CRS is made for",

@@ -26,6 +26,16 @@ double StepBetween(const Position& first, const Position& last) {
   return IsKnown(first) ? std::max(std::abs(last.x - first.x), std::abs(last.y - first.y)) : 0;
 }
 
+TrackPiece PartOf(const TrackPiece& piece, double first, double last) {
+  const double length = piece.end - piece.start;
+  return {.start = piece.start + first * length,
+          .end = last == 1 ? piece.end : piece.start + last * length,
+          .length_m = (last - first) * piece.length_m,
+          .longitude = piece.longitude.Part(first, last),
+          .latitude = piece.latitude.Part(first, last),
+          .height_m = piece.height_m.Part(first, last)};
+}
+
 // A ray on a grid, piece by piece.
 class GridTrack {
  public:
@@ -101,43 +111,70 @@ class GridTrack {
     if (after.start < after.end) Divide(after, {found->to, At(after, 0.5), p[2]}, divisions - 1);
   }
 
-  static TrackPiece PartOf(const TrackPiece& piece, double first, double last) {
-    const double length = piece.end - piece.start;
-    return {.start = piece.start + first * length,
-            .end = last == 1 ? piece.end : piece.start + last * length,
-            .length_m = (last - first) * piece.length_m,
-            .longitude = piece.longitude.Part(first, last),
-            .latitude = piece.latitude.Part(first, last),
-            .height_m = piece.height_m.Part(first, last)};
-  }
-
   const Georeference& georeference_;
   double last_x_ = std::numeric_limits<double>::quiet_NaN();  // the last known one
   std::vector<PieceOnGrid> pieces_;
 };
 
+// The distance of a part of a chord from the axis of the Earth, metres.
+double DistanceFromAxis(const geo::Vec3& from, const geo::Vec3& to) {
+  const double x = to.x - from.x, y = to.y - from.y, square = x * x + y * y;
+  const double nearest = square > 0 ? std::clamp(-(from.x * x + from.y * y) / square, 0.0, 1.0) : 0;
+  return std::hypot(from.x + nearest * x, from.y + nearest * y);
+}
+
+// The longest piece at this distance from the axis. Longitudes along a chord at distance r have a third derivative of
+// at most 2 / r^3, so a polynomial of the second degree through three of them is at most h^3 / 62 r^2 metres off over h
+// metres. Within two metres of a pole, pieces do not become shorter.
+double LongestPiece(double from_axis_m) {
+  constexpr double kMaxError = 1e-3, kMinLength = 0.5;  // metres
+  return std::clamp(std::cbrt(62 * kMaxError * from_axis_m * from_axis_m), kMinLength, TrackPiece::kMaxLength);
+}
+
+// Adds the pieces of a part of a ray, in order.
+void AddPieces(const RayCourse& course, double start, double end, std::vector<TrackPiece>& pieces) {
+  const geo::Vec3 from = course.start() + course.way() * start, to = course.start() + course.way() * end;
+  const double length_m = course.length_m() * (end - start);
+  if (length_m > LongestPiece(DistanceFromAxis(from, to))) {
+    const double middle = (start + end) / 2;
+    AddPieces(course, start, middle, pieces);
+    AddPieces(course, middle, end, pieces);
+    return;
+  }
+  const SightPoint first = course.At(start);
+  SightPoint middle = course.At((start + end) / 2), last = course.At(end);
+  const double before = pieces.empty() ? first.longitude : pieces.back().longitude.At(1);
+  const double longitude = Near(first.longitude, before, 360);
+  middle.longitude = Near(middle.longitude, longitude, 360);
+  last.longitude = Near(last.longitude, middle.longitude, 360);
+  const TrackPiece piece{.start = start,
+                         .end = end,
+                         .length_m = length_m,
+                         .longitude = {longitude, middle.longitude, last.longitude},
+                         .latitude = {first.latitude, middle.latitude, last.latitude},
+                         .height_m = {first.height_m, middle.height_m, last.height_m}};
+  if (std::abs(last.longitude - longitude) < 90) {
+    pieces.push_back(piece);
+    return;
+  }
+  // Half a metre at a pole: the ray changes from one meridian to another, and does not cross those between them.
+  TrackPiece before_pole = PartOf(piece, 0, 0.5), behind_pole = PartOf(piece, 0.5, 1);
+  before_pole.longitude = {longitude, longitude, longitude};
+  behind_pole.longitude = {last.longitude, last.longitude, last.longitude};
+  pieces.push_back(before_pole);
+  pieces.push_back(behind_pole);
+}
+
 }  // namespace
 
 std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& options) {
   const RayCourse course(ray, options);
-  // Meridians converge towards a pole, and columns are not a smooth function of the distance any more.
-  const double latitude = std::max(std::abs(ray.from.latitude), std::abs(ray.to.latitude));
-  const double longest_m = TrackPiece::kMaxLength * std::clamp(2 * std::cos(geo::ToRadians(latitude)), 0.01, 1.0);
-  const int count = std::max(1, static_cast<int>(std::ceil(course.length_m() / longest_m)));
-  std::vector<TrackPiece> pieces(static_cast<std::size_t>(count));
-  SightPoint first = course.At(0);
+  // The air's rise of a ray changes its height alone.
+  const int count = std::max(1, static_cast<int>(std::ceil(course.length_m() / TrackPiece::kMaxLength)));
+  std::vector<TrackPiece> pieces;
+  pieces.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i) {
-    TrackPiece& piece = pieces[static_cast<std::size_t>(i)];
-    piece.start = static_cast<double>(i) / count;
-    piece.end = static_cast<double>(i + 1) / count;
-    piece.length_m = course.length_m() / count;
-    SightPoint middle = course.At((piece.start + piece.end) / 2), last = course.At(piece.end);
-    middle.longitude = Near(middle.longitude, first.longitude, 360);
-    last.longitude = Near(last.longitude, middle.longitude, 360);
-    piece.longitude = {first.longitude, middle.longitude, last.longitude};
-    piece.latitude = {first.latitude, middle.latitude, last.latitude};
-    piece.height_m = {first.height_m, middle.height_m, last.height_m};
-    first = last;
+    AddPieces(course, static_cast<double>(i) / count, static_cast<double>(i + 1) / count, pieces);
   }
   return pieces;
 }

@@ -10,7 +10,8 @@
 
 namespace terrace::dem {
 
-// At most kMaxLength of a ray. Within it, positions are within a millimetre of polynomials of the second degree.
+// At most kMaxLength of a ray. Within it, positions are within a millimetre of polynomials of the second degree; within
+// two metres of a pole, within half a metre.
 struct TrackPiece {
   static constexpr double kMaxLength = 8000;  // metres
 

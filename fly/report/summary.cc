@@ -95,12 +95,15 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   const std::vector<Second>& seconds = record.seconds;
   summary.seconds = static_cast<double>(seconds.size());
   std::vector<float> views;
+  bool has_all_arrived = true;  // of those that opened the document
   for (const ClientRecord& client : summary.clients) {
     if (client.document_s < 0) ++summary.never_opened;
     if (client.document_s >= 0 && client.first_view_s < 0) ++summary.never_full;
     if (client.first_view_s >= 0) views.push_back(static_cast<float>(client.first_view_s));
     summary.arrival_s = std::max(summary.arrival_s, client.arrival_s);
+    has_all_arrived &= client.document_s < 0 || client.arrival_s >= 0;
   }
+  if (!has_all_arrived) summary.arrival_s = -1;
   if (!views.empty()) {
     summary.first_view_s = Percentile(views, 0.5);
     summary.worst_first_view_s = Percentile(views, 1);

@@ -17,7 +17,7 @@ struct Summary {
   double seconds = 0;                                 // of the whole run
   int never_opened = 0, never_full = 0;               // clients
   double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
-  double arrival_s = -1;                              // worst
+  double arrival_s = -1;                              // worst; -1: a client that flew never had a full view
   double p50_s = 0, p99_s = 0, max_s = 0;             // of tiles
   double tiles_per_second = 0;                        // mean over the seconds in which tiles arrived
   double best_tiles_per_second = 0;                   // in the best second

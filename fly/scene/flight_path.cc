@@ -168,6 +168,13 @@ Pose FlightPath::PoseAt(double seconds) const {
   return pose;
 }
 
+bool AreOpposite(const GeodeticPoint& from, const GeodeticPoint& to) {
+  constexpr double kNearest = 1e-4;  // radians, 640 m
+  const geo::Vec3 u = geo::SurfaceNormal(from.longitude, from.latitude);
+  const geo::Vec3 v = geo::SurfaceNormal(to.longitude, to.latitude);
+  return geo::Length(u + v) < kNearest;
+}
+
 FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed) {
   FlightPath path;
   const geo::Vec3 u = geo::SurfaceNormal(from.longitude, from.latitude);

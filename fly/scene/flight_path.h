@@ -30,8 +30,11 @@ struct FlightSpeed {
   double pitch = -20;              // degrees, for paths that state none
 };
 
+// Whether two places are within 640 m of being antipodes: then no path between them is the shortest.
+bool AreOpposite(const GeodeticPoint& from, const GeodeticPoint& to);
+
 // The shortest path over the ground, and the heading along it. If both ends are equal, the camera stands still and
-// looks north.
+// looks north. Precondition: the ends are not opposite.
 FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed);
 
 // Around `center` at its height, clockwise from the north; the heading is along the circle. 0 < radius_m < 5,000,000.

@@ -30,6 +30,13 @@ TEST(FlightPath, CrossesTheAntimeridianOnTheShortWay) {
   EXPECT_NEAR(middle, 180, 0.01);
 }
 
+TEST(FlightPath, BetweenOppositePlacesIsNotTheShortest) {
+  EXPECT_TRUE(AreOpposite({0, 0, 5e6}, {180, 0, 5e6}));
+  EXPECT_TRUE(AreOpposite({10, 20, 0}, {-170, -20, 0}));
+  EXPECT_FALSE(AreOpposite({0, 0, 5e6}, {179, 0, 5e6}));
+  EXPECT_FALSE(AreOpposite({7, 46, 3000}, {7, 46, 3000}));
+}
+
 TEST(FlightPath, CirclesAtItsRadius) {
   const FlightPath path = MakeCircle({-156.3, 20.8, 4000}, 20'000, kSpeed);
   EXPECT_NEAR(path.length_m(), 2 * 3.14159265 * 20'000, 50);

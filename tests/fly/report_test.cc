@@ -45,6 +45,21 @@ void Fill(Statistics& statistics) {
   statistics.AddRequest(1, refused);
 }
 
+TEST(Summary, TheWorstArrivalIsThatOfAllClients) {
+  const auto arrival_of = [](const std::vector<double>& arrivals_s) {
+    Statistics statistics(static_cast<int>(arrivals_s.size()));
+    for (std::size_t i = 0; i < arrivals_s.size(); ++i) {
+      ClientRecord client;
+      client.document_s = 0.1;
+      client.arrival_s = arrivals_s[i];
+      statistics.SetClient(static_cast<int>(i), client);
+    }
+    return Summarize(SomeOptions(), statistics.record()).arrival_s;
+  };
+  EXPECT_EQ(arrival_of({0.5, 2}), 2);
+  EXPECT_EQ(arrival_of({0.5, -1}), -1);
+}
+
 TEST(Summary, CountsWhatHappened) {
   Statistics statistics(1);
   Fill(statistics);

@@ -5,6 +5,7 @@
 #include <optional>
 #include <sstream>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -29,22 +30,39 @@ using Clock = std::chrono::steady_clock;
 // Larger distances occur only for triangles that span half of the Earth and collapse into a line.
 constexpr double kMaxSag_m = 1e6;
 
-// The intersection of the area and the model's bounds; of two parts, the wider one. Nothing if it is empty.
-std::optional<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
+// The part of the area within the model's bounds. kInvalidArgument: there is none, or there are two.
+Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
+  AreaRequest clipped = area;
+  clipped.south = std::max(area.south, bounds.south);
+  clipped.north = std::min(area.north, bounds.north);
   const double bounds_east = bounds.east < bounds.west ? bounds.east + 360 : bounds.east;
-  AreaRequest best = area;
-  const bool all_around = bounds_east - bounds.west >= 360;
-  if (!all_around) best.west = best.east = 0;
-  for (const double turn : {-360.0, 0.0, 360.0}) {
-    const double west = std::max(area.west, bounds.west + turn), east = std::min(area.east, bounds_east + turn);
-    if (all_around || east - west <= best.east - best.west) continue;
-    best.west = west;
-    best.east = east;
+  const bool is_dataset_around = bounds_east - bounds.west >= 360, is_area_around = area.east - area.west >= 360;
+  std::vector<std::pair<double, double>> parts;  // west and east
+  if (is_dataset_around) {
+    parts.emplace_back(area.west, area.east);
+  } else if (is_area_around) {
+    parts.emplace_back(bounds.west, bounds_east);
+  } else {
+    for (const double turn : {-360.0, 0.0, 360.0}) {
+      const double west = std::max(area.west, bounds.west + turn), east = std::min(area.east, bounds_east + turn);
+      if (east > west) parts.emplace_back(west, east);
+    }
   }
-  best.south = std::max(area.south, bounds.south);
-  best.north = std::min(area.north, bounds.north);
-  if (best.east <= best.west || best.north <= best.south) return std::nullopt;
-  return best;
+  if (parts.empty() || clipped.north <= clipped.south) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "bbox lies outside the dataset, whose bounds are {:.6f},{:.6f},{:.6f},{:.6f}", bounds.west,
+                     bounds.south, bounds.east, bounds.north);
+  }
+  if (parts.size() > 1) {
+    const auto longitude = [](double degrees) { return PlainNumber(std::remainder(degrees, 360)); };
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "bbox has two parts of the dataset, at longitudes {} to {} and {} to {}; ask for one after the "
+                     "other, or for a bbox that crosses the dataset once",
+                     longitude(parts[0].first), longitude(parts[0].second), longitude(parts[1].first),
+                     longitude(parts[1].second));
+  }
+  std::tie(clipped.west, clipped.east) = parts.front();
+  return clipped;
 }
 
 // The size of a window in 64 bits: levels too fine for meshing have counts beyond int.
@@ -203,13 +221,8 @@ bool IsCovered(const dem::ElevationModel& model, const AreaRequest& area, int le
 
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples) {
-  const dem::GeoBounds& bounds = model.info().bounds;
-  const std::optional<AreaRequest> clipped = Clip(area, bounds);
-  if (!clipped) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "bbox lies outside the dataset, whose bounds are {:.6f},{:.6f},{:.6f},{:.6f}", bounds.west,
-                     bounds.south, bounds.east, bounds.north);
-  }
+  const Result<AreaRequest> clipped = Clip(area, model.info().bounds);
+  if (!clipped) return tl::unexpected(clipped.error());
   AreaPlan plan;
   const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };
   while (plan.level < model.max_source_level() && is_coarse()) ++plan.level;

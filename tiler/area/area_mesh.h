@@ -36,8 +36,8 @@ struct AreaPlan {
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };
 
-// kInvalidArgument, with a message for the client: the area does not intersect the model, or needs more than
-// `max_samples`.
+// kInvalidArgument, with a message for the client: the area does not intersect the model, or does so in two parts (one
+// east and one west of the antimeridian), or needs more than `max_samples`.
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 

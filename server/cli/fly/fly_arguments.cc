@@ -68,6 +68,12 @@ Result<fly::FlightPath> PathOf(const FlyArguments& arguments) {
   const Result<fly::GeodeticPoint> from = ParsePoint("--from", arguments.from), to = ParsePoint("--to", arguments.to);
   if (!from) return tl::unexpected(from.error());
   if (!to) return tl::unexpected(to.error());
+  if (fly::AreOpposite(*from, *to)) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--from {} --to {}: are on opposite sides of the Earth, so that no way between them is the "
+                     "shortest; give the way with --path",
+                     arguments.from, arguments.to);
+  }
   return fly::MakeStraightPath(*from, *to, speed);
 }
 

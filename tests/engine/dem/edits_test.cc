@@ -38,6 +38,15 @@ TEST_F(TerrainEdits, TakeTheMeanOrTheMedian) {
   EXPECT_NEAR(At(*median, 10.2, 50.2), 299.5, 4);
 }
 
+// A strip, less than a metre wide, from one corner of its box to the opposite one.
+TEST_F(TerrainEdits, TakeTheMeanOfANarrowPolygon) {
+  const auto strip = Open(
+      R"({"type":"Feature","properties":{"terrain":{"op":"flatten","height":"mean"}},"geometry":{"type":"Polygon",)"
+      R"("coordinates":[[[10.1,50.1],[10.10001,50.1],[10.30001,50.3],[10.3,50.3],[10.1,50.1]]]}})");
+  ASSERT_NE(strip, nullptr);
+  EXPECT_NEAR(At(*strip, 10.200005, 50.2), 299.5, 1);
+}
+
 TEST_F(TerrainEdits, SlopeIsAPlaneOrTriangles) {
   const auto plane = Open(Middle(R"({"op":"slope","heights":[100,200,null,100]})"));
   ASSERT_NE(plane, nullptr);

@@ -409,6 +409,43 @@ TEST(Sight, DoesNotSeeTheGroundBelowThroughAVoidOfTheRim) {
   }
 }
 
+// Longitudes of rays that pass near a pole are far from linear there, whatever the latitudes of their ends.
+TEST(Sight, IsThatOfAMarchPastAPole) {
+  const TempDir dir;
+  RasterSpec spec{.width = 720, .height = 200, .geo_transform = {-180, .5, 0, 90, 0, -.005}};
+  spec.value = [](int column, int row) {
+    const double from_pole_m = std::min((row + .5) * .005 * 111'694, 5000.0);
+    return 1000 + 0.3 * from_pole_m * std::sin(geo::ToRadians(column * .5 - 179.75));
+  };
+  const auto source = OpenOrFail(WriteRaster(dir, spec));
+  ASSERT_TRUE(source);
+  std::vector<SightRay> rays;
+  for (const double turn : {0.0, 3.0, 40.0, 90.0, 133.0}) {
+    for (const double across : {180.0, 179.0, 160.0}) {
+      rays.push_back({{turn, 89.6, 1900}, {std::remainder(turn + across, 360), 89.75, 1950}});
+    }
+  }
+  constexpr double kStep = 1;
+  const auto answers = source->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  const std::vector<Marched> marched = March(*source, rays, kStep, {});
+  std::size_t blocked = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    EXPECT_EQ((*answers)[i].is_visible, !marched[i].is_blocked) << i;
+    EXPECT_LE((*answers)[i].clearance_m, marched[i].clearance_m + 0.01) << i;
+    EXPECT_GE((*answers)[i].clearance_m, marched[i].clearance_m - kStep) << i;
+    blocked += marched[i].is_blocked ? 1 : 0;
+  }
+  EXPECT_GT(blocked, 1u);
+  EXPECT_LT(blocked, rays.size());
+}
+
+// A ray through a pole has few short pieces.
+TEST(Sight, HasFewPiecesPastAPole) {
+  EXPECT_LT(PiecesOf({{0, 60, 3000}, {180, 80, 3000}}, {}).size(), 6000u);
+  EXPECT_EQ(PiecesOf({{0, 0, 3000}, {0.5, 0, 3000}}, {}).size(), 7u);
+}
+
 // Rasters of one grid with a gap of ten columns between them, as narrow as the voids that are filled in a raster.
 TEST(Sight, SeesTheRasterBelowInANarrowGapBetweenRasters) {
   const TempDir dir;

@@ -190,6 +190,19 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   ExpectSays(dem::PlanOutputGrid(request, 100), "is no system of two axes");
   request.epsg = 4978;  // geocentric
   ExpectSays(dem::PlanOutputGrid(request, 100), "is no system of two axes");
+  request.epsg = 2048;  // South Africa: axes run west and south
+  ExpectSays(dem::PlanOutputGrid(request, 100), "the axes of EPSG:2048 run west or south");
+  request.epsg = 4807;  // grads
+  ExpectSays(dem::PlanOutputGrid(request, 100), "EPSG:4807 counts in grad");
+  // Around the poles both axes run north, or south.
+  for (const int polar : {3031, 3413, 5041, 32661}) {
+    const auto around = dem::PlanOutputGrid({polar, 1.5e6, 1.5e6, 2.5e6, 2.5e6, 10, 10, {}}, 100);
+    EXPECT_TRUE(around) << around.error().message;
+  }
+  // The north-eastern node lies beside the map of the Earth.
+  const auto beside = dem::PlanOutputGrid({8857, 0, 0, 1.7e7, 8e6, 3, 3, {}}, 100);
+  ASSERT_TRUE(beside) << beside.error().message;
+  ExpectSays(dem::PositionsOf(*beside, 0, 3, {}), "no place on Earth for column 2, row 0");
   // Half a million kilometres east of zone 11.
   const auto far = dem::PlanOutputGrid({32611, 5e8, 0, 6e8, 1e6, 10, 10, {}}, 100);
   ASSERT_TRUE(far) << far.error().message;
