@@ -295,8 +295,8 @@ Result<std::shared_ptr<const Geoid>> Geoid::Checked(std::shared_ptr<const Geoid>
                      PlainNumber(centre.x), PlainNumber(centre.y));
   }
   if (above < base) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: its operation makes depths of heights, not heights",
-                     geoid->name_);
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: PROJ's operation for it turns heights upside down; name another `vertical`", geoid->name_);
   }
   return geoid;
 }

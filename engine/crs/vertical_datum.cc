@@ -20,13 +20,15 @@ Result<VerticalDatum> Above(Result<std::shared_ptr<const Geoid>> geoid) {
 }
 
 Result<VerticalDatum> AboveCrs(const std::string& vertical_crs, Position centre) {
+  auto geoid = Geoid::OfCrs(vertical_crs, centre);
+  if (geoid) return Above(std::move(geoid));
   if (const auto depths = NameOfDepths(vertical_crs)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} counts downwards; make heights of the depths with `gdal_calc.py -A in --outfile=out "
                      "--calc=-A`, and let `vertical` say what the heights count from: the copy still states depths",
                      *depths);
   }
-  return Above(Geoid::OfCrs(vertical_crs, centre));
+  return Above(std::move(geoid));
 }
 
 }  // namespace

@@ -38,15 +38,45 @@ EditFault FaultOf(const Edit& edit, std::string message) {
   return {edit.file, edit.feature, MiddleOf(edit), std::move(message)};
 }
 
-// About a thousand positions inside the polygon: equally far from one another along rows at equal distances.
+// Rows at equal distances over all polygons of an edit, but not between them. Metres on its plane, ascending.
+std::vector<double> RowsOver(const Edit& edit, int count) {
+  std::vector<std::pair<double, double>> spans;  // south and north of each ring
+  for (const auto& ring : edit.rings) {
+    const auto [south, north] = std::ranges::minmax(ring, {}, &PlanPoint::y);
+    spans.emplace_back(south.y, north.y);
+  }
+  std::ranges::sort(spans);
+  std::vector<std::pair<double, double>> merged;
+  double height_m = 0;
+  for (const auto& [south, north] : spans) {
+    if (!merged.empty() && south <= merged.back().second) {
+      height_m += std::max(north - merged.back().second, 0.0);
+      merged.back().second = std::max(merged.back().second, north);
+    } else {
+      height_m += north - south;
+      merged.emplace_back(south, north);
+    }
+  }
+  std::vector<double> rows;
+  double below_m = 0;  // in the spans before
+  for (const auto& [south, north] : merged) {
+    for (auto j = static_cast<int>(rows.size()); j < count; ++j) {
+      const double y = south + height_m * (j + 0.5) / count - below_m;
+      if (y >= north) break;
+      rows.push_back(y);
+    }
+    below_m += north - south;
+  }
+  return rows;
+}
+
+// About a thousand positions inside the polygons: equally far from one another along rows at equal distances.
 std::vector<GeoPosition> PositionsInside(const Edit& edit) {
   constexpr int kRows = 32, kPositions = 1024;
-  const double south = edit.reach.min_y + edit.blend_m / edit.plane.north_m;
-  const double north = edit.reach.max_y - edit.blend_m / edit.plane.north_m;
   std::vector<EditRow> rows;
   double length_m = 0;  // of all parts of rows inside
-  for (int j = 0; j < kRows; ++j) {
-    rows.emplace_back(edit, edit.plane.Y(south + (north - south) * (j + 0.5) / kRows));
+  for (const double y : RowsOver(edit, kRows)) {
+    rows.emplace_back(edit, y);
     const std::vector<double>& crossings = rows.back().crossings();
     for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) length_m += crossings[k + 1] - crossings[k];
   }

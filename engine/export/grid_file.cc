@@ -87,9 +87,10 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
     if (WriteBand(grid, *dataset, heights, GDT_Float32) != CE_None) return CannotWrite("GTiff");
   }
   if (file.has_sidecar()) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "format: a GeoTIFF cannot state EPSG:{}; choose another crs, or another format, such as f32",
-                     grid.epsg);
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "format: GDAL cannot write EPSG:{} into a GeoTIFF; choose another crs, or another format, such as f32",
+        grid.epsg);
   }
   std::string bytes = file.Bytes();
   return bytes.empty() ? Result<std::string>(CannotWrite("GTiff")) : Result<std::string>(std::move(bytes));

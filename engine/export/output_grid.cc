@@ -48,7 +48,7 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
   if (grid.is_geographic) {
     constexpr double kDegree = std::numbers::pi / 180;
     if (std::abs(srs.GetAngularUnits(&unit) - kDegree) > 1e-9) {
-      return Invalid(fmt::format("crs: EPSG:{} counts in {}; choose a system in degrees or metres", epsg,
+      return Invalid(fmt::format("crs: EPSG:{} counts in {}; choose one in degrees, or a projected one", epsg,
                                  unit != nullptr ? unit : "an unknown unit"));
     }
   } else {

@@ -38,8 +38,8 @@ struct GridRequest {
   std::optional<double> spacing = {};
 };
 
-// kInvalidArgument, with a message for clients: PROJ does not know the CRS, or it has not two axes; the box is
-// empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
+// kInvalidArgument, with a message for clients: PROJ does not know the CRS, its axes are not two, run west or south, or
+// count in grads; the box is empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
 Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes);
 
 // Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS

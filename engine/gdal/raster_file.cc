@@ -286,6 +286,14 @@ Result<void> CheckParts(const std::string& vrt) {
   return {};
 }
 
+// Whether the driver reports an error of a tile that it cannot decode, fills in zeros and returns success. Of other
+// drivers, errors during a successful read are harmless: a VRT opens its parts then.
+bool HidesErrors(GDALRasterBand& band) {
+  GDALDataset* const dataset = band.GetDataset();
+  const std::string driver = dataset == nullptr ? "" : dataset->GetDriverName();
+  return driver == "GPKG" || driver == "MBTiles";
+}
+
 }  // namespace
 
 Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
@@ -349,8 +357,10 @@ Result<GDALDatasetUniquePtr> OpenRaster(const std::string& path, int overview) {
 
 bool ReadRaw(GDALRasterBand& band, int col, int row, int cols, int rows, GDALDataType type, void* out) {
   ForgetGdalError();
-  return band.RasterIO(GF_Read, col, row, cols, rows, out, cols, rows, type, 0, 0, nullptr) == CE_None &&
-         !HasGdalError();
+  if (band.RasterIO(GF_Read, col, row, cols, rows, out, cols, rows, type, 0, 0, nullptr) != CE_None) return false;
+  if (!HasGdalError() || !HidesErrors(band)) return true;
+  band.FlushCache(/*bAtClosing=*/false);  // else the next read would find the zeros
+  return false;
 }
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {

@@ -86,7 +86,7 @@ std::vector<Ranges> AvailableTiles(std::span<const SourceExtent> sources) {
   const int deepest = std::ranges::max_element(sources, {}, &SourceExtent::deepest_level)->deepest_level;
   std::vector<Ranges> levels(static_cast<std::size_t>(deepest) + 1);
   // Every level is derived from the tiles of the deepest one, so that rounding cannot lose an ancestor.
-  std::vector<Ranges> worth(levels.size());  // of the deepest level, by the depth of their source
+  std::vector<Ranges> worth(levels.size());  // of the deepest level, by the deepest level of their source
   for (const SourceExtent& source : sources) {
     const Ranges tiles = TilesOverlapping(source.footprint, deepest);
     Ranges& those = worth[static_cast<std::size_t>(source.deepest_level)];

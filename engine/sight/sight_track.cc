@@ -123,9 +123,10 @@ double DistanceFromAxis(const geo::Vec3& from, const geo::Vec3& to) {
   return std::hypot(from.x + nearest * x, from.y + nearest * y);
 }
 
-// The longest piece at this distance from the axis. Longitudes along a chord at distance r have a third derivative of
-// at most 2 / r^3, so a polynomial of the second degree through three of them is at most h^3 / 62 r^2 metres off over h
-// metres. Within two metres of a pole, pieces do not become shorter.
+// The longest piece at this distance from the axis, along the plane of the equator. Longitudes along a chord at
+// distance r have a third derivative of at most 2 / r^3, so a polynomial of the second degree through three of them is
+// at most h^3 / 62 r^2 metres off over h metres. Refraction changes heights alone. Within two metres of a pole, pieces
+// do not become shorter.
 double LongestPiece(double from_axis_m) {
   constexpr double kMaxError = 1e-3, kMinLength = 0.5;  // metres
   return std::clamp(std::cbrt(62 * kMaxError * from_axis_m * from_axis_m), kMinLength, TrackPiece::kMaxLength);
@@ -135,7 +136,7 @@ double LongestPiece(double from_axis_m) {
 void AddPieces(const RayCourse& course, double start, double end, std::vector<TrackPiece>& pieces) {
   const geo::Vec3 from = course.start() + course.way() * start, to = course.start() + course.way() * end;
   const double length_m = course.length_m() * (end - start);
-  if (length_m > LongestPiece(DistanceFromAxis(from, to))) {
+  if (std::hypot(to.x - from.x, to.y - from.y) > LongestPiece(DistanceFromAxis(from, to))) {
     const double middle = (start + end) / 2;
     AddPieces(course, start, middle, pieces);
     AddPieces(course, middle, end, pieces);
@@ -169,7 +170,6 @@ void AddPieces(const RayCourse& course, double start, double end, std::vector<Tr
 
 std::vector<TrackPiece> PiecesOf(const SightRay& ray, const SightOptions& options) {
   const RayCourse course(ray, options);
-  // The air's rise of a ray changes its height alone.
   const int count = std::max(1, static_cast<int>(std::ceil(course.length_m() / TrackPiece::kMaxLength)));
   std::vector<TrackPiece> pieces;
   pieces.reserve(static_cast<std::size_t>(count));

@@ -2,12 +2,32 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/raster_file.h"
 
 namespace terrace::dem {
+
+namespace {
+
+// What GDAL has warned of on this thread, without what says nothing about samples and positions: the order of a TIFF's
+// tags, and requests that were repeated.
+std::vector<std::string> WarningsOfGdal(const std::string& path) {
+  std::vector<std::string> warnings;
+  const std::string name = path.substr(path.rfind('/') + 1) + ": ";
+  for (std::string text : TakeGdalWarnings()) {
+    if (text.starts_with(name)) text.erase(0, name.size());
+    if (text.starts_with("TIFFReadDirectory") || text.find("Retrying again") != std::string::npos) continue;
+    while (text.ends_with('.')) text.pop_back();
+    std::string warning = fmt::format("GDAL warns: {}; `gdalinfo` shows what it reads", text);
+    if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(std::move(warning));
+  }
+  return warnings;
+}
+
+}  // namespace
 
 Result<LocatedRaster> LocateRaster(GDALDataset& dataset, const std::string& path,
                                    const std::optional<FileStamp>& before, int bands) {
@@ -27,10 +47,7 @@ Result<LocatedRaster> OpenLocatedRaster(const std::string& path) {
   TakeGdalWarnings();  // earlier ones
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
-  std::vector<std::string> warnings = TakeGdalWarnings();
-  for (std::string& warning : warnings) {
-    warning = fmt::format("GDAL warns of this file: \"{}\"; check where it lies with gdalinfo", warning);
-  }
+  std::vector<std::string> warnings = WarningsOfGdal(path);
   auto located = LocateRaster(**dataset, path, before);
   if (!located) return located;
   located->dataset = *std::move(dataset);

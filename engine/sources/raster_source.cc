@@ -76,7 +76,7 @@ std::string DropMisleadingOverviews(GDALDataset& dataset, const RasterStatistics
   std::string why;
   if (statistics.voids == 0) {
     why =
-        "they have heights that the raster has not there, as if it was changed after they were made; make them anew "
+        "they have heights that the samples around them have not, as if these were changed later; make them anew "
         "with `gdaladdo -clean file` and `gdaladdo -r average file`";
   } else if (layout.rules.nodata && !declared && !layout.rules.has_mask) {
     why =
@@ -209,7 +209,8 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
   source->info_.overviews_unused = std::move(overviews_unused);
   source->info_.seconds_to_open = SecondsSince(start);
   source->info_.warnings = std::move(located->warnings);
-  std::ranges::move(WarningsOf(dataset, source->georeference_, source->vertical_, options.vertical, source->layout_),
+  std::ranges::move(WarningsOf(dataset, source->georeference_, source->spacing_.finer, source->vertical_,
+                               options.vertical, source->layout_),
                     std::back_inserter(source->info_.warnings));
   if (prepared->statistics.rim_voids.is_everything()) {
     source->info_.warnings.push_back(

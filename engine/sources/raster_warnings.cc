@@ -23,7 +23,8 @@ double BeyondPole(const Georeference& georeference) {
   return std::abs(latitude) > 90 + pixel ? latitude : 0;
 }
 
-void WarnOfPosition(const Georeference& georeference, const RasterLayout& layout, std::vector<std::string>& warnings) {
+void WarnOfPosition(const Georeference& georeference, double spacing_m, const RasterLayout& layout,
+                    std::vector<std::string>& warnings) {
   // One more column is allowed, for grids with nodes at -180 and at 180 degrees.
   if (const int beyond = layout.width - layout.columns; beyond > 1) {
     warnings.push_back(fmt::format(
@@ -37,9 +38,8 @@ void WarnOfPosition(const Georeference& georeference, const RasterLayout& layout
                     "correct it with `gdal_translate -a_ullr west north east south in out`",
                     PlainNumber(latitude)));
   }
-  constexpr double kSmallestPixel = 0.05;  // metres or feet; of degrees, five kilometres
-  if (!georeference.is_geographic() && georeference.MayBeInDegrees() &&
-      std::max(georeference.pixel_width(), georeference.pixel_height()) < kSmallestPixel) {
+  constexpr double kSmallestPixel = 0.005;  // metres; of degrees, 500 m
+  if (!georeference.is_geographic() && georeference.MayBeInDegrees() && spacing_m < kSmallestPixel) {
     warnings.push_back(
         fmt::format("has pixels of {} {} near the origin of {}: if its coordinates are degrees, state that with "
                     "`gdal_translate -a_srs EPSG:4326 in out`",
@@ -57,7 +57,7 @@ void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const V
                     "m",
                     dted == nullptr || *dted == '\0'
                         ? ""
-                        : fmt::format(" but by its DTED header ({}; E96 and MSL are mean sea level)", dted)));
+                        : fmt::format(" (its DTED header states {}; E96 and MSL are mean sea level)", dted)));
   }
   if (wanted_vertical != "crs" && !georeference.vertical_crs().empty()) {
     if (const auto depths = NameOfDepths(georeference.vertical_crs())) {
@@ -81,11 +81,11 @@ void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const V
 
 }  // namespace
 
-std::vector<std::string> WarningsOf(GDALDataset& dataset, const Georeference& georeference,
+std::vector<std::string> WarningsOf(GDALDataset& dataset, const Georeference& georeference, double spacing_m,
                                     const VerticalDatum& vertical, const std::string& wanted_vertical,
                                     const RasterLayout& layout) {
   std::vector<std::string> warnings;
-  WarnOfPosition(georeference, layout, warnings);
+  WarnOfPosition(georeference, spacing_m, layout, warnings);
   WarnOfDatum(dataset, georeference, vertical, wanted_vertical, layout, warnings);
   return warnings;
 }

@@ -13,8 +13,8 @@
 namespace terrace::dem {
 
 // Warnings about the position and the unit of a raster's heights, each with the remedy. `wanted_vertical`: as for
-// ResolveVertical, which gave `vertical`.
-std::vector<std::string> WarningsOf(GDALDataset& dataset, const Georeference& georeference,
+// ResolveVertical, which gave `vertical`. `spacing_m`: between samples on the ground.
+std::vector<std::string> WarningsOf(GDALDataset& dataset, const Georeference& georeference, double spacing_m,
                                     const VerticalDatum& vertical, const std::string& wanted_vertical,
                                     const RasterLayout& layout);
 

@@ -154,7 +154,11 @@ void AddCoarseErrors(const RasterLayout& layout, const CoarseAverages& coarse, A
 
 // Whether averages of an overview are no averages of the samples around them. Where voids take part as heights, they
 // are far from them, but often within the range of the whole raster.
-bool IsStray(const RangeTable& overview, const RangeTable& samples, const RasterLayout& layout, int factor) {
+bool IsStray(const RangeTable& overview, const RangeTable& samples, const RasterLayout& layout, int factor,
+             bool has_voids) {
+  // Compression with loss changes samples and overviews by as much as their owner allows. Voids may change averages by
+  // less.
+  constexpr double kMaxLoss = 2;
   // Samples beyond an average's own that kernels reach, if each overview was made from the one before.
   const double reach = 6.0 * factor;
   constexpr int kBlock = RangeTable::kBlock;
@@ -167,7 +171,7 @@ bool IsStray(const RangeTable& overview, const RangeTable& samples, const Raster
     const BlockRange around = samples.Query(west - reach, north - reach, west + kBlock + reach, north + kBlock + reach);
     // Beside a cliff, overviews by Lanczos kernels exceed the heights by 18 % of their range, cubic ones by 10 %. Equal
     // heights differ by rounding.
-    const double overshoot = 0.25 * (double{around.max} - around.min) + 0.01;
+    const double overshoot = 0.25 * (double{around.max} - around.min) + (has_voids ? 0.01 : kMaxLoss);
     if (!(averages.min >= around.min - overshoot && averages.max <= around.max + overshoot)) return true;
   }
   return false;
@@ -330,7 +334,7 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
         overview.AddWindow(box.col, box.row, box.cols, box.rows, heights->data(), factor);
       }
     }
-    statistics_.has_stray_overviews |= IsStray(overview, samples, layout_, factor);
+    statistics_.has_stray_overviews |= IsStray(overview, samples, layout_, factor, statistics_.voids > 0);
   }
   return {};
 }

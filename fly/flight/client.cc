@@ -111,7 +111,7 @@ void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) 
   if (tile != nullptr) {
     tile->in_flight = true;
     ++active_;
-    if (resource == Resource::kTile) statistics_.AddUrl(url->target);
+    if (options_.keeps_urls && resource == Resource::kTile) statistics_.AddUrl(url->target);
   }
   const bool is_terrain = options_.format == Format::kTerrain;
   const char* accept = resource == Resource::kDocument             ? kAcceptJson

@@ -29,6 +29,7 @@ struct FlightOptions {
   double first_view_limit_s = 30;  // a client that has no full first view by then flies without it
   double arrival_limit_s = 10;     // a client waits so long for a full view at the end
   int max_attempts = 6;            // requests for a tile whose failures are transient
+  bool keeps_urls = false;         // FlightRecord::urls
   HttpOptions http;                // `threads` and `clients` are ignored
 };
 

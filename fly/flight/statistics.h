@@ -110,7 +110,7 @@ struct FlightRecord {
   Totals totals;
   std::vector<Second> seconds;
   std::vector<geo::TileKey> loaded_tiles;
-  std::vector<std::string> urls;  // of the requested tiles
+  std::vector<std::string> urls;  // of the requested tiles, if FlightOptions::keeps_urls
   std::vector<ClientRecord> clients;
   std::vector<GeodeticPoint> track;
   std::vector<double> version_changes;  // seconds since the start

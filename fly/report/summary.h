@@ -17,14 +17,14 @@ struct Summary {
   double seconds = 0;                                 // of the whole run
   int never_opened = 0, never_full = 0;               // clients
   double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
-  double arrival_s = -1;                              // worst; -1: a client that flew never had a full view
-  double p50_s = 0, p99_s = 0, max_s = 0;             // of tiles
-  double tiles_per_second = 0;                        // mean over the seconds in which tiles arrived
-  double best_tiles_per_second = 0;                   // in the best second
-  double refined_share = 0;                           // of the frames of the flight
-  double frame_p50_px = 0, frame_p99_px = 0;          // percentiles of the frames' worst errors
-  std::uint64_t errors = 0;                           // requests that did not end with ok or a refusal
-  std::vector<std::string> findings;                  // what is wrong, in sentences
+  double arrival_s = -1;                      // worst; -1: a client that opened the document had none after its flight
+  double p50_s = 0, p99_s = 0, max_s = 0;     // of tiles
+  double tiles_per_second = 0;                // mean over the seconds in which tiles arrived
+  double best_tiles_per_second = 0;           // in the best second
+  double refined_share = 0;                   // of the frames of the flight
+  double frame_p50_px = 0, frame_p99_px = 0;  // percentiles of the frames' worst errors
+  std::uint64_t errors = 0;                   // requests that did not end with ok or a refusal
+  std::vector<std::string> findings;          // what is wrong, in sentences
 };
 
 struct Judgements;  // requirement.h

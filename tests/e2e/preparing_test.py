@@ -225,7 +225,7 @@ class Preparing(unittest.TestCase):
         self.assertEqual((status, body == self.sample_oracle), (200, True))
         listed = json.loads(server.get("/datasets")[2])
         self.assertEqual([dataset["name"] for dataset in listed["datasets"]], ["jacksboro"])
-        self.assertEqual([(pending["name"], str(pending["percent"]) in PERCENT) for pending in listed["preparing"]], [("hills", True)])
+        self.assertEqual([(pending["name"], bool(re.fullmatch(PERCENT, str(pending["percent"])))) for pending in listed["preparing"]], [("hills", True)])
         self.assertIn("\nterrace_degraded 1\n", server.text("/metrics")[1])
 
     def test_it_is_served_when_it_is_there_and_others_before(self):

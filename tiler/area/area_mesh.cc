@@ -30,8 +30,9 @@ using Clock = std::chrono::steady_clock;
 // Larger distances occur only for triangles that span half of the Earth and collapse into a line.
 constexpr double kMaxSag_m = 1e6;
 
-// The part of the area within the model's bounds. kInvalidArgument: there is none, or there are two.
-Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) {
+// The part of the area within the model's bounds. `step`: degrees between nodes of the finest lattice; gaps and parts
+// narrower than that do not count. kInvalidArgument: there is no part, or there are two.
+Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds, double step) {
   AreaRequest clipped = area;
   clipped.south = std::max(area.south, bounds.south);
   clipped.north = std::min(area.north, bounds.north);
@@ -45,8 +46,14 @@ Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds) 
   } else {
     for (const double turn : {-360.0, 0.0, 360.0}) {
       const double west = std::max(area.west, bounds.west + turn), east = std::min(area.east, bounds_east + turn);
-      if (east > west) parts.emplace_back(west, east);
+      if (east <= west) continue;
+      if (!parts.empty() && west - parts.back().second < step) {
+        parts.back().second = east;
+      } else {
+        parts.emplace_back(west, east);
+      }
     }
+    if (parts.size() > 1) std::erase_if(parts, [&](const auto& part) { return part.second - part.first < step; });
   }
   if (parts.empty() || clipped.north <= clipped.south) {
     return MakeError(ErrorCode::kInvalidArgument,
@@ -221,7 +228,8 @@ bool IsCovered(const dem::ElevationModel& model, const AreaRequest& area, int le
 
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples) {
-  const Result<AreaRequest> clipped = Clip(area, model.info().bounds);
+  const Result<AreaRequest> clipped =
+      Clip(area, model.info().bounds, model.LatticeOf(model.max_source_level()).StepDegrees());
   if (!clipped) return tl::unexpected(clipped.error());
   AreaPlan plan;
   const auto is_coarse = [&] { return geo::DefaultError(plan.level, error_fraction) > area.error_m; };

@@ -121,6 +121,7 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
   options.max_tile_bytes = static_cast<std::uint64_t>(arguments.cache_mib) << 20;
   options.first_view_limit_s = arguments.first_view_limit;
   options.arrival_limit_s = std::min(options.arrival_limit_s, arguments.first_view_limit);
+  options.keeps_urls = !arguments.urls.empty();
   options.http.timeout_s = arguments.timeout;
   options.http.headers = arguments.headers;
   options.http.verifies_certificates = !arguments.insecure;

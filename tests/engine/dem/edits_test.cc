@@ -45,6 +45,13 @@ TEST_F(TerrainEdits, TakeTheMeanOfANarrowPolygon) {
       R"("coordinates":[[[10.1,50.1],[10.10001,50.1],[10.30001,50.3],[10.3,50.3],[10.1,50.1]]]}})");
   ASSERT_NE(strip, nullptr);
   EXPECT_NEAR(At(*strip, 10.200005, 50.2), 299.5, 1);
+  // Two squares of 20 m, far from each other.
+  const auto squares = Open(
+      R"({"type":"Feature","properties":{"terrain":{"op":"flatten","height":"mean"}},"geometry":{"type":)"
+      R"("MultiPolygon","coordinates":[[[[10.1,50.1],[10.1003,50.1],[10.1003,50.1002],[10.1,50.1002],[10.1,50.1]]],)"
+      R"([[[10.3,50.3],[10.3003,50.3],[10.3003,50.3002],[10.3,50.3002],[10.3,50.3]]]]}})");
+  ASSERT_NE(squares, nullptr);
+  EXPECT_NEAR(At(*squares, 10.10015, 50.1001), 299.5, 1);
 }
 
 TEST_F(TerrainEdits, SlopeIsAPlaneOrTriangles) {

@@ -10,6 +10,8 @@
 
 #include "engine/gdal/driver_list.h"
 #include "engine/gdal/gdal_runtime.h"
+#include "engine/gdal/raster_file.h"
+#include "engine/gdal/source_policy.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/engine/dem/source_fixture.h"
 
@@ -91,8 +93,7 @@ TEST(RasterWarnings, ContainTheWarningsOfGdal) {
   }
   const std::vector<std::string> warnings = WarningsAbout(path);
   EXPECT_TRUE(std::ranges::any_of(warnings, [](const std::string& warning) {
-    return warning.starts_with("GDAL warns of this file: ") &&
-           warning.find("not a Longitude/X dimension") != std::string::npos;
+    return warning.starts_with("GDAL warns: ") && warning.find("not a Longitude/X dimension") != std::string::npos;
   }));
 }
 
@@ -133,7 +134,7 @@ TEST(RasterWarnings, NameTheDatumOfADtedHeader) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 46, 0, -.01}});
   GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), GDAL_OF_UPDATE))->SetMetadataItem("DTED_VerticalDatum", "E96");
-  ExpectOne(WarningsAbout(path), "no vertical datum stated but by its DTED header (E96;");
+  ExpectOne(WarningsAbout(path), "no vertical datum stated (its DTED header states E96;");
   EXPECT_EQ(WarningsAbout(path, {.vertical = "egm96"}), std::vector<std::string>());
 }
 
@@ -159,6 +160,9 @@ TEST(DamagedBlocks, AreErrorsAlsoIfGdalReturnsZeros) {
   RasterSpec spec{.width = 256, .height = 256, .type = "Byte", .geo_transform = {7, .001, 0, 46, 0, -.001}};
   spec.value = [](int column, int row) { return 50 + (column * 7 + row * 3) % 100; };
   const std::string path = dir.File("tiles.gpkg");
+  const struct Restored {
+    ~Restored() { EXPECT_TRUE(UseDrivers(DefaultDrivers())); }
+  } restored;
   ASSERT_TRUE(UseDrivers({"GTiff", "GPKG", "PNG"}));
   {
     const GDALDatasetUniquePtr source(GDALDataset::Open(WriteRaster(dir, spec).c_str()));
@@ -171,10 +175,37 @@ TEST(DamagedBlocks, AreErrorsAlsoIfGdalReturnsZeros) {
   std::string bytes = (std::stringstream() << std::ifstream(path, std::ios::binary).rdbuf()).str();
   for (std::size_t at = bytes.find("IDAT"); at != std::string::npos; at = bytes.find("IDAT", at + 1)) bytes[at] = 'X';
   std::ofstream(path, std::ios::binary) << bytes;
+  const GDALDatasetUniquePtr file(GDALDataset::Open(path.c_str()));
+  ASSERT_NE(file, nullptr);
+  std::vector<float> heights(16);
+  for (int i = 0; i < 2; ++i) {  // not from a cache of blocks
+    EXPECT_FALSE(ReadRaw(*file->GetRasterBand(1), 0, 0, 4, 4, GDT_Float32, heights.data())) << i;
+  }
   const auto damaged = RasterSource::Open(path);
-  EXPECT_TRUE(UseDrivers(DefaultDrivers()));
   ASSERT_FALSE(damaged);
   EXPECT_NE(damaged.error().message.find("cannot be read"), std::string::npos) << damaged.error().message;
+}
+
+// GDAL reports what is wrong with a part of a VRT when it first reads from it, and reads it all the same.
+TEST(DamagedBlocks, AreNotThoseOfPartsWithOddSidecars) {
+  const TempDir dir;
+  RasterSpec spec{.geo_transform = {7, .01, 0, 46, 0, -.01}};
+  spec.value = [](int, int) { return 77; };
+  const std::string part = dir.File("part.asc"), vrt = dir.File("all.vrt");
+  {
+    const GDALDatasetUniquePtr source(GDALDataset::Open(WriteRaster(dir, spec).c_str()));
+    GDALDatasetUniquePtr(
+        FindDriver("AAIGrid")->CreateCopy(part.c_str(), source.get(), FALSE, nullptr, nullptr, nullptr));
+  }
+  ASSERT_TRUE(AllowVrts());
+  WriteVrt(part, vrt);
+  const GDALDatasetUniquePtr file(GDALDataset::Open(vrt.c_str()));
+  ASSERT_NE(file, nullptr);
+  std::ofstream(dir.File("part.prj")) << "GEOGCS[\"broken";
+  std::vector<float> heights(16);
+  EXPECT_TRUE(ReadRaw(*file->GetRasterBand(1), 0, 0, 4, 4, GDT_Float32, heights.data())) << TakeGdalError();
+  EXPECT_TRUE(HasGdalError()) << "the test needs a sidecar of which GDAL reports an error";
+  EXPECT_EQ(heights.front(), 77);
 }
 
 // Of a header whose name has another case than the raster's.

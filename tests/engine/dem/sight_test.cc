@@ -444,6 +444,9 @@ TEST(Sight, IsThatOfAMarchPastAPole) {
 TEST(Sight, HasFewPiecesPastAPole) {
   EXPECT_LT(PiecesOf({{0, 60, 3000}, {180, 80, 3000}}, {}).size(), 6000u);
   EXPECT_EQ(PiecesOf({{0, 0, 3000}, {0.5, 0, 3000}}, {}).size(), 7u);
+  for (const double latitude : {90.0, 89.99999}) {  // upwards
+    EXPECT_LT(PiecesOf({{0, latitude, 1000}, {0, latitude, 1e6}}, {}).size(), 140u);
+  }
 }
 
 // Rasters of one grid with a gap of ten columns between them, as narrow as the voids that are filled in a raster.

@@ -299,6 +299,7 @@ TEST(AreaMesh, AcrossTheAntimeridianIsNotCut) {
   EXPECT_NEAR(columns(-180, 180), 20, 0.3);
   EXPECT_NEAR(columns(175, 185), 10, 0.3);
   EXPECT_NEAR(columns(-180, 100), 10, 0.3) << "one side";
+  EXPECT_NEAR(columns(-170.01, 171), 1, 0.3) << "parts narrower than a sample do not count";
   const auto both = PlanArea(*model, 0.5, {-175, -1, 175, 1, 50}, kMany);
   ASSERT_FALSE(both);
   EXPECT_NE(both.error().message.find("two parts of the dataset, at longitudes -175 to -170 and 170 to 175"),
