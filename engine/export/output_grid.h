@@ -53,7 +53,7 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
 // A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kInvalidArgument, with
-// a message for clients: the format has no way to state the CRS. kUnavailable: GDAL cannot write it.
+// a message for clients: GDAL cannot write the CRS into one. kUnavailable: GDAL cannot write it.
 Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights);
 // A grey image of 16 bits. `values`: one per node. kUnavailable: GDAL cannot write it.
 Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values);
