@@ -1,6 +1,7 @@
 #include "engine/crs/georeference.h"
 
 #include <cpl_conv.h>
+#include <cpl_string.h>
 #include <ogr_spatialref.h>
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <numbers>
 #include <vector>
 
+#include "engine/core/plain_number.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/sample_rules.h"
 
@@ -111,6 +113,33 @@ bool HasNorthingFirst(const OGRSpatialReference& srs) {
   return axes.size() >= 2 && usual_axes.size() >= 2 && axes[0] == usual_axes[1] && axes[1] == usual_axes[0];
 }
 
+std::vector<double> NumbersIn(const char* list) {
+  std::vector<double> numbers;
+  const CPLStringList texts(CSLTokenizeString2(list, "{, }", 0));
+  for (int i = 0; i < texts.size(); ++i) numbers.push_back(CPLAtof(texts[i]));
+  return numbers;
+}
+
+// GDAL places the rows of a Gaussian grid in a netCDF file at even distances, and keeps their latitudes as metadata.
+Result<void> CheckRowSpacing(GDALDataset& dataset, const std::array<double, 6>& to_crs, const std::string& path) {
+  constexpr double kTolerance = 0.1;  // rows: latitudes in single precision are nearer to their places
+  const char* const text = dataset.GetMetadataItem("Y_VALUES", "GEOLOCATION2");
+  if (text == nullptr) return {};
+  std::vector<double> latitudes = NumbersIn(text);
+  if (latitudes.size() != static_cast<std::size_t>(dataset.GetRasterYSize())) return {};  // cut out of a larger raster
+  std::ranges::sort(latitudes);
+  if (to_crs[5] < 0) std::ranges::reverse(latitudes);
+  for (std::size_t row = 0; row < latitudes.size(); ++row) {
+    const double off = std::abs((latitudes[row] - to_crs[3]) / to_crs[5] - (static_cast<double>(row) + 0.5));
+    if (off <= kTolerance) continue;
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: its rows are not evenly spaced: row {}, at latitude {}, is {} rows from its place in an even "
+                     "grid; resample it to one, as with `cdo remapbil,r720x360 in out`",
+                     path, row, PlainNumber(latitudes[row]), PlainNumber(std::round(off * 100) / 100));
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& path) {
@@ -141,6 +170,7 @@ Result<Georeference> Georeference::Of(GDALDataset& dataset, const std::string& p
     std::swap_ranges(self.to_crs_.begin(), self.to_crs_.begin() + 3, self.to_crs_.begin() + 3);
   }
   if (auto affine = self.SetAffine(path); !affine) return tl::unexpected(affine.error());
+  if (auto even = CheckRowSpacing(dataset, self.to_crs_, path); !even) return tl::unexpected(even.error());
   if (srs == nullptr || srs->IsEmpty()) {
     return MakeError(
         ErrorCode::kInvalidArgument,

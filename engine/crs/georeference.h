@@ -28,7 +28,8 @@ struct PixelOffset {
 // Immutable and thread-safe.
 class Georeference {
  public:
-  // Reads the georeference of a dataset. Error messages say what is missing and which command adds it.
+  // Reads the georeference of a dataset. kInvalidArgument: it has none that can be used, or its rows are not evenly
+  // spaced; the message says what is missing and which command adds it.
   static Result<Georeference> Of(GDALDataset& dataset, const std::string& path);
 
   // Returns the position of the first pixel of `other` if both have the same CRS and pixel grid; else nothing. Columns

@@ -49,6 +49,11 @@ bool IsSignedByte(GDALRasterBand& band) {
 
 }  // namespace
 
+bool StatesDepths(GDALRasterBand& band) {
+  const char* const direction = band.GetMetadataItem("positive");
+  return direction != nullptr && EQUAL(direction, "down");
+}
+
 std::optional<double> DeclaredNodata(GDALRasterBand& band) {
   int has = 0;
   double value = 0;

@@ -12,14 +12,16 @@ namespace terrace::dem {
 
 namespace {
 
-// What GDAL has warned of on this thread, without what says nothing about samples and positions: the order of a TIFF's
-// tags, and requests that were repeated.
+// What GDAL has warned of on this thread, without what says nothing about samples and positions (the order of a TIFF's
+// tags, and requests that were repeated) and without rows that are not evenly spaced, which Georeference::Of measures.
 std::vector<std::string> WarningsOfGdal(const std::string& path) {
   std::vector<std::string> warnings;
   const std::string name = path.substr(path.rfind('/') + 1) + ": ";
   for (std::string text : TakeGdalWarnings()) {
     if (text.starts_with(name)) text.erase(0, name.size());
-    if (text.starts_with("TIFFReadDirectory") || text.find("Retrying again") != std::string::npos) continue;
+    if (text.starts_with("Latitude grid not spaced evenly") || text.starts_with("TIFFReadDirectory") ||
+        text.find("Retrying again") != std::string::npos)
+      continue;
     while (text.ends_with('.')) text.pop_back();
     std::string warning = fmt::format("GDAL warns: {}; `gdalinfo` shows what it reads", text);
     if (std::ranges::find(warnings, warning) == warnings.end()) warnings.push_back(std::move(warning));

@@ -223,6 +223,13 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
 }
 
 Result<void> RasterSource::FindLayout(GDALDataset& dataset, const std::string& path, const SourceOptions& options) {
+  if (options.vertical == "crs" && StatesDepths(*dataset.GetRasterBand(1))) {
+    return MakeError(
+        ErrorCode::kInvalidArgument,
+        "{}: its band states \"positive: down\", so that its samples are depths; make heights of them with "
+        "`gdal_calc.py -A in --outfile=out --calc=-A`, and let `vertical` say what the heights count from",
+        path);
+  }
   auto vertical = ResolveVertical(options.vertical, georeference_, CentreOf(georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
   vertical_ = *std::move(vertical);

@@ -67,6 +67,12 @@ void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const V
                       *depths));
     }
   }
+  if (wanted_vertical != "crs" && StatesDepths(*dataset.GetRasterBand(1))) {
+    warnings.push_back(
+        "its band states \"positive: down\", but `vertical` takes its samples for heights; if they are not negated "
+        "yet, "
+        "negate them with `gdal_calc.py -A in --outfile=out --calc=-A`");
+  }
   if (!vertical.geoid) return;
   // Some programs write feet in places that GDAL does not read.
   const std::string &unit = layout.rules.unit, &counted = vertical.geoid->unit();

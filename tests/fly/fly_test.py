@@ -54,7 +54,7 @@ class SoundServer(unittest.TestCase):
         for tiles in ("terrain", "3dtiles"):
             with self.subTest(format=tiles), tempfile.TemporaryDirectory() as folder:
                 urls, page = pathlib.Path(folder, "urls"), pathlib.Path(folder, "page.html")
-                status, report = fly(UPSTREAM, "--format", tiles, "--urls", urls, "--report", page,
+                status, report = fly(UPSTREAM, "--format", tiles, "--forbid-holes", "--urls", urls, "--report", page,
                                      "--require", "full-view=60s,errors=0,refusals=0,holes=0,screen-error=1000px")
                 summary = report["summary"]
                 self.assertEqual(status, 0, summary)
@@ -273,7 +273,7 @@ class Https(unittest.TestCase):
                 url = f"https://localhost:{server.port}/jacksboro"
                 trusted = {"SSL_CERT_FILE": str(certificate)}
                 for tiles in ("terrain", "3dtiles"):
-                    status, summary = fly_to(url, "--format", tiles, "--require", "full-view=60s,errors=0,refusals=0,holes=0",
+                    status, summary = fly_to(url, "--format", tiles, "--forbid-holes", "--require", "full-view=60s,errors=0,refusals=0,holes=0",
                                              environment=trusted)
                     self.assertEqual(status, 0, summary)
                     self.assertGreater(summary["tiles"], 60)
@@ -307,8 +307,8 @@ class DeeperLevels(unittest.TestCase):
                 self.assertGreater(levels("jacksboro"), levels("plain") + 2)
                 for tiles in ("terrain", "3dtiles"):
                     urls = pathlib.Path(folder, "urls-" + tiles)
-                    status, summary = fly_to(f"http://127.0.0.1:{server.port}/jacksboro", "--format", tiles, "--urls", urls, "--require",
-                                             "full-view=60s,errors=0,refusals=0,holes=0",
+                    status, summary = fly_to(f"http://127.0.0.1:{server.port}/jacksboro", "--format", tiles, "--forbid-holes", "--urls", urls,
+                                             "--require", "full-view=60s,errors=0,refusals=0,holes=0",
                                              way=["--circle", "-84.25,36.30,700,250", "--speed", "100"])
                     self.assertEqual(status, 0, summary)
                     self.assertGreater(summary["holes"]["examined_frames"], 3)

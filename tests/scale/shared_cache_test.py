@@ -345,7 +345,9 @@ class SharedCache(unittest.TestCase):
         seen = cluster.Seen()
 
         async def both():
-            await asyncio.gather(*(cluster.draw(node.port, WORKERS, self.targets, seen, is_tls=False) for node in nodes))
+            # From both ends, so that each node is the first to ask for some tiles.
+            await asyncio.gather(*(cluster.draw(node.port, WORKERS, targets, seen, is_tls=False)
+                                   for node, targets in zip(nodes, (self.targets, self.targets[::-1]))))
         asyncio.run(both())
         self.assertEqual((seen.failures, seen.wrong), ([], []))
         self.assertEqual(sum(node.sum_of("terrace_tile_builds_total") for node in nodes), TILES)

@@ -129,6 +129,79 @@ TEST(RasterWarnings, NameDepths) {
   ExpectOne(WarningsAbout(path, {.vertical = "ellipsoid"}), "has depths (NAVD88 depth)");
 }
 
+// Writes a netCDF file of heights at these latitudes, half a degree apart from west to east. `positive`: an attribute.
+std::string WriteNetCdf(const TempDir& dir, const std::vector<double>& latitudes, const char* positive = nullptr) {
+  OpenRaster("none");  // registers the drivers
+  constexpr std::size_t kColumns = 20;
+  const std::string path = (dir.path() / "grid.nc").string();
+  const std::unique_ptr<GDALDataset> file(
+      GetGDALDriverManager()->GetDriverByName("netCDF")->CreateMultiDimensional(path.c_str(), nullptr, nullptr));
+  const auto root = file->GetRootGroup();
+  const auto put = [](GDALMDArray& array, const char* name, const std::string& value) {
+    array.CreateAttribute(name, {}, GDALExtendedDataType::CreateString(0), nullptr)->Write(value.c_str());
+  };
+  const auto real = GDALExtendedDataType::Create(GDT_Float64);
+  const auto add = [&](const char* name, const std::vector<std::shared_ptr<GDALDimension>>& sides,
+                       const std::vector<double>& values, const char* unit) {
+    const auto array = root->CreateMDArray(name, sides, real, nullptr);
+    std::vector<GUInt64> begin(sides.size(), 0);
+    std::vector<std::size_t> count;
+    for (const auto& side : sides) count.push_back(side->GetSize());
+    EXPECT_TRUE(array->Write(begin.data(), count.data(), nullptr, nullptr, real, values.data()));
+    put(*array, "units", unit);
+    return array;
+  };
+  const auto rows = root->CreateDimension("lat", "", "", latitudes.size());
+  const auto columns = root->CreateDimension("lon", "", "", kColumns);
+  std::vector<double> longitudes, heights;
+  for (std::size_t i = 0; i < kColumns; ++i) longitudes.push_back(5 + 0.5 * static_cast<double>(i));
+  for (std::size_t i = 0; i < kColumns * latitudes.size(); ++i) heights.push_back(static_cast<double>(i % 900));
+  put(*add("lat", {rows}, latitudes, "degrees_north"), "standard_name", "latitude");
+  put(*add("lon", {columns}, longitudes, "degrees_east"), "standard_name", "longitude");
+  const auto z = add("z", {rows, columns}, heights, "m");
+  const auto crs = root->CreateMDArray("crs", {}, GDALExtendedDataType::Create(GDT_Int32), nullptr);
+  put(*crs, "grid_mapping_name", "latitude_longitude");
+  put(*z, "grid_mapping", "crs");
+  if (positive != nullptr) put(*z, "positive", positive);
+  return path;
+}
+
+std::vector<double> Latitudes(int rows, double bend) {
+  std::vector<double> latitudes;
+  for (int row = 0; row < rows; ++row) latitudes.push_back(60 - 0.5 * row - bend * std::sin(0.2 * row));
+  return latitudes;
+}
+
+TEST(RasterWarnings, RowsThatAreNotEvenlySpacedAreRefused) {
+  const TempDir dir;
+  const auto refused = RasterSource::Open(WriteNetCdf(dir, Latitudes(40, 0.2)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::kInvalidArgument);
+  EXPECT_NE(refused.error().message.find("its rows are not evenly spaced: row "), std::string::npos)
+      << refused.error().message;
+  std::vector<double> upwards = Latitudes(40, 0.2);
+  std::ranges::reverse(upwards);
+  EXPECT_FALSE(RasterSource::Open(WriteNetCdf(dir, upwards)));
+  EXPECT_EQ(WarningsAbout(WriteNetCdf(dir, Latitudes(40, 0))), std::vector<std::string>());
+  // Latitudes in single precision.
+  for (double step : {1.0, 1.0 / 120, 1.0 / 1200}) {
+    std::vector<double> latitudes;
+    for (int row = 0; row < 40; ++row) latitudes.push_back(static_cast<float>(80 - step * row));
+    EXPECT_EQ(WarningsAbout(WriteNetCdf(dir, latitudes)), std::vector<std::string>()) << step;
+  }
+}
+
+TEST(RasterWarnings, BandsThatStateDepthsAreRefused) {
+  const TempDir dir;
+  const std::string path = WriteNetCdf(dir, Latitudes(40, 0), "down");
+  const auto refused = RasterSource::Open(path);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("its samples are depths; make heights of them"), std::string::npos)
+      << refused.error().message;
+  ExpectOne(WarningsAbout(path, {.vertical = "ellipsoid"}), "its band states \"positive: down\"");
+  EXPECT_TRUE(RasterSource::Open(WriteNetCdf(dir, Latitudes(40, 0), "up")));
+}
+
 // Tools copy the header of a DTED file into the metadata of GeoTIFFs.
 TEST(RasterWarnings, NameTheDatumOfADtedHeader) {
   const TempDir dir;
