@@ -29,8 +29,8 @@ class Archive {
   // The archives of a place: one, or those of several formats, in the folders that FolderOf names. Errors: those of
   // Open.
   static Result<std::vector<std::shared_ptr<const Archive>>> OpenAll(const std::string& place);
-  // The names of all files from which Open may open a place, and which a bake replaces last: the single file and the
-  // manifest of each format. A place has only some of them.
+  // The files by which a new archive at the place is noticed, because a bake replaces them last: the place itself, if
+  // it is one file, and the manifests in it and in the folder of each format. Not all of them exist.
   static std::vector<std::string> FilesOf(const std::string& place);
   virtual ~Archive() = default;
 

@@ -18,7 +18,8 @@ dem::GeoBounds HeightTileBounds(const Manifest& manifest);
 // TileJSON of an archive of height tiles, with a template relative to itself.
 std::string TileJson(const Manifest& manifest);
 
-// The metadata of a single file: layer.json or TileJSON, with the manifest as member kManifestMember.
+// The metadata of an archive in one file (WriteSingle of export.h): layer.json or TileJSON, with the manifest as member
+// kManifestMember.
 std::string SingleMetadata(const Manifest& manifest);
 
 }  // namespace terrace::archive

@@ -1,6 +1,6 @@
-// Other forms of an archive. A bake writes one file per unit (unit_writer.h), the form `chunks`. These functions read
-// the files and write the other form in one deterministic pass. `out` appears by rename when it is complete.
-// kCancelled: stopped.
+// Other forms of an archive. A bake writes one file per unit (unit_writer.h), which `terrace bake` calls the form
+// `chunks`. These functions read the files and write the other form in one deterministic pass. `out` appears by rename
+// when it is complete. kCancelled: stopped.
 #pragma once
 
 #include <stop_token>

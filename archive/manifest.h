@@ -93,7 +93,7 @@ Result<Manifest> ParseManifest(std::string_view json);
 // that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written.
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
 // kNotFound: there is no manifest: the place holds an unfinished bake, or something else. kInvalidArgument: see
-// ParseManifest. Also reads the manifest in the metadata of a single file.
+// ParseManifest. Also reads the manifest in an archive in one file (WriteSingle of export.h).
 Result<Manifest> ReadManifest(const std::string& place);
 
 }  // namespace terrace::archive

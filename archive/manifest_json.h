@@ -1,4 +1,4 @@
-// The manifest as JSON. Also part of the metadata of a single file.
+// The manifest as JSON. Also part of the metadata of an archive in one file (WriteSingle of export.h).
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 
 namespace terrace::archive {
 
-// JSON with the manifest as its member kManifestMember: metadata of a single file.
+// JSON with the manifest as its member kManifestMember: metadata of an archive in one file.
 inline constexpr const char* kManifestMember = "terrace";
 // kInvalidArgument: the text is not a JSON object or has no such member.
 Result<std::string> ManifestIn(std::string_view metadata);

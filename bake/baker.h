@@ -20,7 +20,7 @@
 
 namespace terrace::bake {
 
-// An archive to be made.
+// Where tiles are baked to: an archive to be made, or, with `create` and `has`, a cache.
 struct Target {
   std::string place;
   archive::Manifest manifest;  // without units

@@ -20,7 +20,7 @@ std::string ReadText(const std::filesystem::path& file);
 // The names directly below a folder. Errors: there is no such folder, it cannot be read, or it is in a bucket and
 // without objects (archive::NamesInBucket).
 Result<std::vector<std::string>> NamesIn(const std::filesystem::path& folder);
-// What is not there is no error; others are ignored as well.
+// Removes a file if it is there; all errors are ignored.
 void Remove(const std::filesystem::path& file);
 
 // Creates a file together with its content, so that no process reads it empty. False: there is one already. An

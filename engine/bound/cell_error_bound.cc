@@ -123,7 +123,7 @@ double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) co
   // If members are misplaced, samples of the cell may count as neighbouring ones. The last average of an axis may be up
   // to twice as near.
   const Position& off = statistics_.misplacement();
-  const double off_x = 2 * off.x / trace_.factor, off_y = 2 * off.y / trace_.factor;
+  const double off_x = 2 * off.x / reading_.factor, off_y = 2 * off.y / reading_.factor;
   const auto below = [](double weight) { return static_cast<std::int64_t>(std::floor(weight)); };
   const auto above = [](double weight) {
     return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(weight)));
@@ -131,7 +131,7 @@ double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) co
   SampleBox around;
   for (std::size_t k = 0; k < 4; ++k) {
     const auto [node_column, node_row] = tile_.NodeAt(cell, k);
-    const GridCell at = trace_.cells.OfNode(node_column, node_row);
+    const GridCell at = reading_.cells.OfNode(node_column, node_row);
     SampleBox near{at.column, at.row, at.column + 1, at.row + 1};
     if (off_x > 0 || off_y > 0) {
       near = {at.column + below(at.x - off_x), at.row + below(at.y - off_y), at.column + above(at.x + off_x),
@@ -145,7 +145,7 @@ double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) co
   }
   around.north = std::max<std::int64_t>(around.north, 0);
   around.south = std::min(around.south, rows_ - 1);
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   const SampleBox read = {std::max(around.west, window.column), std::max(around.north, window.row),
                           std::min(around.east, window.column + window.columns - 1),
                           std::min(around.south, window.row + window.rows - 1)};
@@ -155,10 +155,10 @@ double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) co
 
 // A bound from the averages in a box of the window.
 double CellErrorBound::BoundByBox(const TileCell& cell, const SampleBox& averages, bool& has_voids) const {
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   double lowest = kUnknownError, highest = -lowest;
   for (std::int64_t row = averages.north; row <= averages.south; ++row) {
-    const float* const line = trace_.samples.data() + (row - window.row) * window.columns - window.column;
+    const float* const line = reading_.samples.data() + (row - window.row) * window.columns - window.column;
     for (std::int64_t column = averages.west; column <= averages.east; ++column) {
       const float average = line[column];
       has_voids |= std::isnan(average);
@@ -176,7 +176,7 @@ double CellErrorBound::BoundByBox(const TileCell& cell, const SampleBox& average
 
 // A bound from the averages near the samples in a box of pixels; infinite if some were not read.
 double CellErrorBound::BoundByAveragesNear(const TileCell& cell, const PixelBounds& box) const {
-  const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / trace_.factor - 0.5)); };
+  const auto index = [&](double pixel) { return static_cast<std::int64_t>(std::floor(pixel / reading_.factor - 0.5)); };
   std::int64_t left = index(box.west), right = index(box.east) + 1;
   // One average more, because the last average of an axis may cover fewer pixels and lie nearer.
   const std::int64_t top = std::clamp<std::int64_t>(index(box.north), 0, rows_ - 1);
@@ -184,10 +184,10 @@ double CellErrorBound::BoundByAveragesNear(const TileCell& cell, const PixelBoun
   if (!grid_.wraps()) {
     left = std::clamp<std::int64_t>(left, 0, columns_ - 1);
     right = std::clamp<std::int64_t>(right + 1, 0, columns_ - 1);
-  } else if (grid_.columns() % trace_.factor != 0) {
+  } else if (grid_.columns() % reading_.factor != 0) {
     return kUnknownError;
   }
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   if (top < window.row || bottom >= window.row + window.rows) return kUnknownError;
   for (const int turn : {0, -1, 1}) {
     const std::int64_t shift = turn * columns_;
@@ -204,11 +204,11 @@ std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell&
   std::array<Position, 4> corners;
   for (std::size_t k = 0; k < 4; ++k) {
     const auto [column, row] = tile_.NodeAt(cell, k);
-    corners[k] = trace_.cells.positions().OfNode(column, row);
+    corners[k] = reading_.cells.positions().OfNode(column, row);
     if (grid_.georeference().is_geographic_grid()) {
       // The nodes of a pole may share one position: use the columns of the row beside it.
-      if (row == 0) corners[k].x = trace_.cells.positions().OfNode(column, row + 1).x;
-      if (row == tile_.lattice.rows()) corners[k].x = trace_.cells.positions().OfNode(column, row - 1).x;
+      if (row == 0) corners[k].x = reading_.cells.positions().OfNode(column, row + 1).x;
+      if (row == tile_.lattice.rows()) corners[k].x = reading_.cells.positions().OfNode(column, row - 1).x;
       const double turn = grid_.georeference().period(), near = k == 0 ? grid_.columns() / 2.0 : corners[0].x;
       const double turns = (near - corners[k].x) / turn;
       if (std::abs(turns) >= 0.5) corners[k].x += turn * std::round(turns);  // else 0; round is a call
@@ -230,7 +230,7 @@ bool CellErrorBound::IsOnBothEnds(const PixelBounds& box) const {
 // One query for the box in place of one for each cell: the samples around a cell are among those around the box.
 bool CellErrorBound::HasNoSamples(const CellBox& box) const {
   const bool has_turns = grid_.georeference().is_geographic_grid();
-  const bool is_separable = trace_.cells.positions().is_separable();  // then one row and one column tell all
+  const bool is_separable = reading_.cells.positions().is_separable();  // then one row and one column tell all
   const double turn = grid_.georeference().period(), middle = grid_.columns() / 2.0;
   PixelBounds at;
   for (int j = box.south; j <= box.north; ++j) {
@@ -238,7 +238,7 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
       const std::int64_t column = tile_.window.column + 1 + i, row = tile_.window.row + 1 + j;
       // The places of a pole's nodes are those of the rows beside it, and far from the middle turns may be added.
       if (has_turns && (row <= 0 || row >= tile_.lattice.rows())) return false;
-      Position corner = trace_.cells.positions().OfNode(column, row);
+      Position corner = reading_.cells.positions().OfNode(column, row);
       if (!std::isfinite(corner.x) || !std::isfinite(corner.y)) return false;
       // Nodes west of the raster may have places east of it, nearly a turn further on.
       const double turns = has_turns && turn > 0 ? (middle - corner.x) / turn : 0;
@@ -256,15 +256,15 @@ bool CellErrorBound::HasNoSamples(const CellBox& box) const {
                                               static_cast<double>(in.east), static_cast<double>(in.south));
   if (range.min > range.max) return true;
   // The blocks of the statistics are large: samples that were read tell more.
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   const SampleBox near = Clipped(in);
   if (near.empty()) return true;
-  if (trace_.factor > 1 || near.west < window.column || near.east >= window.column + window.columns ||
+  if (reading_.factor > 1 || near.west < window.column || near.east >= window.column + window.columns ||
       near.north < window.row || near.south >= window.row + window.rows) {
     return false;
   }
   for (std::int64_t row = near.north; row <= near.south; ++row) {
-    const auto first = trace_.samples.begin() + (row - window.row) * window.columns + (near.west - window.column);
+    const auto first = reading_.samples.begin() + (row - window.row) * window.columns + (near.west - window.column);
     if (!std::all_of(first, first + near.columns(), [](float sample) { return std::isnan(sample); })) return false;
   }
   return true;
@@ -282,7 +282,7 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool between, b
   const Position& off = statistics_.misplacement();
   box.Grow((box.east - box.west) * kBulge + halo + off.x, (box.south - box.north) * kBulge + halo + off.y);
   if (fills) {
-    const double reach = grid_.options().max_void_gap + trace_.factor;
+    const double reach = grid_.options().max_void_gap + reading_.factor;
     PixelBounds wide = box;
     wide.Grow(reach, reach);
     fills = grid_.Ranges({wide.west, wide.north, wide.east, wide.south}).has_voids;
@@ -303,10 +303,10 @@ double CellErrorBound::BoundBySurroundings(const TileCell& cell, bool between, b
   if (fills) return error;
   error = std::min(error, BoundByAveragesNear(cell, box));
   cell_samples = CellSamples{*corners, Clipped(CentresIn(box, 0)), between};
-  if (trace_.factor > 1) return error;
+  if (reading_.factor > 1) return error;
   for (const int turn : {0, -1, 1}) {
     if (turn != 0 && !grid_.wraps()) continue;
-    error = std::min(error, BoundBySamples(cell, *cell_samples, trace_.window, trace_.samples,
+    error = std::min(error, BoundBySamples(cell, *cell_samples, reading_.window, reading_.samples,
                                            turn * static_cast<std::int64_t>(grid_.columns()), known));
   }
   return error;
@@ -322,7 +322,7 @@ double CellErrorBound::BoundBySamples(const TileCell& cell, const CellSamples& c
     return kUnknownError;
   }
   const Position& off = statistics_.misplacement();
-  const double slack = MaxPositionError(grid_.georeference()) * trace_.factor;
+  const double slack = MaxPositionError(grid_.georeference()) * reading_.factor;
   const bool is_separable = grid_.georeference().is_geographic_grid() && grid_.georeference().is_affine();
   CellSurface surface(cell_samples.corners, is_separable, {off.x + slack, off.y + slack});
   const double geoid_error = geoid_.BoundOver(cell.box());

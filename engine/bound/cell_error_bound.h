@@ -20,15 +20,15 @@ namespace terrace::dem {
 class CellErrorBound {
  public:
   // The arguments must outlive this object.
-  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+  CellErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridReading& reading,
                  const GridStatistics& statistics, const GeoidErrorBound& geoid)
       : tile_(tile),
         grid_(grid),
-        trace_(trace),
+        reading_(reading),
         statistics_(statistics),
         geoid_(geoid),
-        columns_(GridAxis(grid.columns(), trace.factor, grid.wraps()).count()),
-        rows_(GridAxis(grid.rows(), trace.factor, false).count()) {}
+        columns_(GridAxis(grid.columns(), reading.factor, grid.wraps()).count()),
+        rows_(GridAxis(grid.rows(), reading.factor, false).count()) {}
 
   // Returns a bound from the averages that the cell's nodes are interpolated from: the surface lies between the
   // averages, and the samples lie within the averaging error of it. Sets `has_voids` if some averages are void.
@@ -68,10 +68,10 @@ class CellErrorBound {
 
   const TileNodes tile_;
   const RasterGrid& grid_;
-  const GridTrace& trace_;
+  const GridReading& reading_;
   const GridStatistics& statistics_;
   const GeoidErrorBound& geoid_;
-  const std::int64_t columns_, rows_;  // of averages of the trace's factor
+  const std::int64_t columns_, rows_;  // of averages of the reading's factor
 };
 
 }  // namespace terrace::dem

@@ -12,8 +12,12 @@ constexpr std::size_t kFewMembers = 8;
 
 }  // namespace
 
-GridStatistics::GridStatistics(const RasterGrid& grid, const GridTrace& trace)
-    : grid_(grid), trace_(trace), turn_(grid.georeference().period()), around_(BoxAround()), near_(MembersAround()) {
+GridStatistics::GridStatistics(const RasterGrid& grid, const GridReading& reading)
+    : grid_(grid),
+      reading_(reading),
+      turn_(grid.georeference().period()),
+      around_(BoxAround()),
+      near_(MembersAround()) {
   for (const std::size_t i : near_) {
     const Position& off = grid.members()[i].misplacement;
     misplacement_ = {std::max(misplacement_.x, off.x), std::max(misplacement_.y, off.y)};
@@ -27,7 +31,7 @@ GridStatistics::GridStatistics(const RasterGrid& grid, const GridTrace& trace)
 Box GridStatistics::BoxAround() const {
   Box hull{1e300, 1e300, -1e300, -1e300};
   if (grid_.members().size() == 1) return hull;  // near members are not needed
-  const NodePositions& positions = trace_.cells.positions();
+  const NodePositions& positions = reading_.cells.positions();
   // For separable nodes, the first row and the first column represent all others.
   const bool is_separable = positions.is_separable();
   double of_row = grid_.columns() / 2.0;
@@ -43,7 +47,7 @@ Box GridStatistics::BoxAround() const {
       hull = {std::min(hull.min_x, x), std::min(hull.min_y, p.y), std::max(hull.max_x, x), std::max(hull.max_y, p.y)};
     }
   }
-  const double halo = 4.0 * trace_.factor;
+  const double halo = 4.0 * reading_.factor;
   return {hull.min_x - halo, hull.min_y - halo, hull.max_x + halo, hull.max_y + halo};
 }
 
@@ -93,7 +97,7 @@ BlockRange GridStatistics::Ranges(double west, double north, double east, double
 }
 
 float GridStatistics::ErrorOfAverages(double west, double north, double east, double south) const {
-  const int factor = trace_.factor;
+  const int factor = reading_.factor;
   if (factor == 1) return 0;  // averages of one sample
   const auto error_of = [&](const GridMember& member, const RasterStatistics* statistics) {
     const auto x = static_cast<double>(member.column), y = static_cast<double>(member.row);
@@ -123,7 +127,7 @@ float GridStatistics::ErrorOfAverages(double west, double north, double east, do
 }
 
 float GridStatistics::AveragingError(double west, double north, double east, double south) const {
-  const double factor = trace_.factor, turn = grid_.columns();
+  const double factor = reading_.factor, turn = grid_.columns();
   west *= factor, north *= factor, east = (east + 1) * factor, south = (south + 1) * factor;
   const auto error = [&](double shift) { return ErrorOfAverages(west + shift, north, east + shift, south); };
   float largest = error(0);

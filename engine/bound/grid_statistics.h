@@ -10,8 +10,8 @@ namespace terrace::dem {
 
 class GridStatistics {
  public:
-  // `grid` and `trace` must outlive this.
-  GridStatistics(const RasterGrid& grid, const GridTrace& trace);
+  // `grid` and `reading` must outlive this.
+  GridStatistics(const RasterGrid& grid, const GridReading& reading);
 
   // Members visited by all queries so far. For tests: a query visits the members that its box meets.
   std::size_t members_visited() const { return members_visited_; }
@@ -22,7 +22,7 @@ class GridStatistics {
   // A range that contains all samples in a box, in pixels. Clips the box to the raster grid.
   BlockRange Ranges(double west, double north, double east, double south) const;
 
-  // The largest distance of samples from the surface between averages of the trace's factor (averaging_errors.h). The
+  // The largest distance of samples from the surface between averages of the reading's factor (averaging_errors.h). The
   // box is in averages, ends included. Infinite where several rasters contribute to that surface.
   float AveragingError(double west, double north, double east, double south) const;
 
@@ -37,7 +37,7 @@ class GridStatistics {
   float ErrorOfAverages(double west, double north, double east, double south) const;  // of pixels
 
   const RasterGrid& grid_;
-  const GridTrace& trace_;
+  const GridReading& reading_;
   const double turn_;              // columns; 0: the raster grid does not wrap around the Earth
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn

@@ -44,15 +44,15 @@ float Sum(const float* values, std::size_t count) {
 
 }  // namespace
 
-SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridReading& reading,
                                    const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends)
     : tile_(tile),
-      trace_(trace),
+      reading_(reading),
       statistics_(statistics),
       geoid_(geoid),
       blends_(blends),
       position_error_(MaxPositionError(grid.georeference())),
-      misplacement_{statistics.misplacement().x / trace.factor, statistics.misplacement().y / trace.factor} {
+      misplacement_{statistics.misplacement().x / reading.factor, statistics.misplacement().y / reading.factor} {
   PlaceNodes(grid);
 }
 
@@ -60,22 +60,22 @@ SmoothErrorBound::SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid
 // average covers fewer samples. Beyond the outermost averages, where the surface is constant, all places are those of
 // the averages: the steps between places change there, which counts as a bend.
 void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
-  const GridAxis columns(grid.columns(), trace_.factor, grid.wraps()), rows(grid.rows(), trace_.factor, false);
+  const GridAxis columns(grid.columns(), reading_.factor, grid.wraps()), rows(grid.rows(), reading_.factor, false);
   const auto last = [&](const GridAxis& axis, int samples) {
-    return static_cast<double>(axis.count() - (samples % trace_.factor == 0 ? 1 : 2));
+    return static_cast<double>(axis.count() - (samples % reading_.factor == 0 ? 1 : 2));
   };
   const double last_x = last(columns, grid.columns()) - misplacement_.x;
   const double last_y = last(rows, grid.rows()) - misplacement_.y;
   const auto of_column = [&](std::int64_t column, double weight) {
     const double x = static_cast<double>(column) + weight;
-    const bool is_even = (grid.wraps() && grid.columns() % trace_.factor == 0) || (x >= 0 && x <= last_x);
+    const bool is_even = (grid.wraps() && grid.columns() % reading_.factor == 0) || (x >= 0 && x <= last_x);
     return is_even ? x : kUnknown;
   };
   const auto of_row = [&](std::int64_t row, double weight) {
     const double y = static_cast<double>(row) + weight;
     return y >= 0 && y <= last_y ? y : kUnknown;
   };
-  const NodeCells& cells = trace_.cells;
+  const NodeCells& cells = reading_.cells;
   const NodeWindow& part = cells.window();  // nodes beyond have no height from this raster grid
   const auto west = static_cast<std::size_t>(part.column - tile_.window.column);
   const auto south = static_cast<std::size_t>(part.row - tile_.window.row);
@@ -94,7 +94,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
     }
     return;
   }
-  const std::size_t nodes = trace_.heights.size(), columns_here = cells.positions().columns();
+  const std::size_t nodes = reading_.heights.size(), columns_here = cells.positions().columns();
   x_ = std::make_unique_for_overwrite<double[]>(nodes);
   y_ = std::make_unique_for_overwrite<double[]>(nodes);
   if (cells.positions().rows() < static_cast<std::size_t>(tile_.window.rows) || columns_here < tile_.stride()) {
@@ -104,7 +104,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
   for (std::size_t j = 0; j < cells.positions().rows(); ++j) {
     const std::size_t first = (south + j) * tile_.stride() + west;
     double *const x = x_.get() + first, *const y = y_.get() + first;
-    const float* const heights = trace_.heights.data() + first;
+    const float* const heights = reading_.heights.data() + first;
     const bool are_all_known = GridCoordinatesOf(cells.positions().Row(j), cells.axes(), {heights, columns_here},
                                                  {last_x, last_y}, {x, columns_here}, {y, columns_here});
     for (std::size_t i = 0; !are_all_known && i < columns_here; ++i) {
@@ -119,7 +119,7 @@ void SmoothErrorBound::PlaceNodes(const RasterGrid& grid) {
 
 // Returns false if one of the nodes `first` to `end` of a row of the tile's window has no height from this raster grid.
 bool SmoothErrorBound::GaveHeights(std::size_t row, std::size_t first, std::size_t end) const {
-  return !HasVoids(std::span(trace_.heights).subspan(row * tile_.stride() + first, end - first));
+  return !HasVoids(std::span(reading_.heights).subspan(row * tile_.stride() + first, end - first));
 }
 
 PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
@@ -129,7 +129,7 @@ PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
       const std::size_t n = tile_.NodeOf(i, j);
       const double x = is_separable_ ? x_[static_cast<std::size_t>(i + 1)] : x_[n];
       const double y = is_separable_ ? y_[static_cast<std::size_t>(j + 1)] : y_[n];
-      if (std::isnan(x + y) || std::isnan(trace_.heights[n])) return {};
+      if (std::isnan(x + y) || std::isnan(reading_.heights[n])) return {};
       bounds.Add(x, y);
     }
   }
@@ -151,7 +151,7 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {
       const std::size_t n = tile_.NodeOf(i, j);
-      largest = std::max(largest, std::abs(tile_.heights[n] - trace_.heights[n]));
+      largest = std::max(largest, std::abs(tile_.heights[n] - reading_.heights[n]));
     }
   }
   return largest;
@@ -222,7 +222,7 @@ SampleBox SmoothErrorBound::AveragesIn(const PixelBounds& at) const {
 
 // Beyond the outermost averages the surface is constant.
 SampleBox SmoothErrorBound::Clipped(SampleBox range) const {
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   return {std::max(range.west, window.column), std::max(range.north, window.row),
           std::min(range.east, window.column + window.columns - 1),
           std::min(range.south, window.row + window.rows - 1)};
@@ -234,7 +234,7 @@ bool SmoothErrorBound::Measure(const SampleBox& range, Differences& differences)
   const bool is_in_band = in.north == band_.top && in.south == band_.bottom;
   if (!is_in_band) MeasureColumns(in, box_);
   const ColumnDifferences& of_column = is_in_band ? band_ : box_;
-  const auto first = static_cast<std::size_t>(is_in_band ? in.west - trace_.window.column : 0);
+  const auto first = static_cast<std::size_t>(is_in_band ? in.west - reading_.window.column : 0);
   const auto columns = static_cast<std::size_t>(in.east - in.west + 1);
   const auto largest = [&](const std::vector<float>& values, std::size_t count) {
     constexpr double kUp = 1 + 1e-6;  // rounding of differences of floats
@@ -247,19 +247,19 @@ bool SmoothErrorBound::Measure(const SampleBox& range, Differences& differences)
 }
 
 void SmoothErrorBound::MeasureColumns(const SampleBox& range, ColumnDifferences& differences) const {
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   differences.Resize(static_cast<std::size_t>(range.east - range.west + 1));
-  MeasureDifferences(trace_.samples.data() + (range.north - window.row) * window.columns + (range.west - window.column),
-                     static_cast<std::size_t>(window.columns), static_cast<std::size_t>(range.south - range.north + 1),
-                     differences);
+  MeasureDifferences(
+      reading_.samples.data() + (range.north - window.row) * window.columns + (range.west - window.column),
+      static_cast<std::size_t>(window.columns), static_cast<std::size_t>(range.south - range.north + 1), differences);
 }
 
 // All boxes of a row of cells use the same rows of samples: differences are computed once for all, along whole rows.
 void SmoothErrorBound::PrepareRows(int south, int north) {
   band_.top = 0, band_.bottom = -1;
-  if (!is_separable_ || trace_.samples.empty()) return;
+  if (!is_separable_ || reading_.samples.empty()) return;
   const auto rows = static_cast<std::size_t>(north - south + 3);
-  const auto nodes = std::span(trace_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
+  const auto nodes = std::span(reading_.heights).subspan(static_cast<std::size_t>(south) * tile_.stride());
   const bool are_known = !HasVoids(nodes.first(rows * tile_.stride()));
   known_south_ = are_known ? south : 0;
   known_north_ = are_known ? north : -1;
@@ -269,7 +269,7 @@ void SmoothErrorBound::PrepareRows(int south, int north) {
   at.Add(0, y0);
   at.Add(0, y1);
   at.Grow(0, misplacement_.y);
-  const GridWindow& window = trace_.window;
+  const GridWindow& window = reading_.window;
   SampleBox range = AveragesIn(at);
   range.west = window.column, range.east = window.column + window.columns - 1;
   range = Clipped(range);

@@ -19,7 +19,7 @@ namespace terrace::dem {
 class SmoothErrorBound {
  public:
   // `blends`: raster grids are blended where they meet. The other arguments must outlive this object.
-  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridTrace& trace,
+  SmoothErrorBound(const TileNodes& tile, const RasterGrid& grid, const GridReading& reading,
                    const GridStatistics& statistics, const GeoidErrorBound& geoid, bool blends);
 
   // Makes BoundOver faster for boxes of cell rows `south` to `north`. Results do not depend on it.
@@ -51,7 +51,7 @@ class SmoothErrorBound {
   double LargestBlend(const CellBox& box) const;
 
   const TileNodes tile_;
-  const GridTrace& trace_;
+  const GridReading& reading_;
   const GridStatistics& statistics_;
   const GeoidErrorBound& geoid_;
   const bool blends_;
@@ -62,7 +62,7 @@ class SmoothErrorBound {
   bool is_separable_ = false;
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared
 
-  // By column of the trace's window, over rows `top` to `bottom` of the averages.
+  // By column of the reading's window, over rows `top` to `bottom` of the averages.
   struct Band : ColumnDifferences {
     std::int64_t top = 0, bottom = -1;
   };

@@ -90,15 +90,15 @@ class LooseCells {
 // and so on down to single cells. Large boxes come first, because cells below the bound known by then need no work.
 class GridErrorBound {
  public:
-  GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridTrace& trace)
+  GridErrorBound(SourceErrorBound& tile, const RasterGrid& grid, const GridReading& reading)
       : tile_(tile),
         nodes_{tile.lattice_, tile.window_, tile.heights_},
         grid_(grid),
-        trace_(trace),
-        statistics_(grid, trace),
-        geoid_(nodes_, grid.undulations(), trace.undulations),
-        smooth_(nodes_, grid, trace, statistics_, geoid_, tile.blends_),
-        single_(nodes_, grid, trace, statistics_, geoid_),
+        reading_(reading),
+        statistics_(grid, reading),
+        geoid_(nodes_, grid.undulations(), reading.undulations),
+        smooth_(nodes_, grid, reading, statistics_, geoid_, tile.blends_),
+        single_(nodes_, grid, reading, statistics_, geoid_),
         loose_(grid, single_) {}
 
   Result<void> Add(const std::stop_token& stop) {
@@ -134,17 +134,17 @@ class GridErrorBound {
   bool MayBlend(const CellBox& box) const {
     if (!tile_.blends_) return false;
     const PixelBounds at = smooth_.BoundsOf(box);
-    const double factor = trace_.factor;
+    const double factor = reading_.factor;
     if (!(at.west <= at.east)) return true;
-    if (trace_.includes_filled && CountInFull(at)) return false;
+    if (reading_.includes_filled && CountInFull(at)) return false;
     return grid_.MayBlend({at.west * factor, at.north * factor, (at.east + 1) * factor, (at.south + 1) * factor},
-                          trace_.factor);
+                          reading_.factor);
   }
 
   // Checks all samples around a box. Weights are rounded to 2^-10.
   bool CountInFull(const PixelBounds& at) const {
-    if (trace_.weights.empty()) return true;
-    const GridWindow& window = trace_.window;
+    if (reading_.weights.empty()) return true;
+    const GridWindow& window = reading_.window;
     const auto west = static_cast<std::int64_t>(std::floor(at.west)) - 1;
     const auto east = static_cast<std::int64_t>(std::floor(at.east)) + 2;
     const auto north = static_cast<std::int64_t>(std::floor(at.north)) - 1;
@@ -154,17 +154,17 @@ class GridErrorBound {
       return false;
     }
     for (std::int64_t row = north; row <= south; ++row) {
-      const auto first = trace_.weights.begin() + (row - window.row) * window.columns + (west - window.column);
+      const auto first = reading_.weights.begin() + (row - window.row) * window.columns + (west - window.column);
       if (std::any_of(first, first + (east - west + 1), [](float weight) { return weight < 1; })) return false;
     }
     return true;
   }
 
-  // Whether the box may have filled heights that the trace does not contain.
+  // Whether the box may have filled heights that the reading does not contain.
   bool MayBeFilled(const CellBox& box) const {
-    if (trace_.includes_filled) return false;
+    if (reading_.includes_filled) return false;
     const PixelBounds at = smooth_.BoundsOf(box);
-    const double factor = trace_.factor;
+    const double factor = reading_.factor;
     const auto has_voids = [&] {
       return grid_
           .Ranges({(at.west - 1) * factor, (at.north - 1) * factor, (at.east + 2) * factor, (at.south + 2) * factor})
@@ -188,7 +188,7 @@ class GridErrorBound {
   // either: every part of the bound grows with the box, except that of a geoid. Where positions are not separable, the
   // bound of rows takes as long as those of their groups, and is seldom small enough.
   bool AddRows(const CellBox& box) {
-    if (!trace_.cells.is_separable() || tile_.blends_ || geoid_.is_added() || IsCovered(box) || !Touches(box)) {
+    if (!reading_.cells.is_separable() || tile_.blends_ || geoid_.is_added() || IsCovered(box) || !Touches(box)) {
       return false;
     }
     Prepare(box);
@@ -235,7 +235,7 @@ class GridErrorBound {
   // Whether no node of the box took its height from the raster grid.
   bool HasNoHeights(const CellBox& box) const {
     for (int j = box.south; j <= box.north; ++j) {
-      const auto first = trace_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeOf(box.west, j));
+      const auto first = reading_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeOf(box.west, j));
       if (!std::all_of(first, first + (box.east - box.west + 1), [](float height) { return std::isnan(height); })) {
         return false;
       }
@@ -263,9 +263,9 @@ class GridErrorBound {
   }
 
   void AddCell(int i, int j, bool may_blend) {
-    const bool fills = may_blend && !trace_.includes_filled;
+    const bool fills = may_blend && !reading_.includes_filled;
     const TileCell cell = nodes_.Cell(i, j);
-    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return std::isnan(trace_.heights[node]); })) {
+    if (std::ranges::any_of(cell.nodes, [&](std::size_t node) { return std::isnan(reading_.heights[node]); })) {
       if (Touches(cell.box())) AddUneven(cell, may_blend, fills, kUnknownError);
       return;
     }
@@ -286,14 +286,14 @@ class GridErrorBound {
     const double error = std::min(known, single_.BoundBySurroundings(cell, may_blend || tile_.counts_between_, fills,
                                                                      tile_.bound_, cell_samples));
     if (error <= tile_.bound_) return;
-    if (!cell_samples || !LooseCells::MayRead(trace_.factor)) return Raise(error);
+    if (!cell_samples || !LooseCells::MayRead(reading_.factor)) return Raise(error);
     loose_.Add(cell, *cell_samples, error);
   }
 
   SourceErrorBound& tile_;
   const TileNodes nodes_;
   const RasterGrid& grid_;
-  const GridTrace& trace_;
+  const GridReading& reading_;
   const GridStatistics statistics_;
   const GeoidErrorBound geoid_;
   SmoothErrorBound smooth_;
@@ -316,8 +316,8 @@ SourceErrorBound::SourceErrorBound(const geo::Lattice& lattice, const NodeWindow
       counts_between_(counts_between),
       covered_(Area(lattice.cells, lattice.cells)) {}
 
-Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop) {
-  return GridErrorBound(*this, grid, trace).Add(stop);
+Result<void> SourceErrorBound::Add(const RasterGrid& grid, const GridReading& reading, const std::stop_token& stop) {
+  return GridErrorBound(*this, grid, reading).Add(stop);
 }
 
 bool SourceErrorBound::is_covered() const { return std::memchr(covered_.data(), 0, covered_.size()) == nullptr; }

@@ -26,9 +26,9 @@ class SourceErrorBound {
   SourceErrorBound(const geo::Lattice& lattice, const NodeWindow& window, std::span<const float> heights, bool blends,
                    bool counts_between = false);
 
-  // `trace`: of RasterGrid::FillNodes for this window, with heights above the ellipsoid. Reads samples where
+  // `reading`: of RasterGrid::FillNodes for this window, with heights above the ellipsoid. Reads samples where
   // statistics and averages give no tight bound. kUnavailable: a raster cannot be read now. kCancelled: stopped.
-  Result<void> Add(const RasterGrid& grid, const GridTrace& trace, const std::stop_token& stop);
+  Result<void> Add(const RasterGrid& grid, const GridReading& reading, const std::stop_token& stop);
 
   // Whether the raster grids added so far hide all others.
   bool is_covered() const;

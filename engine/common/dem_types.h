@@ -129,7 +129,7 @@ struct RasterInfo {
   std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: metres assumed
   bool knows_height_unit = true;             // false: metres assumed
-  std::string picture_part;                  // colour interpretation of a picture's band, "red"; empty: none
+  std::string picture_color;                 // colour interpretation of a picture's band, "red"; empty: none
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // along the finer axis at the centre, metres on the ground

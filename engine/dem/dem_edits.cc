@@ -215,26 +215,26 @@ template <typename NodeGrid>
 Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
                                               std::span<const std::size_t> which, std::span<float> heights,
                                               const std::stop_token& stop, double* error_m) const {
-  // Heights of a replacement before other edits, so that its voids show what is below. Features with the same source
+  // Heights of a replacement, without its floor, so that its voids show what is below. Features with the same source
   // share them.
   std::map<std::size_t, ReplacedHeights> known;
   const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
     if (const auto found = known.find(edit.replacement); found != known.end()) return &found->second;
     const Impl& other = *replacements[edit.replacement]->impl_;
-    std::vector<PartTrace> traces;
+    std::vector<PartReading> readings;
     auto read = other.ReadGrids(node_grid, window, HeightDatum::kEllipsoid, edit.source, stop,
-                                error_m != nullptr ? &traces : nullptr);
+                                error_m != nullptr ? &readings : nullptr);
     if (!read) return tl::unexpected(std::move(read).error());
     ReplacedHeights result{*std::move(read), 0};
     if constexpr (std::is_same_v<NodeGrid, geo::Lattice>) {
       if (error_m != nullptr) {
-        result.void_cells = other.VoidCells(node_grid, window, traces);
+        result.void_cells = other.VoidCells(node_grid, window, readings);
         TileHeights tile{node_grid, window.columns, result.heights};
         for (std::size_t k = 0; k < tile.heights.size(); ++k) {
           if (std::isnan(tile.heights[k])) tile.heights[k] = heights[k];
         }
-        // The samples of the sources take heights between those of the replacement.
-        const auto bound = other.BoundError(tile, window, std::move(traces), stop, /*counts_between=*/true);
+        // The samples of the sources lie between those of the replacement, and are compared with its heights there.
+        const auto bound = other.BoundError(tile, window, std::move(readings), stop, /*counts_between=*/true);
         if (!bound) return tl::unexpected(bound.error());
         result.error_m = *bound;
       }
@@ -253,7 +253,8 @@ template Result<void> ElevationModel::Impl::ApplyEdits(const geo::MercatorGrid&,
                                                        std::span<const std::size_t>, std::span<float>,
                                                        const std::stop_token&, double*) const;
 
-// Where there is no height, an edit whose weight is 1 makes one, but above the ellipsoid alone.
+// Where there is no height, an edit whose weight is 1 makes one if `datum` is kEllipsoid; in other datums it stays
+// void.
 Result<void> ElevationModel::Impl::EditPoints(std::span<const GeoPosition> points, HeightDatum datum,
                                               std::span<float> heights, const std::stop_token& stop) const {
   std::vector<std::size_t> edited;

@@ -19,11 +19,11 @@
 
 namespace terrace::dem {
 
-// The trace of RasterGrid::FillNodes for a window. If `part` is set, the trace covers that part only, and its
-// `cells` are empty.
-struct PartTrace {
+// What RasterGrid::FillNodes read for a window, which the certified error needs. If `part` is set, it was for that part
+// only, and the `cells` are empty.
+struct PartReading {
   std::optional<NodeWindow> part = {};
-  GridTrace trace = {};
+  GridReading reading = {};
 };
 
 // What the heights of a raster grid depend on, for ElevationModel::ContentBelow.
@@ -37,10 +37,11 @@ class ElevationModel::Impl {
   // `what`: names the request in messages.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
                                        const std::stop_token& stop) const;
-  // The same before the edits. `traces`: unless null, receives the traces of the raster grids that were read, in order.
+  // The same before the edits. `readings`: unless null, receives the readings of the raster grids that were read, in
+  // order.
   Result<std::vector<float>> ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
                                           const std::string& what, const std::stop_token& stop,
-                                          std::vector<PartTrace>* traces = nullptr) const;
+                                          std::vector<PartReading>* readings = nullptr) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
@@ -48,9 +49,9 @@ class ElevationModel::Impl {
   template <typename NodeGrid>
   Result<std::vector<float>> ReadGrids(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                        const std::string& what, const std::stop_token& stop,
-                                       std::vector<PartTrace>* traces) const;
-  // `counts_between`: heights between samples count as well.
-  Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartTrace> traces,
+                                       std::vector<PartReading>* readings) const;
+  // `counts_between`: as for SourceErrorBound.
+  Result<double> BoundError(const TileHeights& tile, const NodeWindow& window, std::vector<PartReading> readings,
                             const std::stop_token& stop, bool counts_between = false) const;
   // The raster grids that may have heights in the box, in order of precedence.
   std::vector<std::size_t> GridsAt(const Box& degrees) const;
@@ -73,9 +74,9 @@ class ElevationModel::Impl {
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
-  // ReplacedHeights::void_cells. `traces`: of this model, for the window. void_cells.cc.
+  // ReplacedHeights::void_cells. `readings`: of this model, for the window. void_cells.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
-                                      std::span<const PartTrace> traces) const;
+                                      std::span<const PartReading> readings) const;
   // The edits that may reach the nodes of a window.
   template <typename NodeGrid>
   std::vector<std::size_t> EditsAt(const NodeGrid& node_grid, const NodeWindow& window) const;

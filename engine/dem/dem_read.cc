@@ -74,12 +74,13 @@ void ForPart(const NodeWindow& part, const NodeWindow& window, Visit&& visit) {
 }
 
 // RasterGrid::FillNodes. If there are many raster grids, only for the part of the window that this one reaches: a
-// shallow tile may have thousands of small ones, and their traces are kept until all heights are known.
+// shallow tile may have thousands of small ones, and their readings are kept until all heights are known.
 template <typename NodeGrid>
 Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, std::size_t grids,
-                         HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop, PartTrace* traced) {
-  GridTrace* const trace = traced != nullptr ? &traced->trace : nullptr;
-  if (grids <= kFewGrids) return grid.FillNodes(node_grid, window, datum, nodes, stop, trace);
+                         HeightDatum datum, const NodeHeights& nodes, const std::stop_token& stop,
+                         PartReading* reading_of_part) {
+  GridReading* const reading = reading_of_part != nullptr ? &reading_of_part->reading : nullptr;
+  if (grids <= kFewGrids) return grid.FillNodes(node_grid, window, datum, nodes, stop, reading);
   const NodeWindow part = PartOf(grid, node_grid, window, 0);
   const auto copy = [&](std::span<const float> all) {
     std::vector<float> some(all.empty() ? 0 : Area(part.columns, part.rows));
@@ -93,35 +94,36 @@ Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, cons
   if (nodes.smooth != nullptr) smooth = copy(*nodes.smooth);
   const auto done =
       grid.FillNodes(node_grid, part, datum,
-                     {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, trace);
+                     {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, reading);
   if (!done) return done;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
   if (!smooth.empty() && nodes.smooth->empty()) *nodes.smooth = VoidHeights(nodes.heights.size());
   if (!smooth.empty()) copy_back(smooth, *nodes.smooth);
-  if (traced != nullptr) {
-    traced->part = part;
-    trace->cells = {};  // can be located again
+  if (reading_of_part != nullptr) {
+    reading_of_part->part = part;
+    reading->cells = {};  // can be located again
   }
   return done;
 }
 
-// Converts a trace of a part to one of the window. Positions are known within the raster grid's footprint plus a
+// Converts a reading of a part to one of the window. Positions are known within the raster grid's footprint plus a
 // margin.
-GridTrace Widened(PartTrace&& of_part, const RasterGrid& grid, const geo::Lattice& lattice, const NodeWindow& window) {
-  if (!of_part.part) return std::move(of_part.trace);
-  GridTrace trace = std::move(of_part.trace);
+GridReading Widened(PartReading&& of_part, const RasterGrid& grid, const geo::Lattice& lattice,
+                    const NodeWindow& window) {
+  if (!of_part.part) return std::move(of_part.reading);
+  GridReading reading = std::move(of_part.reading);
   const std::size_t nodes = Area(window.columns, window.rows);
   std::vector<float> heights(nodes, SampleRules::kVoid);
-  ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = trace.heights[from]; });
-  trace.heights = std::move(heights);
-  trace.cells = grid.CellsOf(lattice, PartOf(grid, lattice, window, kAround), trace.factor, trace.window);
-  if (!trace.undulations.empty()) {
+  ForPart(*of_part.part, window, [&](std::size_t from, std::size_t to) { heights[to] = reading.heights[from]; });
+  reading.heights = std::move(heights);
+  reading.cells = grid.CellsOf(lattice, PartOf(grid, lattice, window, kAround), reading.factor, reading.window);
+  if (!reading.undulations.empty()) {
     auto undulations = grid.undulations()->At(lattice, window);
     constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();  // the bound uses the geoid's range instead
-    trace.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
+    reading.undulations = undulations ? *std::move(undulations) : std::vector<double>(nodes, kUnknown);
   }
-  return trace;
+  return reading;
 }
 
 }  // namespace
@@ -183,7 +185,7 @@ template <typename NodeGrid>
 Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_grid, const NodeWindow& window,
                                                            HeightDatum datum, const std::string& what,
                                                            const std::stop_token& stop,
-                                                           std::vector<PartTrace>* traces) const {
+                                                           std::vector<PartReading>* readings) const {
   const std::size_t nodes = Area(window.columns, window.rows);
   std::vector<float> heights = VoidHeights(nodes), smooth;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
@@ -196,9 +198,9 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
       heights = blend.Wanted();
       weights.assign(nodes, 1);
     }
-    PartTrace* const trace = traces != nullptr ? &traces->emplace_back() : nullptr;
+    PartReading* const reading = readings != nullptr ? &readings->emplace_back() : nullptr;
     const auto done = FillNodesOf(grids[i], node_grid, window, order.size(), datum,
-                                  {heights, weights, &smooth, are_void}, stop, trace);
+                                  {heights, weights, &smooth, are_void}, stop, reading);
     if (!done) {
       return MakeError(done.error().code, "{}: {}", what, done.error().message);
     }
@@ -234,9 +236,9 @@ const geo::Lattice& ElevationModel::Impl::LatticeOf(int level) const {
 
 Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
                                                               const std::string& what, const std::stop_token& stop,
-                                                              std::vector<PartTrace>* traces) const {
+                                                              std::vector<PartReading>* readings) const {
   const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadGrids(lattice, window, datum, what, stop, traces);
+  auto heights = ReadGrids(lattice, window, datum, what, stop, readings);
   if (!heights || !HasVoids(*heights)) return heights;
   if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
     ReplaceVoids(*heights, floor);
@@ -285,16 +287,16 @@ Result<TileHeights> ElevationModel::Impl::Read(const geo::TileKey& key, HeightDa
   const NodeWindow window = WindowOfTile(lattice, key);
   const std::string what = "tile " + geo::ToString(key);
   const bool is_certified = datum == HeightDatum::kEllipsoid;
-  std::vector<PartTrace> traces;
+  std::vector<PartReading> readings;
   if (!is_certified) {
     auto read = ReadNodes(key.level, window, datum, what, stop);
     if (!read) return tl::unexpected(std::move(read).error());
     return TileHeights{lattice, lattice.cells + 3, *std::move(read)};
   }
-  auto heights = ReadUnedited(key.level, window, datum, what, stop, &traces);
+  auto heights = ReadUnedited(key.level, window, datum, what, stop, &readings);
   if (!heights) return tl::unexpected(std::move(heights).error());
   TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
-  const auto bound = BoundError(tile, window, std::move(traces), stop);
+  const auto bound = BoundError(tile, window, std::move(readings), stop);
   if (!bound) return MakeError(bound.error().code, "{}: {}", what, bound.error().message);
   tile.source_error_m = *bound;
   if (const auto which = EditsAt(lattice, window); !which.empty()) {
@@ -304,28 +306,28 @@ Result<TileHeights> ElevationModel::Impl::Read(const geo::TileKey& key, HeightDa
   return tile;
 }
 
-// `traces`: of the raster grids that were read for the heights, in order of precedence.
+// `readings`: of the raster grids that were read for the heights, in order of precedence.
 Result<double> ElevationModel::Impl::BoundError(const TileHeights& tile, const NodeWindow& window,
-                                                std::vector<PartTrace> traces, const std::stop_token& stop,
+                                                std::vector<PartReading> readings, const std::stop_token& stop,
                                                 bool counts_between) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(tile.lattice, window));
   SourceErrorBound bound(tile.lattice, window, tile.heights, has_feather && order.size() > 1, counts_between);
-  for (std::size_t k = 0; k < traces.size(); ++k) {
+  for (std::size_t k = 0; k < readings.size(); ++k) {
     const RasterGrid& grid = grids[order[k]];
-    const GridTrace trace = Widened(std::move(traces[k]), grid, tile.lattice, window);
-    if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
+    const GridReading reading = Widened(std::move(readings[k]), grid, tile.lattice, window);
+    if (const auto added = bound.Add(grid, reading, stop); !added) return tl::unexpected(added.error());
   }
   // All nodes have a height, but samples of further raster grids may still be visible between them.
   std::vector<float> none_wanted;
-  for (std::size_t k = traces.size(); k < order.size() && !bound.is_covered(); ++k) {
+  for (std::size_t k = readings.size(); k < order.size() && !bound.is_covered(); ++k) {
     const RasterGrid& grid = grids[order[k]];
     if (none_wanted.empty()) none_wanted = tile.heights;
-    PartTrace traced;
-    const auto done =
-        FillNodesOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted}, stop, &traced);
+    PartReading reading_of_part;
+    const auto done = FillNodesOf(grid, tile.lattice, window, order.size(), HeightDatum::kEllipsoid, {none_wanted},
+                                  stop, &reading_of_part);
     if (!done) return tl::unexpected(done.error());
-    const GridTrace trace = Widened(std::move(traced), grid, tile.lattice, window);
-    if (const auto added = bound.Add(grid, trace, stop); !added) return tl::unexpected(added.error());
+    const GridReading reading = Widened(std::move(reading_of_part), grid, tile.lattice, window);
+    if (const auto added = bound.Add(grid, reading, stop); !added) return tl::unexpected(added.error());
   }
   return bound.bound();
 }

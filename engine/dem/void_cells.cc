@@ -34,21 +34,21 @@ bool Contains(const GridWindow& window, const GridWindow& other) {
 }  // namespace
 
 std::vector<std::uint8_t> ElevationModel::Impl::VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
-                                                          std::span<const PartTrace> traces) const {
+                                                          std::span<const PartReading> readings) const {
   const std::vector<std::size_t> order = GridsAt(BoxOf(lattice, window));
   const auto columns = static_cast<std::size_t>(window.columns - 1), rows = static_cast<std::size_t>(window.rows - 1);
   std::vector<std::uint8_t> cells(columns * rows, 1);
-  for (std::size_t k = 0; k < traces.size(); ++k) {
-    const GridTrace& trace = traces[k].trace;
-    if (traces[k].part || trace.window.columns == 0) continue;
+  for (std::size_t k = 0; k < readings.size(); ++k) {
+    const GridReading& reading = readings[k].reading;
+    if (readings[k].part || reading.window.columns == 0) continue;
     const RasterGrid& grid = grids[order[k]];
-    const bool has_voids = grid.Ranges(PixelsOf(trace.window, trace.factor)).has_voids;
+    const bool has_voids = grid.Ranges(PixelsOf(reading.window, reading.factor)).has_voids;
     for (std::size_t cell = 0; cell < cells.size(); ++cell) {
       if (cells[cell] == 0) continue;
-      const auto around = SamplesAround(trace.cells, cell % columns, cell / columns);
+      const auto around = SamplesAround(reading.cells, cell % columns, cell / columns);
       if (!around) continue;
-      const bool is_known = !has_voids && Contains(trace.window, *around);
-      cells[cell] = !is_known && grid.Ranges(PixelsOf(*around, trace.factor)).has_voids ? 1 : 0;
+      const bool is_known = !has_voids && Contains(reading.window, *around);
+      cells[cell] = !is_known && grid.Ranges(PixelsOf(*around, reading.factor)).has_voids ? 1 : 0;
     }
   }
   return cells;

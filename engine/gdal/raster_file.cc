@@ -373,7 +373,7 @@ bool HasMaskBand(GDALRasterBand& band) {
   return (flags & GMF_PER_DATASET) != 0 || flags == 0;  // 0: a mask of this band alone
 }
 
-std::string PicturePartOf(GDALRasterBand& band) {
+std::string PictureColorOf(GDALRasterBand& band) {
   const GDALColorInterp part = band.GetColorInterpretation();
   const bool is_picture = part != GCI_Undefined && part != GCI_GrayIndex && part != GCI_AlphaBand;
   return is_picture ? GDALGetColorInterpretationName(part) : "";

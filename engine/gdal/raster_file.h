@@ -54,7 +54,7 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height);
 bool HasMaskBand(GDALRasterBand& band);
 
 // Returns GDAL's name of a colour band ("Red", "Palette"); empty if the band may contain heights, as grey bands may.
-std::string PicturePartOf(GDALRasterBand& band);
+std::string PictureColorOf(GDALRasterBand& band);
 
 // Returns band 1, which contains the heights. Precondition: the dataset came from OpenRaster or ReopenRaster.
 inline GDALRasterBand& HeightBand(GDALDataset& dataset) { return *dataset.GetRasterBand(1); }

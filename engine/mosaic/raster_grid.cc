@@ -42,16 +42,17 @@ int FactorOf(const geo::MercatorGrid& grid, const SourceSpacing& spacing) {
   return MercatorFactor(grid.depth, spacing);
 }
 
-void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, bool are_all, GridTrace& trace) {
+void TraceWanted(std::span<const float> heights, std::span<const std::uint8_t> wanted, bool are_all,
+                 GridReading& reading) {
   if (are_all) {
-    trace.heights.assign(heights.begin(), heights.end());
+    reading.heights.assign(heights.begin(), heights.end());
     return;
   }
-  trace.heights.resize(wanted.size());
-  float* const traced = trace.heights.data();
+  reading.heights.resize(wanted.size());
+  float* const reading_of_part = reading.heights.data();
   for (std::size_t n = 0; n < wanted.size(); ++n) {
     const float height = heights[n];  // read for every node, or the compiler makes no vectors
-    traced[n] = wanted[n] != 0 ? height : SampleRules::kVoid;
+    reading_of_part[n] = wanted[n] != 0 ? height : SampleRules::kVoid;
   }
 }
 
@@ -313,9 +314,9 @@ Result<std::vector<float>> RasterGrid::ReadWeights(int factor, const GridWindow&
 
 Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,
                                      std::span<const double> undulations, int factor, const NodeHeights& nodes,
-                                     const std::stop_token& stop, GridTrace* trace) const {
+                                     const std::stop_token& stop, GridReading* reading) const {
   const std::span<float> heights = nodes.heights, weights = nodes.weights;
-  const bool traces_others = trace != nullptr && !weights.empty();
+  const bool traces_others = reading != nullptr && !weights.empty();
   std::vector<std::uint8_t> wanted;
   bool is_any_wanted = true;
   if (nodes.are_void) {
@@ -329,9 +330,9 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
   if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
   NodeCells cells(std::move(positions), Axes(factor));
   const auto leave_unfilled = [&](const Result<void>& unchanged) {
-    if (trace != nullptr) {
-      trace->heights = VoidHeights(inside.size());
-      trace->cells = std::move(cells);
+    if (reading != nullptr) {
+      reading->heights = VoidHeights(inside.size());
+      reading->cells = std::move(cells);
     }
     return unchanged;
   };
@@ -344,8 +345,8 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
   // At the rim of a raster, the certified error compares averages between the outermost nodes and the rim, too
   // (CellErrorBound). Where they are missing, it is looser.
   constexpr int kRim = 3;
-  if (trace != nullptr) window = Grown(window, kRim, factor);
-  auto bridged = ReadBridged(factor, window, stop, trace != nullptr ? &trace->samples : nullptr);
+  if (reading != nullptr) window = Grown(window, kRim, factor);
+  auto bridged = ReadBridged(factor, window, stop, reading != nullptr ? &reading->samples : nullptr);
   if (!bridged) return tl::unexpected(bridged.error());
   const auto smoothed = FillHoles(factor, window, *bridged, stop);
   if (!smoothed) return tl::unexpected(smoothed.error());
@@ -356,15 +357,15 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
   counts_->filled += bridged->voids - left;
   counts_->voids += left;
   if (traces_others && factor == 1) {
-    if (bridged->voids > 0) trace->samples = bridged->heights;
-    trace->includes_filled = true;
+    if (bridged->voids > 0) reading->samples = bridged->heights;
+    reading->includes_filled = true;
   }
   std::vector<float> sample_weights;
   if (!weights.empty() && options_.feather_m > 0) {
     auto read = ReadWeights(factor, window, stop);
     if (!read) return tl::unexpected(read.error());
     sample_weights = *std::move(read);
-    if (trace != nullptr && trace->includes_filled) trace->weights = sample_weights;
+    if (reading != nullptr && reading->includes_filled) reading->weights = sample_weights;
   }
   const auto take = [&](std::size_t node, const GridCell& cell) {
     const auto height = Interpolate(samples, window, cell);
@@ -378,7 +379,7 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
       return;
     }
     heights[node] = rounded;
-    if (trace != nullptr) trace->heights[node] = rounded;
+    if (reading != nullptr) reading->heights[node] = rounded;
     if (weights.empty()) return;
     // All samples have weights, so this is plain bilinear interpolation. The least weight is above 0,
     // so that a node that no other grid has a height for takes the height of this one.
@@ -392,9 +393,9 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
     } else if (left < samples.size()) {
       FillRows(samples, window, cells, wanted, are_all, undulations, heights);
     }
-    if (trace != nullptr) TraceWanted(heights, wanted, are_all, *trace);
+    if (reading != nullptr) TraceWanted(heights, wanted, are_all, *reading);
   } else {
-    if (trace != nullptr) trace->heights = VoidHeights(inside.size());
+    if (reading != nullptr) reading->heights = VoidHeights(inside.size());
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;
     for (std::size_t j = 0; node < wanted.size(); ++j) {
@@ -403,27 +404,27 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
       }
     }
   }
-  if (trace == nullptr) return {};
-  trace->window = window;
-  trace->cells = std::move(cells);
+  if (reading == nullptr) return {};
+  reading->window = window;
+  reading->cells = std::move(cells);
   if (traces_others) {
     std::vector<std::uint8_t> others(inside.size());
     for (std::size_t n = 0; n < others.size(); ++n) others[n] = inside[n] & (wanted[n] ^ std::uint8_t{1});
-    TraceOthers(others, bridged->heights, samples, undulations, *trace);
+    TraceOthers(others, bridged->heights, samples, undulations, *reading);
   }
-  if (bridged->voids == 0) trace->samples = std::move(bridged->heights);  // not copied: nothing was filled
+  if (bridged->voids == 0) reading->samples = std::move(bridged->heights);  // not copied: nothing was filled
   return {};
 }
 
 // Traces nodes whose heights came from other raster grids, as far as this raster grid's samples were read.
 void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
                              const std::vector<float>& filled, std::span<const double> undulations,
-                             GridTrace& trace) const {
-  const GridWindow& window = trace.window;
-  const auto stride = static_cast<std::size_t>(trace.cells.window().columns);
+                             GridReading& reading) const {
+  const GridWindow& window = reading.window;
+  const auto stride = static_cast<std::size_t>(reading.cells.window().columns);
   for (std::size_t node = 0; node < others.size(); ++node) {
     if (others[node] == 0) continue;
-    const GridCell cell = trace.cells.At(node % stride, node / stride);
+    const GridCell cell = reading.cells.At(node % stride, node / stride);
     if (cell.column < window.column || cell.column + 1 >= window.column + window.columns || cell.row < window.row ||
         cell.row + 1 >= window.row + window.rows) {
       continue;
@@ -431,7 +432,7 @@ void RasterGrid::TraceOthers(std::span<const std::uint8_t> others, const std::ve
     const auto height = Interpolate(filled, window, cell);
     if (!height || !HasSample(bridged, window, cell)) continue;
     if (!undulations.empty() && std::isnan(undulations[node])) continue;
-    trace.heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
+    reading.heights[node] = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
   }
 }
 
@@ -449,11 +450,11 @@ NodePositions RasterGrid::PositionsOf(const NodeGrid& node_grid, const NodeWindo
 
 template <typename NodeGrid>
 Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
-                                   const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace) const {
+                                   const NodeHeights& nodes, const std::stop_token& stop, GridReading* reading) const {
   const int factor = FactorOf(node_grid, spacing_);
   NodePositions positions = PositionsOf(node_grid, window, factor);
   std::vector<std::uint8_t> inside = cover_.Inside(positions);
-  if (trace != nullptr) trace->factor = factor;
+  if (reading != nullptr) reading->factor = factor;
   for (int row = 0; row < window.rows && georeference_.is_geographic_grid(); ++row) {
     const std::int64_t global = window.row + row;
     if (!IsPoleRow(node_grid, global)) continue;
@@ -470,13 +471,13 @@ Result<void> RasterGrid::FillNodes(const NodeGrid& node_grid, const NodeWindow& 
     if (!found) return tl::unexpected(found.error());
     undulations = *std::move(found);
   }
-  if (trace != nullptr) trace->undulations = undulations;
-  return FillNodesAt(std::move(positions), inside, undulations, factor, nodes, stop, trace);
+  if (reading != nullptr) reading->undulations = undulations;
+  return FillNodesAt(std::move(positions), inside, undulations, factor, nodes, stop, reading);
 }
 
 template Result<void> RasterGrid::FillNodes(const geo::Lattice&, const NodeWindow&, HeightDatum, const NodeHeights&,
-                                            const std::stop_token&, GridTrace*) const;
+                                            const std::stop_token&, GridReading*) const;
 template Result<void> RasterGrid::FillNodes(const geo::MercatorGrid&, const NodeWindow&, HeightDatum,
-                                            const NodeHeights&, const std::stop_token&, GridTrace*) const;
+                                            const NodeHeights&, const std::stop_token&, GridReading*) const;
 
 }  // namespace terrace::dem

@@ -38,7 +38,7 @@ struct GridRange {
 };
 
 // What FillNodes read for a window. The error bounds compare served heights with these samples. Heights in metres.
-struct GridTrace {
+struct GridReading {
   // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
   // raster grid may have no position.
   NodeCells cells;
@@ -108,15 +108,15 @@ class RasterGrid {
   HeightRange EllipsoidalRange() const;
 
   // Replaces NaN among the window's heights by the raster grid's heights, where it has them. A height depends on the
-  // node alone, not on the window. Fills in `trace` unless it is null. Errors: kUnavailable (a raster cannot be read
+  // node alone, not on the window. Fills in `reading` unless it is null. Errors: kUnavailable (a raster cannot be read
   // now), kChanged (a file was changed, replaced or removed), kCancelled (stopped).
   // `NodeGrid`: geo::Lattice or geo::MercatorGrid.
   template <typename NodeGrid>
   Result<void> FillNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
-                         const NodeHeights& nodes, const std::stop_token& stop, GridTrace* trace = nullptr) const;
+                         const NodeHeights& nodes, const std::stop_token& stop, GridReading* reading = nullptr) const;
 
   // Returns the cells in which FillNodes locates the window's nodes. Where columns wrap, they are moved by whole turns
-  // to lie near `samples`, the window of a GridTrace.
+  // to lie near `samples`, the window of a GridReading.
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // FillNodes for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
@@ -216,9 +216,9 @@ class RasterGrid {
   // none are.
   Result<void> FillNodesAt(NodePositions positions, std::span<const std::uint8_t> inside,
                            std::span<const double> undulations, int factor, const NodeHeights& nodes,
-                           const std::stop_token& stop, GridTrace* trace = nullptr) const;
+                           const std::stop_token& stop, GridReading* reading = nullptr) const;
   void TraceOthers(std::span<const std::uint8_t> others, const std::vector<float>& bridged,
-                   const std::vector<float>& filled, std::span<const double> undulations, GridTrace& trace) const;
+                   const std::vector<float>& filled, std::span<const double> undulations, GridReading& reading) const;
   std::optional<float> PoleHeight(int pole, HeightDatum datum) const;  // 0 south, 1 north
   // Returns the blend weight of each sample in the window, 0 to 1; empty: all are 1.
   Result<std::vector<float>> ReadWeights(int factor, const GridWindow& window, const std::stop_token& stop) const;

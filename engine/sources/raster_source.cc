@@ -111,7 +111,7 @@ RasterInfo Describe(GDALDataset& dataset, const std::string& path, const Georefe
   info.vertical_datum = georeference.vertical_datum();
   info.height_unit = layout.rules.unit;
   info.knows_height_unit = MetresPerUnit(layout.rules.unit).has_value();
-  info.picture_part = PicturePartOf(HeightBand(dataset));
+  info.picture_color = PictureColorOf(HeightBand(dataset));
   info.pixel_width = georeference.pixel_width();
   info.pixel_height = georeference.pixel_height();
   info.pixel_unit = georeference.pixel_unit();
@@ -151,11 +151,11 @@ void LogWhatMatters(GDALDataset& dataset, const RasterInfo& info, const Georefer
     const std::string kind = warning.substr(0, warning.find_first_of("0123456789\"("));
     SourceLog::Write(SourceLog::Level::kWarn, kind, info.path, warning);
   }
-  if (!info.picture_part.empty()) {
+  if (!info.picture_color.empty()) {
     LogSource(SourceLog::Level::kWarn, info.path,
               "is a picture (its band 1 is \"{}\"), whose values are taken for heights; serve the elevation model "
               "that belongs to it",
-              info.picture_part);
+              info.picture_color);
   }
   if (!info.transform.empty()) {
     LogSource(SourceLog::Level::kDebug, info.path, "placed by PROJ operation \"{}\": {}", info.transform,

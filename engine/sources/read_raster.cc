@@ -62,7 +62,7 @@ Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& opt
   if (auto fits = CheckSizeToMesh(path, raster.width, raster.height); !fits) return tl::unexpected(fits.error());
   raster.georeferenced = (*dataset)->GetGeoTransform(raster.geo_transform.data()) == CE_None;
   GDALRasterBand& band = HeightBand(**dataset);
-  raster.picture_part = PicturePartOf(band);
+  raster.picture_color = PictureColorOf(band);
   // Rasters that are only meshed need no georeference; if they have none, no CRS states the unit of heights.
   const auto georeference = Georeference::Of(**dataset, path);
   const auto spacing = georeference ? SourceSpacing::Of(*georeference, path) : SourceSpacing{};

@@ -25,7 +25,7 @@ struct RasterHeights {
   std::string coordinate_unit;            // "US survey foot"; empty: metres, degrees or unknown
   bool in_angles = false;                 // x and y are longitudes and latitudes
   std::string found_voids;                // detected nodata values, for people; empty: none
-  std::string picture_part;               // as RasterInfo::picture_part
+  std::string picture_color;              // as RasterInfo::picture_color
 };
 Result<RasterHeights> ReadRaster(const std::string& path, const ReadOptions& options = {});
 

@@ -16,7 +16,7 @@ namespace terrace::tin {
 // The side that both corners lie on. Precondition: they are different and on one border.
 Side SideOf(const HeightField& field, const Corner& a, const Corner& b);
 
-// A border edge along its axis, and the samples beside it. Precondition: (b - a) stride < 2^31, as in any HeightField.
+// A border edge along its axis, and the samples on it. Precondition: (b - a) stride < 2^31, as in any HeightField.
 struct Chord {
   int a = 0, b = 0;                // first and last sample; a < b
   double h_a = 0, h_b = 0;         // heights of the ends, metres

@@ -7,7 +7,8 @@ namespace terrace::tin {
 
 enum class Criterion : std::uint8_t {
   kDelaunay,
-  kDataDependent,  // section 3.4 of the paper: fewer vertices to the same error, thinner triangles, more time
+  kDataDependent,  // section 3.4 of Garland and Heckbert (1997): fewer vertices to the same error, thinner triangles,
+                   // more time
 };
 
 }  // namespace terrace::tin

@@ -11,6 +11,7 @@ namespace {
 constexpr std::size_t kMaxMessages = 50;
 constexpr std::size_t kMaxSeconds = 7 * 86400;  // later ones count into the last
 constexpr std::size_t kMaxTrack = 100'000;
+constexpr std::size_t kMaxTiles = 6'000;
 
 }  // namespace
 
@@ -82,7 +83,7 @@ void Statistics::AddRequest(double now_s, const RequestRecord& record) {
   totals.triangles += record.triangles;
   totals.incomplete_tiles += record.is_incomplete ? 1 : 0;
   second.latencies_s.push_back(static_cast<float>(record.seconds));
-  totals.latencies_s.push_back(static_cast<float>(record.seconds));
+  totals.latencies_s.Add(record.seconds);
 }
 
 void Statistics::AddFrame(double now_s, const FrameRecord& record) {
@@ -111,12 +112,13 @@ void Statistics::AddFrame(double now_s, const FrameRecord& record) {
   totals.worst_hole = std::max(totals.worst_hole, hole);
   totals.worst_px = std::max(totals.worst_px, record.worst_px);
   totals.worst_stated_px = std::max(totals.worst_stated_px, record.worst_stated_px);
-  totals.frame_worst_px.push_back(static_cast<float>(record.worst_px));
+  totals.frame_worst_px.Add(record.worst_px);
 }
 
 void Statistics::AddLoadedTile(const geo::TileKey& key) {
   const std::lock_guard lock(mutex_);
-  record_.loaded_tiles.push_back(key);
+  ++record_.totals.tiles_by_level[key.level];
+  if (record_.loaded_tiles.size() < kMaxTiles) record_.loaded_tiles.insert({key.level, key.x, key.y});
 }
 
 void Statistics::AddUrl(std::string url) {

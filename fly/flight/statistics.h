@@ -7,10 +7,13 @@
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "engine/geo/tile_key.h"
+#include "fly/flight/value_counts.h"
 #include "fly/scene/volume.h"
 #include "fly/select/coverage.h"
 
@@ -101,15 +104,16 @@ struct Totals {
   std::uint64_t measured_frames = 0, hole_frames = 0, uncovered_frames = 0;
   double worst_hole = 0;  // share of the screen
   double worst_px = 0, worst_stated_px = 0;
-  std::vector<float> latencies_s, frame_worst_px;  // of tiles; of flying frames
-  std::map<std::string, std::uint64_t> messages;   // counts of failure messages, at most 50 different ones
+  ValueCounts latencies_s, frame_worst_px;  // of tiles; of flying frames
+  std::map<int, std::uint64_t> tiles_by_level;
+  std::map<std::string, std::uint64_t> messages;  // counts of failure messages, at most 50 different ones
 };
 
 // All that reports need.
 struct FlightRecord {
   Totals totals;
   std::vector<Second> seconds;
-  std::vector<geo::TileKey> loaded_tiles;
+  std::set<std::tuple<int, std::int64_t, std::int64_t>> loaded_tiles;  // level, x, y of the first 6,000 different ones
   std::vector<std::string> urls;  // of the requested tiles, if FlightOptions::keeps_urls
   std::vector<ClientRecord> clients;
   std::vector<GeodeticPoint> track;

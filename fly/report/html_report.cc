@@ -198,37 +198,33 @@ TimePlot FailurePlot(const std::vector<Second>& seconds) {
                      {"failed", "var(--d)", ValuesOf(seconds, FailuresOf), Shape::kBars}}};
 }
 
-BarPlot LevelPlot(const std::vector<geo::TileKey>& tiles) {
-  std::map<int, double> counts;
-  for (const geo::TileKey& tile : tiles) ++counts[tile.level];
+BarPlot LevelPlot(const std::map<int, std::uint64_t>& counts) {
   BarPlot plot{.title = "Tiles by level",
                .unit = "count",
                .note = "Each is half as wide as the one before.",
                .series = {{"tiles", "var(--a)", {}, Shape::kBars}}};
   for (const auto& [level, count] : counts) {
     plot.labels.push_back(std::to_string(level));
-    plot.series[0].values.push_back(count);
+    plot.series[0].values.push_back(static_cast<double>(count));
   }
   return plot;
 }
 
-BarPlot LatencyHistogram(const std::vector<float>& latencies_s) {
+BarPlot LatencyHistogram(const ValueCounts& latencies_s) {
   BarPlot plot{.title = "Latencies of all tiles",
                .unit = "count",
                .note = "Each class reaches up to its label.",
                .series = {{"tiles", "var(--a)", {}, Shape::kBars}}};
   constexpr double kBounds[] = {1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000};
-  double below = 0;
+  std::uint64_t below = 0;
   for (const double bound : kBounds) {
-    const auto count = static_cast<double>(std::count_if(
-        latencies_s.begin(), latencies_s.end(), [&](float s) { return s * 1000 > below && s * 1000 <= bound; }));
+    const std::uint64_t count = latencies_s.CountUpTo(bound / 1000);
     plot.labels.push_back(bound < 1000 ? PlainNumber(bound) + " ms" : PlainNumber(bound / 1000) + " s");
-    plot.series[0].values.push_back(count);
-    below = bound;
+    plot.series[0].values.push_back(static_cast<double>(count - below));
+    below = count;
   }
   plot.labels.emplace_back("more");
-  plot.series[0].values.push_back(
-      static_cast<double>(std::count_if(latencies_s.begin(), latencies_s.end(), [](float s) { return s > 5; })));
+  plot.series[0].values.push_back(static_cast<double>(latencies_s.size() - below));
   return plot;
 }
 
@@ -277,7 +273,8 @@ std::string HtmlOf(const FlightOptions& options, const Summary& summary, const J
     plot.marks_name = "new version of the dataset";
     html += SvgOf(plot);
   }
-  html += SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(record.loaded_tiles)) + "</div>";
+  html +=
+      SvgOf(LatencyHistogram(summary.totals.latencies_s)) + SvgOf(LevelPlot(summary.totals.tiles_by_level)) + "</div>";
   return html + TablesOf(summary.totals) + "</main></body></html>\n";
 }
 

@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <set>
-#include <tuple>
 
 #include "engine/core/plain_number.h"
 #include "fly/report/time_plot.h"
@@ -17,7 +15,6 @@ namespace terrace::fly {
 namespace {
 
 constexpr double kWidth = 1304, kHeight = 620, kMargin = 30;
-constexpr std::size_t kMaxTiles = 6000;
 constexpr int kShownLevels = 7;  // the deepest ones; shallower tiles only tint the ground
 
 struct Frame {
@@ -90,17 +87,14 @@ std::string ColorOfLevel(int level, int shallowest, int deepest) {
   return fmt::format("rgb({:.0f},{:.0f},{:.0f})", mix(0), mix(1), mix(2));
 }
 
-std::string MapOf(const std::vector<geo::TileKey>& tiles, const std::vector<GeodeticPoint>& track) {
+std::string MapOf(const std::set<std::tuple<int, std::int64_t, std::int64_t>>& tiles,
+                  const std::vector<GeodeticPoint>& track) {
   if (tiles.empty() || track.empty()) return {};
   const Frame frame = FrameOf(track);
-  std::set<std::tuple<int, std::int64_t, std::int64_t>> keys;  // shallow ones first
-  for (const geo::TileKey& tile : tiles) {
-    if (keys.size() < kMaxTiles) keys.insert({tile.level, tile.x, tile.y});
-  }
-  const int deepest = std::get<0>(*keys.rbegin());
-  const int shallowest = std::max(std::get<0>(*keys.begin()), deepest - kShownLevels + 1);
+  const int deepest = std::get<0>(*tiles.rbegin());
+  const int shallowest = std::max(std::get<0>(*tiles.begin()), deepest - kShownLevels + 1);
   std::string svg;
-  for (const auto& [level, x, y] : keys) {
+  for (const auto& [level, x, y] : tiles) {
     AddTile(frame, {level, x, y}, ColorOfLevel(level, shallowest, deepest), svg);
   }
   std::string points;

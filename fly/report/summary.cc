@@ -109,11 +109,11 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
     summary.worst_first_view_s = Percentile(views, 1);
   }
   const Totals& totals = summary.totals;
-  summary.p50_s = Percentile(totals.latencies_s, 0.5);
-  summary.p99_s = Percentile(totals.latencies_s, 0.99);
-  summary.max_s = Percentile(totals.latencies_s, 1);
-  summary.frame_p50_px = Percentile(totals.frame_worst_px, 0.5);
-  summary.frame_p99_px = Percentile(totals.frame_worst_px, 0.99);
+  summary.p50_s = totals.latencies_s.Percentile(0.5);
+  summary.p99_s = totals.latencies_s.Percentile(0.99);
+  summary.max_s = totals.latencies_s.Percentile(1);
+  summary.frame_p50_px = totals.frame_worst_px.Percentile(0.5);
+  summary.frame_p99_px = totals.frame_worst_px.Percentile(0.99);
   summary.refined_share = Share(totals.refined_frames, totals.flying_frames);
   std::uint64_t busy = 0;
   for (const Second& second : seconds) {

@@ -19,8 +19,8 @@ struct LatticeCrossings {
   double from, to;                  // the coordinate across the lines at the first and the last end, lattice steps
   double along_from, along_change;  // the coordinate along the lines at the first end; last minus first
   double height, rise;              // of the edge at the first end; last minus first; metres
-  // Between two crossings the surface leaves the straight line between its heights there by at most bend times the
-  // cell's twist, the coefficient of xy of its surface. Without a unit.
+  // Between two crossings the lattice surface differs from the straight line through its heights at the crossings by at
+  // most bend * twist, where twist is the coefficient of xy of the cell's surface. No unit.
   double bend;
   const float *heights, *twists;   // metres, from the tile's south-western sample and cell
   std::int32_t line_stride, step;  // index = line * line_stride + cell * step

@@ -66,8 +66,8 @@ class NodeVerticals {
   // distances from the axis; the error of this is of third order in the difference of their longitudes. The offset of
   // its latitude has three terms: the point is nearer to the axis than the corners, at most by
   // sin(latitude) cos(latitude) d^2 / 8 for a difference d in longitude; the covariance of latitude and height; that of
-  // latitude and radius of curvature. All bounds are a few times too
-  // large. That costs time, but the result is the same: triangles within the shift are measured exactly.
+  // latitude and radius of curvature. All bounds are a few times too large. That costs time, but the result is the
+  // same: nodes within the shift of an edge are tested exactly (Meets).
   struct Bounds {
     Shift shift;
     // An upper bound, in metres, of how far the triangle lies below its corners' linear interpolation: half the square

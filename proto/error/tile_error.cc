@@ -30,8 +30,9 @@ struct Surface {
   std::vector<double> heights;    // by vertex, metres above the ellipsoid
   std::vector<geo::Vec3> ecef;    // by vertex
   std::vector<std::array<std::uint32_t, 3>> triangles;
-  bool is_planar = true;  // the height interpolated in longitude and latitude is measured, not the flat triangles alone
-  double beside_m = 0;    // by which the vertices lie beside the plumb lines of their points, at most
+  bool measures_linear =
+      true;             // the height interpolated in longitude and latitude is measured, not the flat triangles alone
+  double beside_m = 0;  // by which the vertices lie beside the plumb lines of their points, at most
 };
 
 // The largest difference between `count` samples of a row and a plane. The first sample lies at (x, y), each further
@@ -90,8 +91,8 @@ class TileErrorMeter::Impl {
   // triangle. Then measures the flat triangles that may be the worst or exceed the bound.
   TileError Measure(Surface surface) {
     const Surface before = std::exchange(surface_, std::move(surface));
-    const bool is_alike =
-        before.unit == surface_.unit && before.is_planar == surface_.is_planar && before.beside_m == surface_.beside_m;
+    const bool is_alike = before.unit == surface_.unit && before.measures_linear == surface_.measures_linear &&
+                          before.beside_m == surface_.beside_m;
     const bool of_same_vertices = is_alike && HasVerticesOf(before, surface_);
     is_vertex_.assign(static_cast<std::size_t>(cells_ + 1) * static_cast<std::size_t>(cells_ + 1), false);
     for (const NodePoint& p : surface_.points) is_vertex_[NodeIndex(NodeOf(p.x), NodeOf(p.y))] = true;
@@ -150,7 +151,7 @@ class TileErrorMeter::Impl {
     return p;
   }
 
-  // Inside the tile, if its error is above the bound.
+  // The worst sample so far. `at` is inside the tile, and set only if `error` is above the bound.
   struct Miss {
     double error = 0;
     tin::SamplePosition at;
@@ -307,7 +308,7 @@ class TileErrorMeter::Impl {
     Found found(bound_);
     const std::int64_t twice_area = TwiceArea(p);
     const auto measure_linear = [&] {
-      if (!surface_.is_planar || twice_area <= 0) return;
+      if (!surface_.measures_linear || twice_area <= 0) return;
       const std::array<EdgeRows, 3> edges = EdgesOf(p);
       const auto [low, high] = std::minmax({p[0].y, p[1].y, p[2].y});
       const Linear plane = PlaneOf(t, p, twice_area);
@@ -416,7 +417,7 @@ TileError TileErrorMeter::Measure(const QuantizedTile& tile) {
   }
   // Equal places and heights have equal positions.
   const Surface& before = impl_->surface();
-  if (before.is_planar && HasVerticesOf(before, surface)) surface.ecef = before.ecef;
+  if (before.measures_linear && HasVerticesOf(before, surface)) surface.ecef = before.ecef;
   DecodeFurtherPositions(tile, surface.ecef);
   return impl_->Measure(std::move(surface));
 }

@@ -61,7 +61,7 @@ struct HandlerState {
   HandlerState(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
                const config::Config& config, const ProcessState& process);
 
-  // The deadline of a request that begins now.
+  // The deadline of work that begins now. The session limits the whole request (http/session.h).
   TileService::Clock::time_point Deadline() const { return TileService::Clock::now() + deadline; }
 
   const CatalogPtr catalog;

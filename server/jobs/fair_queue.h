@@ -72,10 +72,10 @@ class FairQueue {
   // Removes the newest job of the client with the most waiting jobs. Returns null if no job waits.
   PoolJobPtr RemoveNewestOfLargest();
 
-  // Expected wait of a new job: (own + the sum, over all other clients, of the smaller of their waiting time and own +
-  // the new job) / the number of threads that may run it, where own is the time of its client's waiting jobs before it.
-  // Only jobs of the same length (is_long) count, each with the mean time of its kind. Running jobs, and kinds that
-  // have never run, are not counted.
+  // Expected wait of a new job: (own + the sum, over all other clients, of min(theirs, own + job)) / the number of
+  // threads that may run it. `own` and `theirs`: how long the waiting jobs of its client before it, and those of
+  // another client, will run; `job`: how long it will run itself. Only jobs of the same length (is_long) count, each
+  // with the mean time of its kind. Running jobs, and kinds that have never run, are not counted.
   std::chrono::duration<double> ExpectedWait(const JobTerms& terms, JobClock::time_point now) const;
 
   std::size_t size() const { return size_; }

@@ -30,8 +30,8 @@ struct TileServiceOptions {
   unsigned worker_threads = 0;                                 // 0: as many as the machine has processors
   std::size_t queue_length = 10'000;                           // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;            // 0: no cache
-  std::vector<std::shared_ptr<tiler::TileStore>> stores = {};  // as of tiler::TileTiers
-  tiler::HeaderWriter write_header_lines = nullptr;            // as of tiler::TileTiers; called on a worker
+  std::vector<std::shared_ptr<tiler::TileStore>> stores = {};  // see tiler::TileTiers
+  tiler::HeaderWriter write_header_lines = nullptr;            // see tiler::TileTiers; called on a worker
 };
 
 enum class CacheStatus { kHit, kStore, kMiss, kJoined };  // kStore: in a tier below memory
@@ -87,7 +87,9 @@ class TileService {
   void Shutdown() { pool_.Shutdown(); }
 
   struct Stats {
-    std::uint64_t hits = 0, misses = 0, joined = 0;
+    std::uint64_t hits = 0;                              // found in memory
+    std::uint64_t misses = 0;                            // built, or found in a store
+    std::uint64_t joined = 0;                            // waited for the same tile as another request
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
     std::size_t queued = 0, in_flight = 0;

@@ -186,6 +186,8 @@ class DiskCache(unittest.TestCase):
                 threads = [threading.Thread(target=self.load, args=(server.port, stop, wrong, tiers)) for _ in range(3)]
                 for thread in threads:
                     thread.start()
+                if number == 0:
+                    server.wait_until_written("tiles", 1)
                 time.sleep(random.Random(number).uniform(0.05, 0.8))
                 server.kill()
                 stop.set()

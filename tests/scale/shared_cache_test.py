@@ -102,6 +102,9 @@ class SharedCache(unittest.TestCase):
             time.sleep(0.2)
             return len(redis.keys()) == TILES
         self.wait_for(is_full, "tiles are not written", 60)
+        # The later rounds have built some tiles again.
+        self.wait_for(lambda: sum(self.figure(node, name) for name in ("written_total", "dropped_total"))
+                      >= node.sum_of("terrace_tile_builds_total"), "tiles are not written")
 
     def draw(self, node, fault=None):
         """Many replies, with a fault in the middle: each must be right. Prints the times, asserts none."""

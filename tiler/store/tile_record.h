@@ -2,7 +2,7 @@
 //
 // A key holds everything that its value depends on within one build of the program: the request, the hash of the edits
 // that the tile depends on, and the dataset's cache generation, which identifies the dataset without its edits.
-// The checksum detects damage, not forgery: trust the store.
+// The checksum detects damage, not forgery: only trusted programs may write to a store.
 #pragma once
 
 #include <optional>

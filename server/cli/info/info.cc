@@ -72,11 +72,11 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
         "a VRT, which names other files: 'terrace serve' takes it where allowed_drivers of its configuration lists "
         "\"VRT\"");
   }
-  if (!info.picture_part.empty()) {
+  if (!info.picture_color.empty()) {
     advice.push_back(fmt::format(
         "band 1 says that it is the \"{}\" of a picture: its values are taken for heights, which they hardly "
         "are; serve the elevation model that belongs to it",
-        info.picture_part));
+        info.picture_color));
   }
   if (!info.found_voids.empty()) {
     advice.push_back(

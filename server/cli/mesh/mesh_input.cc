@@ -69,11 +69,11 @@ void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const 
                "takes them for heights\n",
                path, raster.found_voids);
   }
-  if (!raster.picture_part.empty()) {
+  if (!raster.picture_color.empty()) {
     fmt::print(stderr,
                "terrace: {}: band 1 says that it is the \"{}\" of a picture: its values are taken for heights; --image "
                "meshes its colours\n",
-               path, raster.picture_part);
+               path, raster.picture_color);
   }
 }
 

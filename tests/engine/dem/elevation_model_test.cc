@@ -214,7 +214,7 @@ TEST(ElevationModel, TellsPicturesFromHeights) {
   TERRACE_REQUIRE_DATA(bytes, "ortho_pair_dtm_2m_byte.tif");
   const auto part_of = [](const std::string& path) {
     const auto source = OpenOrFail(path);
-    return source == nullptr ? "" : source->info().sources.front().picture_part;
+    return source == nullptr ? "" : source->info().sources.front().picture_color;
   };
   EXPECT_EQ(part_of(photo), "Red");
   EXPECT_EQ(part_of(palette), "Palette");

@@ -39,14 +39,14 @@ RasterGrid MakeGrid(const TempDir& dir, const std::array<double, 6>& first, cons
   return *std::move(grid);
 }
 
-GridTrace TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo::TileKey& key) {
+GridReading TraceOf(const RasterGrid& grid, const geo::Lattice& lattice, const geo::TileKey& key) {
   const NodeWindow window{lattice.FirstColumn(key) - 1, lattice.FirstRow(key) - 1, lattice.cells + 3,
                           lattice.cells + 3};
   std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                              SampleRules::kVoid);
-  GridTrace trace;
-  EXPECT_TRUE(grid.FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
-  return trace;
+  GridReading reading;
+  EXPECT_TRUE(grid.FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &reading));
+  return reading;
 }
 
 // The range of a box from the tables of all members.
@@ -59,14 +59,14 @@ BlockRange OfAllMembers(const RasterGrid& grid, double west, double north, doubl
   return range;
 }
 
-// Queries a box around every position of a trace. Returns how many members were examined: the maximum of a box, and in
-// all.
-std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridTrace& trace) {
-  const GridStatistics statistics(grid, trace);
+// Queries a box around every position of a reading. Returns how many members were examined: the maximum of a box, and
+// in all.
+std::pair<std::size_t, std::size_t> LookAround(const RasterGrid& grid, const GridReading& reading) {
+  const GridStatistics statistics(grid, reading);
   std::size_t most = 0;
-  for (std::size_t n = 0; n < trace.cells.positions().columns() * trace.cells.positions().rows(); ++n) {
+  for (std::size_t n = 0; n < reading.cells.positions().columns() * reading.cells.positions().rows(); ++n) {
     const Position p =
-        trace.cells.positions().At(n % trace.cells.positions().columns(), n / trace.cells.positions().columns());
+        reading.cells.positions().At(n % reading.cells.positions().columns(), n / reading.cells.positions().columns());
     if (!std::isfinite(p.x) || !std::isfinite(p.y)) continue;
     const std::size_t before = statistics.members_visited();
     const BlockRange found = statistics.Ranges(p.x - 1, p.y - 1, p.x + 1, p.y + 1);
@@ -87,8 +87,8 @@ TEST(ManySources, AroundTheEarthATileLooksAtItsOwnSources) {
   const geo::Lattice lattice{5, 32};
   const std::int64_t columns = 1 << 6;
   for (const std::int64_t x : {std::int64_t{0}, std::int64_t{7}, columns - 1}) {
-    const GridTrace trace = TraceOf(grid, lattice, {5, x, 27});
-    const auto [most, all] = LookAround(grid, trace);
+    const GridReading reading = TraceOf(grid, lattice, {5, x, 27});
+    const auto [most, all] = LookAround(grid, reading);
     EXPECT_LE(most, 4U) << "a tile of 5.6 degrees among sources of 10, column " << x;
     EXPECT_GT(all, 0U);
   }
@@ -99,8 +99,8 @@ TEST(ManySources, AShallowTileLooksAtTheSourcesOfEachBox) {
   const TempDir dir;
   const RasterGrid grid = MakeGrid(dir, {-180, 0.5, 0, 85, 0, -0.5}, "EPSG:4326", 36, 4, 20);
   const geo::Lattice lattice{0, 32};
-  const GridTrace trace = TraceOf(grid, lattice, {0, 0, 0});
-  const auto [most, all] = LookAround(grid, trace);
+  const GridReading reading = TraceOf(grid, lattice, {0, 0, 0});
+  const auto [most, all] = LookAround(grid, reading);
   EXPECT_LE(most, 4U);
 }
 
@@ -113,13 +113,13 @@ TEST(ManySources, AtTheRimOfAProjectionATileLooksAtItsOwnSources) {
   const double tile = 180.0 / (1 << 11);
   const geo::TileKey corner{11, static_cast<std::int64_t>((west + 0.02 + 180) / tile),
                             static_cast<std::int64_t>((north - 0.02 + 90) / tile)};
-  GridTrace trace = TraceOf(grid, lattice, corner);
+  GridReading reading = TraceOf(grid, lattice, corner);
   // Positions of nodes far from a raster grid and outside its projection.
-  std::vector<Position> nodes(trace.cells.positions().nodes().begin(), trace.cells.positions().nodes().end());
+  std::vector<Position> nodes(reading.cells.positions().nodes().begin(), reading.cells.positions().nodes().end());
   std::fill_n(nodes.begin(), 40, kNowhere);
-  const GridAxes axes = trace.cells.axes();
-  trace.cells = NodeCells(NodePositions(trace.cells.positions().window(), std::move(nodes)), axes);
-  const auto [most, all] = LookAround(grid, trace);
+  const GridAxes axes = reading.cells.axes();
+  reading.cells = NodeCells(NodePositions(reading.cells.positions().window(), std::move(nodes)), axes);
+  const auto [most, all] = LookAround(grid, reading);
   EXPECT_GT(all, 0U);
   EXPECT_LE(most, 8U);
 }

@@ -74,11 +74,11 @@ TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
     const NodeWindow window = WindowOfTile(lattice, key);
     std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                SampleRules::kVoid);
-    GridTrace trace;
+    GridReading reading;
     auto filled = grid->FillNodes(lattice, window, HeightDatum::kEllipsoid,
-                                  {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &trace);
+                                  {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &reading);
     EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
-    return filled ? Result<GridTrace>(std::move(trace)) : tl::unexpected(filled.error());
+    return filled ? Result<GridReading>(std::move(reading)) : tl::unexpected(filled.error());
   };
   std::vector<float> smooth;
   const auto collar = read(key_at(11, 19.7), smooth);

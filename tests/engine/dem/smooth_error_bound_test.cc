@@ -43,13 +43,13 @@ TEST(SmoothErrorBound, IsTheSameWithAndWithoutPreparedRows) {
       const NodeWindow window = WindowOfTile(lattice, key);
       std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                  SampleRules::kVoid);
-      GridTrace trace;
-      ASSERT_TRUE(grid->FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &trace));
+      GridReading reading;
+      ASSERT_TRUE(grid->FillNodes(lattice, window, HeightDatum::kEllipsoid, {heights}, {}, &reading));
       const TileNodes nodes{lattice, window, heights};
-      const GridStatistics statistics(*grid, trace);
+      const GridStatistics statistics(*grid, reading);
       const GeoidErrorBound geoid(nodes, nullptr, {});
-      SmoothErrorBound plain(nodes, *grid, trace, statistics, geoid, false);
-      SmoothErrorBound prepared(nodes, *grid, trace, statistics, geoid, false);
+      SmoothErrorBound plain(nodes, *grid, reading, statistics, geoid, false);
+      SmoothErrorBound prepared(nodes, *grid, reading, statistics, geoid, false);
       for (int south = 0; south < lattice.cells; south += 16) {
         prepared.PrepareRows(south, south + 16);
         for (int west = 0; west < lattice.cells; west += 8) {
