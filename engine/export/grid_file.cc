@@ -3,6 +3,7 @@
 #include <gdal_priv.h>
 #include <ogr_spatialref.h>
 
+#include <array>
 #include <atomic>
 #include <limits>
 #include <utility>
@@ -94,6 +95,13 @@ Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> 
   }
   std::string bytes = file.Bytes();
   return bytes.empty() ? Result<std::string>(CannotWrite("GTiff")) : Result<std::string>(std::move(bytes));
+}
+
+Result<void> CheckGeoTiff(const OutputGrid& grid) {
+  OutputGrid smallest = grid;
+  smallest.columns = smallest.rows = 2;
+  const auto written = WriteGeoTiff(smallest, std::array<float, 4>{});
+  return written ? Result<void>() : tl::unexpected(written.error());
 }
 
 Result<std::string> WritePng16(const OutputGrid& grid, std::span<const std::uint16_t> values) {

@@ -66,6 +66,48 @@ Result<std::int64_t> NodesAlong(double length, const std::optional<std::int64_t>
   return static_cast<std::int64_t>(std::min(nodes, 1e15));
 }
 
+// Finds the positions of nodes. A node has one if it comes back from there. So does a node just beyond the edge of the
+// CRS, because the boxes of worlds are rounded: it gets the position of a place nearer to the centre of the grid.
+class Placement {
+ public:
+  Placement(const OutputGrid& grid, const Projector& projector) : grid_(grid), projector_(projector) {}
+
+  // Converts nodes to degrees, in place. Returns the index of the first that has no position; nothing: all have one.
+  std::optional<std::size_t> Place(std::span<Position> nodes) const {
+    const std::vector<Position> wanted(nodes.begin(), nodes.end());
+    projector_.Inverse(nodes);
+    std::vector<Position> back(nodes.begin(), nodes.end());
+    projector_.Forward(back);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      if (IsOnEarth(nodes[i]) && IsNear(back[i], wanted[i])) continue;
+      const Position inner = MovedInwards(wanted[i]);
+      nodes[i] = inner;
+      projector_.Inverse(nodes.subspan(i, 1));
+      Position inner_back = nodes[i];
+      projector_.Forward({&inner_back, 1});
+      if (!IsOnEarth(nodes[i]) || !IsNear(inner_back, inner)) return i;
+    }
+    return std::nullopt;
+  }
+
+ private:
+  static bool IsOnEarth(const Position& degrees) { return !std::isnan(degrees.x) && std::abs(degrees.y) <= 90; }
+  double nearest() const { return grid_.is_geographic ? kReturn * 1e-5 : kReturn; }
+  bool IsNear(const Position& a, const Position& b) const {
+    const double x = grid_.is_geographic ? std::remainder(a.x - b.x, 360) : a.x - b.x;
+    return std::hypot(x, a.y - b.y) <= nearest();
+  }
+  Position MovedInwards(const Position& node) const {
+    const auto move = [&](double at, double low, double high) {
+      return at + std::clamp((low + high) / 2 - at, -nearest(), nearest());
+    };
+    return {move(node.x, grid_.west, grid_.east), move(node.y, grid_.south, grid_.north)};
+  }
+
+  const OutputGrid& grid_;
+  const Projector& projector_;
+};
+
 }  // namespace
 
 Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes) {
@@ -120,31 +162,20 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
     }
   }
   if (grid.epsg != kWgs84) {
-    const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
+    const Position centre{(grid.west + grid.east) / 2, (grid.south + grid.north) / 2};
+    const auto projector = Projector::Make(grid.wkt, centre);
     if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
-    const std::vector<Position> wanted = nodes;
-    std::vector<Position> back;
-    back.reserve(nodes.size());
+    const Placement placement(grid, **projector);
     constexpr std::size_t kBatch = 4096;
     for (std::size_t done = 0; done < nodes.size(); done += kBatch) {
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "placing a grid was stopped");
-      const auto batch = std::span(nodes).subspan(done, std::min(kBatch, nodes.size() - done));
-      (*projector)->Inverse(batch);
-      back.insert(back.end(), batch.begin(), batch.end());
-      (*projector)->Forward(std::span(back).subspan(done));
-    }
-    const double farthest = grid.is_geographic ? kReturn * 1e-5 : kReturn;
-    const auto is_back = [&](std::size_t i) {
-      const double off_x = back[i].x - wanted[i].x;
-      return std::hypot(grid.is_geographic ? std::remainder(off_x, 360) : off_x, back[i].y - wanted[i].y) <= farthest;
-    };
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      if (!std::isnan(nodes[i].x) && std::abs(nodes[i].y) <= 90 && is_back(i)) continue;
+      const auto failed = placement.Place(std::span(nodes).subspan(done, std::min(kBatch, nodes.size() - done)));
+      if (!failed) continue;
+      const auto i = static_cast<std::int64_t>(done + *failed);
       return Invalid(
           fmt::format("bbox: EPSG:{} has no place on Earth for column {}, row {} of the grid; choose a bbox "
                       "within the area that the CRS is made for",
-                      grid.epsg, static_cast<std::int64_t>(i) % grid.columns,
-                      first_row + static_cast<std::int64_t>(i) / grid.columns));
+                      grid.epsg, i % grid.columns, first_row + i / grid.columns));
     }
   }
   std::vector<GeoPosition> positions;

@@ -52,6 +52,8 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
 // there, or if the area crosses the antimeridian or touches a pole.
 std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& area);
 
+// Errors as of WriteGeoTiff: whether it can write the grid, whatever the heights are.
+Result<void> CheckGeoTiff(const OutputGrid& grid);
 // A tiled GeoTIFF with deflate and a nodata value for NaN. Its pixels are centred on the nodes. kInvalidArgument, with
 // a message for clients: GDAL cannot write the CRS into one. kUnavailable: GDAL cannot write it.
 Result<std::string> WriteGeoTiff(const OutputGrid& grid, std::span<const float> heights);

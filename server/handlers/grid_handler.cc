@@ -151,6 +151,9 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
     auto begun = TileService::Clock::now();
     const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
     if (!grid) return tl::unexpected(grid.error());
+    if (query->format == GridFormat::kGeoTiff) {  // before heights are read in vain
+      if (const Result<void> written = dem::CheckGeoTiff(*grid); !written) return tl::unexpected(written.error());
+    }
     const Result<std::vector<float>> heights = ReadNodes(*catalog->pipeline, dataset, *query, *grid, stop);
     if (!heights) return tl::unexpected(heights.error());
     made.reply.times.read = MicrosecondsSince(begun);

@@ -30,6 +30,11 @@ TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
   EXPECT_EQ(file.error().code, ErrorCode::kInvalidArgument);
   EXPECT_NE(file.error().message.find("cannot write EPSG:8857"), std::string::npos) << file.error().message;
   EXPECT_EQ(files(), before);
+  const auto checked = CheckGeoTiff(*plan);
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().message, file.error().message);
+  EXPECT_TRUE(
+      CheckGeoTiff(*PlanOutputGrid({.west = 7, .south = 46, .east = 8, .north = 47, .columns = 2, .rows = 2}, 100)));
 }
 
 }  // namespace

@@ -209,6 +209,24 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   ExpectSays(dem::PositionsOf(*far, 0, 10, {}), "EPSG:32611 has no place on Earth for column 0, row 0");
 }
 
+// The half circumference is 20037508.342789: usual roundings of the box of the world reach beyond it.
+TEST(GridPlan, HasTheRoundedWorldOfWebMercator) {
+  for (const double half : {20037508.34, 20037508.3428, 20037508.35, 20037509.0}) {
+    const auto world = dem::PlanOutputGrid({3857, -half, -half, half, half, 3, 3, {}}, 100);
+    ASSERT_TRUE(world) << world.error().message;
+    const auto positions = dem::PositionsOf(*world, 0, 3, {});
+    ASSERT_TRUE(positions) << positions.error().message;
+    EXPECT_NEAR(positions->front().longitude, -180, 2e-5);
+    EXPECT_NEAR(positions->front().latitude, 85.0511288, 1e-5);
+    EXPECT_NEAR(positions->back().longitude, 180, 2e-5);
+    EXPECT_NEAR(positions->back().latitude, -85.0511288, 1e-5);
+    EXPECT_NEAR((*positions)[4].longitude, 0, 1e-9);
+  }
+  const auto beyond = dem::PlanOutputGrid({3857, -20037512, 0, 0, 100, 3, 3, {}}, 100);
+  ASSERT_TRUE(beyond);
+  ExpectSays(dem::PositionsOf(*beyond, 0, 3, {}), "no place on Earth for column 0, row 0");
+}
+
 TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
   const auto plan = dem::PlanOutputGrid({32632, 8.03, 46.45, 8.16, 46.55, 5, 5, {}}, 100);
   ASSERT_TRUE(plan) << plan.error().message;
