@@ -54,7 +54,8 @@ struct Manifest {
   std::string encoder;  // tiler::EncoderText()
   BakedDataset dataset;
   // The request of every tile: format, coding, extensions, compression, texture, encoding. Its dataset, key and
-  // error_step are not used. Its extensions.metadata is true if tiles that carry metadata have it.
+  // error_step are not used. Its extensions.metadata: whether the archive was baked with metadata;
+  // proto::CarriesMetadata decides which tiles then have it.
   tiler::TileRequest kind;
   std::vector<int> error_steps;  // by level, 0 .. max_level; empty: 0 at each level
   int min_level = 0, max_level = 0;

@@ -1,4 +1,4 @@
-// The manifest as JSON. Also part of the metadata of an archive in one file (WriteSingle of export.h).
+// The manifest as part of other JSON, and numbers in JSON. manifest.h declares ToJson and ParseManifest.
 #pragma once
 
 #include <cstdint>

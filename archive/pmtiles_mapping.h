@@ -20,7 +20,8 @@ PmtilesKey PmtilesKeyOf(const geo::TileKey& key, bool is_mercator);
 // Nothing: there is no such tile.
 std::optional<geo::TileKey> TileKeyOf(std::uint64_t tile_id, bool is_mercator);
 
-// `root`: of the unit; nothing: all tiles. kInvalidArgument: archives do not hold tiles in this coding.
+// `root`: of the unit, for the bounds of the file; nothing: those of the whole world. kInvalidArgument: archives do not
+// hold tiles in this coding.
 Result<PmtilesOptions> PmtilesOptionsOf(const tiler::TileRequest& kind, const std::optional<geo::TileKey>& root);
 
 // "quantized-mesh-1.0", "glb", "png"; and the media type of a tile.

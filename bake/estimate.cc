@@ -96,7 +96,7 @@ Result<Estimate> EstimateBake(const tiler::TilePipeline& pipeline, const std::ve
   Estimate estimate = Sum(std::move(levels));
   estimate.files = plan.files;
   for (const UnitPlan::Entry& entry : plan.units)
-    estimate.subtrees += ReachesDown(entry.unit) ? entry.targets.size() : 0;
+    estimate.subtree_files += ReachesDown(entry.unit) ? entry.targets.size() : 0;
   estimate.sampled = sampled;
   return estimate;
 }
@@ -110,7 +110,7 @@ Estimate EstimateWith(const Pyramid& tiles, double bytes_per_tile, double millis
   Estimate estimate = Sum(std::move(levels));
   const std::vector<Unit> units = UnitsOf(tiles);
   estimate.files = units.size();
-  estimate.subtrees = static_cast<std::uint64_t>(std::ranges::count_if(units, ReachesDown));
+  estimate.subtree_files = static_cast<std::uint64_t>(std::ranges::count_if(units, ReachesDown));
   return estimate;
 }
 

@@ -25,7 +25,7 @@ struct Estimate {
   std::uint64_t tiles = 0, files = 0;
   // Of `files`: those with more than one tile, and the file of the top levels. A file of one tile exists only so that
   // its parent has four children.
-  std::uint64_t subtrees = 0;
+  std::uint64_t subtree_files = 0;
   std::uint64_t sampled = 0;  // tiles that were built for the estimate
   double bytes = 0, core_hours = 0;
 };

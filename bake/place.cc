@@ -346,8 +346,8 @@ void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock) {
   Remove(fs::path(place) / kIdentityFile);
 }
 
-void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker) {
-  const std::string own = fmt::format("bake-{}.lock", LockOfWorker(but_of_worker, job));
+void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& except_worker) {
+  const std::string own = fmt::format("bake-{}.lock", LockOfWorker(except_worker, job));
   const std::string ending = LockOfWorker("", job) + ".lock";
   for (const std::string& name : NamesIn(place).value_or(std::vector<std::string>())) {
     if (IsLock(name) && name.ends_with(ending) && name != own) Remove(fs::path(place) / name);

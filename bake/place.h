@@ -59,15 +59,15 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 // A random number that is kept in the place until the bake is finished: workers that have the same one write into the
 // same place, wherever it is mounted. kUnavailable: the place cannot be written.
 Result<std::string> PlaceId(const std::string& place);
-// Returns whether the archives there are finished. If so, removes the notes of ClaimPlace and PlaceId, and what killed
-// processes have left, as TidyPlace does.
+// Returns whether the archives there are finished. If so, removes the identity (ClaimPlace), the number (PlaceId), and
+// what killed processes have left, as TidyPlace does.
 bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
-// Removes the notes of ClaimPlace and PlaceId if the place holds nothing else but the lock `own_lock`: the bake was
+// Removes the identity and the number if the place holds nothing else but the lock `own_lock`: the bake was
 // refused.
 void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock);
 // The name of a worker's lock for PlaceLock::Take. Locks of one job exclude other bakes, but not one another.
 std::string LockOfWorker(const std::string& worker, const std::string& job);
 // Removes the locks of the job's other workers. The job is done: they were killed, or what they still do is not needed.
-void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& but_of_worker);
+void RemoveLocksOfJob(const std::string& place, const std::string& job, const std::string& except_worker);
 
 }  // namespace terrace::bake

@@ -1,4 +1,4 @@
-// The small files of a place, in a folder or in a bucket: locks, identities, notes.
+// The small files of a place, in a folder or in a bucket: locks, identities, numbers of places.
 #pragma once
 
 #include <filesystem>

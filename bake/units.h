@@ -29,7 +29,7 @@ struct Unit {
 // tiles are left out.
 std::vector<Unit> UnitsOf(const Pyramid& pyramid);
 
-// A part of a unit: the tiles below `root` on the levels up to `last_level`.
+// A part of a unit: `root`, and the tiles below it on the levels up to `last_level`.
 struct Part {
   geo::TileKey root;
   int last_level = 0;

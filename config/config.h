@@ -87,7 +87,7 @@ struct DatasetConfig {
   dem::HoleFill voids = dem::HoleFill::kSmooth;  // surface in larger voids with data all around them
   double feather = 0;  // metres: width of the blend between a source and the next one, inwards from its edges
   tin::Criterion criterion = tin::Criterion::kDelaunay;
-  bool compact = false;                                                   // tiles go through the drop pass
+  bool compact = false;                                                   // vertices are removed (engine/tin/decimate)
   proto::GlbCompression glb_compression = proto::GlbCompression::kDraco;  // for requests that name none
   int draco_speed = 7;                                                    // 0 smallest tiles .. 10 fastest
   int draco_normal_bits = 8;                                              // of each of the two coordinates of a normal

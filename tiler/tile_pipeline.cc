@@ -70,7 +70,8 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<Refine
       drawn_(std::make_unique<DrawnMeshCache>(kDrawnMeshBytes)),
       refinements_(std::move(refinements)) {}
 
-// Returns the cached refinement if it reaches the error; else reads or continues it, and caches the result.
+// Returns the cached refinement if it reaches the error. Else continues it, or reads heights and refines them. Caches
+// the result if it reaches the error.
 Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
                                             EncodedTile& encoded, const std::stop_token& stop) const {
   const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.model->EditsHash(key)};

@@ -44,9 +44,10 @@ class TilePipeline {
 
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset, a tile outside availability, or, in a dataset without sources, a tile that its archive
-  // lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced, so the dataset has
-  // to be opened again. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; the reasons of the other encoders
+  // (encoders.h); in a dataset without sources, a tile that its archive lacks. kUnavailable: a source cannot be read
+  // now. kChanged: a file of a source was replaced, so the dataset has to be opened again. kInternal: an encoder
+  // failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.

@@ -32,8 +32,8 @@ std::vector<proto::TreeRoot> TreesOf(const TileTree& tree);
 std::string TilesetJson(const TileTree& tree, const std::vector<proto::TreeRoot>& roots,
                         const std::string& content_query, const std::string& subtree_query, bool has_versions = true);
 
-// The subtree of `levels` levels below `top`, an available tile. Not a subtree if a stop was requested: the ranges of
-// an archive take long, because its tiles are read for them.
+// The subtree of `levels` levels below `top`, an available tile. The ranges of heights of an archive take long, because
+// its tiles are read for them: after a stop was requested, the result is incomplete and must be dropped.
 std::string SubtreeOf(const TileTree& tree, const geo::TileKey& top, int levels, const std::stop_token& stop);
 
 }  // namespace terrace::tiler

@@ -19,8 +19,8 @@
 
 namespace terrace::dem {
 
-// What RasterGrid::FillNodes read for a window, which the certified error needs. If `part` is set, it was for that part
-// only, and the `cells` are empty.
+// What RasterGrid::FillNodes read for a window, which the certified error needs. If `part` is set, `reading` is of
+// that part of the window only, and `reading.cells` is empty.
 struct PartReading {
   std::optional<NodeWindow> part = {};
   GridReading reading = {};
@@ -138,8 +138,8 @@ Box BoxOf(const NodeGrid& node_grid, const NodeWindow& window) {
           north + kSlack};
 }
 
-// An index of raster grids by the box in degrees where they may have heights. Longitudes from -540 to 540, with one
-// entry for each turn around the Earth that begins there.
+// An index of raster grids by the box in degrees where they may have heights. Each box is entered three
+// times, 360 degrees apart, so that it is found with longitudes from -540 to 540.
 BoxIndex IndexOf(const std::vector<RasterGrid>& grids);
 
 }  // namespace terrace::dem

@@ -30,8 +30,8 @@ class ElevationModel {
   // Opens and checks rasters, and reads each once for its statistics. Errors name the file, the fault and the remedy.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
-  // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks some, and all files
-  // have passed the other checks; or stopped.
+  // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks the statistics of a
+  // raster, and all files have passed the other checks; or DemOptions::stop was requested.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -70,8 +70,9 @@ class ElevationModel {
 
   // Heights at pixel centres of a Web Mercator grid, row by row from the north-western pixel. The rules of tiles apply:
   // samples are averaged to the grid's resolution, voids are filled as DemOptions says, and the floor is used
-  // elsewhere. A height depends on depth and pixel alone. Depths 0 .. geo::kMaxLevel; info().max_mercator_depth is the
-  // first as fine as the finest source.
+  // elsewhere. A height depends on depth and pixel alone. `depth`: of
+  // geo::MercatorGrid, 256 << depth pixels around the Earth; 0 .. geo::kMaxLevel. info().max_mercator_depth is the first
+  // as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:

@@ -9,7 +9,7 @@
 //                        u-v is kept if S(p-w) < q^(5/4) S(u-v), at edges further out if S(p-w) < q^(1/4) S(u-v),
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // Edges that have come into the outline in place of other ones are further out.
-// For the angle between normals, S is squared once more, and the thresholds do not depend on how the edge came into the
+// With FitMeasure::kNormals, S is squared once more, and the thresholds do not depend on how the edge came into the
 // outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
 // that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
 // Therefore u-v is kept more readily than p-w is taken, and most readily at edges further out from p: there are three

@@ -38,7 +38,8 @@ enum class Side : std::uint8_t {
 // evaluated in double in exactly this form. Its error is
 //   scale * min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
 // For samples with a limit (sample_limits.h) it is
-//   scale * max((m + p) * weight, m + p + step_m)  with p = rounding * |h_b - h_a| / (b - a).
+//   scale * W(max((m + p) * weight, m + p + step_m))  with p = rounding * |h_b - h_a| / (b - a)
+// if m > 0, where W is SampleLimits::WeightedError.
 // `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts,
 // and p for rounding of positions along the sample's own chord.
 // The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples

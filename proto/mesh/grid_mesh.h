@@ -24,9 +24,9 @@ enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 
 // Metres, a power of two. At most a 32nd of the error, so that rounding takes at most 3 % of it on level ground. At
 // most a 64th of the side of a lattice cell on the ground, so that few triangles flip. Never below 2^-16 m, which
-// matters to errors below half a millimetre. With the default error of its level a tile spans less than 2^16 steps. Its
-// side is never more than 2^23 steps: therefore, at an error_fraction below 0.11, the step of the finest errors is up
-// to a 15th of the error instead of a 32nd.
+// matters to errors below half a millimetre, and never so small that a tile's side has more than 2^23 steps, which
+// matters at an error_fraction below 0.11: the step is then up to a 15th of the finest errors. With the default error
+// of its level a tile spans less than 2^16 steps.
 //
 // Floats allow finer steps. With floats the step is also at most 2^-7 m, so that all vertices of a tile's edge are less
 // than a centimetre from the meridian or parallel where the tile ends: clients can find the vertices of an edge by

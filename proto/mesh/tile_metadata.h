@@ -11,8 +11,8 @@
 namespace terrace::proto {
 
 // Whether a tile has metadata: tiles of levels 0, N, 2N and so on have it, for N = `metadata_availability`
-// (layer.json's metadataAvailability); 0: no tile. `max_source_level`: the deepest level of the sources. Tiles from
-// there on, where edits added levels, have metadata only if they have children. `available`: as below.
+// (layer.json's metadataAvailability); 0: no tile. `max_source_level`: the deepest level of the sources. Tiles of
+// this level and of deeper ones, which edits may add, have metadata only if they have children. `available`: as below.
 bool CarriesMetadata(const geo::TileKey& key, int metadata_availability, int max_source_level,
                      std::span<const std::vector<geo::TileRange>> available);
 

@@ -61,7 +61,7 @@ struct HandlerState {
   HandlerState(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
                const config::Config& config, const ProcessState& process);
 
-  // The deadline of work that begins now. The session limits the whole request (http/session.h).
+  // The deadline of work that begins now. Waits for memory before and after it have the session's (http/session.h).
   TileService::Clock::time_point Deadline() const { return TileService::Clock::now() + deadline; }
 
   const CatalogPtr catalog;

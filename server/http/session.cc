@@ -118,7 +118,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   // If its reply is being sent, or its body has no memory, there is nothing to release.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
-    displaced_ = true;  // also if the body has got memory, but the session was not woken yet
+    displaced_ = true;  // set also after the body got memory, until the session's coroutine resumes
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
@@ -429,7 +429,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
   const std::size_t body_bytes = SendsBody(response) ? response.body->size() : 0;
 
   BufferPair left = {asio::buffer(head), body_bytes > 0 ? asio::buffer(*response.body) : asio::const_buffer()};
-  Skip(stream_.TakeAhead(), left);
+  Skip(stream_.TakeBytesSentAhead(), left);
   // What the kernel accepts at once needs no deadline. An error occurs again when the rest is written.
   const std::size_t taken = stream_.WriteReady(left).value_or(0);
   Skip(taken, left);
@@ -439,10 +439,11 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 }
 
 // Returns false if the client is gone, has read nothing for too long, or reads too slowly on average. `total`: bytes of
-// the reply that were written before. They say nothing about the client, because the kernel buffers them.
+// the reply that were written before. They count for min_rate, but not as taken by the client (`room`): the kernel may
+// only have buffered them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
-  room.AddTaken(0);
+  room.AddTaken(0);  // the client's time begins
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;

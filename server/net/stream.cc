@@ -156,7 +156,7 @@ void Stream::SendAhead(std::string_view bytes) {
   if (state_->ahead == 0) state_->ahead = WriteReady({asio::buffer(bytes), asio::const_buffer()}).value_or(0);
 }
 
-std::size_t Stream::TakeAhead() { return std::exchange(state_->ahead, 0); }
+std::size_t Stream::TakeBytesSentAhead() { return std::exchange(state_->ahead, 0); }
 
 void Stream::Cancel() {
   error_code ignored;

@@ -62,8 +62,8 @@ class Stream {
   // connection answers with a reset. A peer that has closed only its sending direction (RFC 9293, section 3.6) accepts
   // them. Does nothing for TLS.
   void SendAhead(std::string_view bytes);
-  // The number of bytes of the next message that were sent ahead.
-  std::size_t TakeAhead();
+  // The number of bytes of the next message that were sent ahead; 0 from then on.
+  std::size_t TakeBytesSentAhead();
 
   // Cancels the current operation.
   void Cancel();

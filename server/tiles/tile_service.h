@@ -88,7 +88,7 @@ class TileService {
 
   struct Stats {
     std::uint64_t hits = 0;                              // found in memory
-    std::uint64_t misses = 0;                            // built, or found in a store
+    std::uint64_t misses = 0;                            // calls of Build that started a flight
     std::uint64_t joined = 0;                            // waited for the same tile as another request
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times

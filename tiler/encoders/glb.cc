@@ -44,7 +44,7 @@ struct MeshedGlb {
   std::vector<geo::Vec3> positions;         // of its vertices
 };
 
-// Takes the mesh that the quantized-mesh form at this error begins with (ReplayMesh), and rounds its vertices to the
+// Starts from the same mesh as a quantized-mesh tile of this error (ReplayMesh), and rounds its vertices to the
 // grid of proto/mesh/grid_mesh.h. Measures the result, and inserts samples where rounding has pushed one over the
 // bound. Edges do not change: they are refined to 15/16 of the error, and the grid's rounding takes less than the rest.
 // `refinement`: as for MeshTile. `skirt_error_m`: determines the depth of skirts (proto/mesh/skirt.h), as in tilesets.

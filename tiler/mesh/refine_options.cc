@@ -123,8 +123,8 @@ proto::EdgeSteps EdgeStepsOf(const dem::ElevationModel& model, const geo::TileKe
 
 tin::GreedyOptions RefineOptionsOf(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                    tin::Criterion criterion) {
-  const proto::EdgeErrors none(proto::kHeightResolution);
-  tin::GreedyOptions options = BaseRefineOptions(samples, EdgeStepsOf(model, samples.key, none));
+  const proto::EdgeErrors smallest(proto::kHeightResolution);
+  tin::GreedyOptions options = BaseRefineOptions(samples, EdgeStepsOf(model, samples.key, smallest));
   options.criterion = criterion;
   options.limits = LimitsOf(model, samples.key);
   return options;

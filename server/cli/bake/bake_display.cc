@@ -141,7 +141,7 @@ std::string EstimateJson(const bake::Estimate& estimate) {
   Json json;
   json["tiles"] = estimate.tiles;
   json["files"] = estimate.files;
-  json["subtrees"] = estimate.subtrees;
+  json["subtrees"] = estimate.subtree_files;
   json["bytes"] = std::round(estimate.bytes);
   json["core_hours"] = estimate.core_hours;
   json["sampled_tiles"] = estimate.sampled;
@@ -165,7 +165,7 @@ std::string EstimateText(const bake::Estimate& estimate) {
   const std::string hours = estimate.core_hours < 0.1 ? fmt::format("{:.1f} core-minutes", estimate.core_hours * 60)
                                                       : fmt::format("{:.1f} core-hours", estimate.core_hours);
   fmt::format_to(std::back_inserter(text), "{} tiles in {} files ({} subtrees), about {} and {}; {}\n",
-                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.subtrees), Bytes(estimate.bytes),
+                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.subtree_files), Bytes(estimate.bytes),
                  hours,
                  estimate.sampled > 0 ? fmt::format("from {} tiles that were built", estimate.sampled)
                                       : std::string("from the assumed bytes and milliseconds a tile"));
