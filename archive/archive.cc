@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <list>
 #include <mutex>
 #include <unordered_map>
@@ -27,6 +28,7 @@ class ArchiveBase : public Archive {
 
   const std::string& place() const override { return place_; }
   const Manifest& manifest() const override { return manifest_; }
+  bool is_outdated() const override { return is_outdated_; }
 
   Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const override {
     const bool is_mercator = tiler::IsMercator(manifest_.kind.format);
@@ -64,10 +66,12 @@ class ArchiveBase : public Archive {
   // The file of this tile is damaged: the next look-up opens it again, since it may have been repaired meanwhile.
   virtual void Forget(const geo::TileKey& key) const = 0;
   virtual Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const = 0;
+  void SetOutdated() const { is_outdated_ = true; }
 
  private:
   const std::string place_;
   const Manifest manifest_;
+  mutable std::atomic<bool> is_outdated_{false};
 };
 
 class SingleArchive final : public ArchiveBase {
@@ -77,7 +81,7 @@ class SingleArchive final : public ArchiveBase {
 
  protected:
   Result<FilePtr> FileOf(const geo::TileKey&) const override { return file_; }
-  void Forget(const geo::TileKey&) const override {}  // a reload opens it again
+  void Forget(const geo::TileKey&) const override { SetOutdated(); }
   Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const override {
     return take(*file_);
   }
@@ -140,9 +144,11 @@ class ChunkedArchive final : public ArchiveBase {
     Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path, kMaxMetadataBytes);
     if (!file) {
       if (file.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(file.error()));
+      SetOutdated();
       return MakeError(ErrorCode::kUnavailable, "{} is missing, although the manifest names it; bake it again", path);
     }
     if ((*file)->bytes() != unit.bytes || UnitKeyIn((*file)->metadata()) != unit.key) {
+      SetOutdated();
       return MakeError(ErrorCode::kUnavailable,
                        "{} is not the file that the manifest describes: it is of another bake; bake it again", path);
     }
@@ -157,13 +163,16 @@ class ChunkedArchive final : public ArchiveBase {
 }  // namespace
 
 Result<std::shared_ptr<const Archive>> Archive::Open(const std::string& place) {
-  Result<Manifest> manifest = ReadManifest(place);
-  if (!manifest) return tl::unexpected(std::move(manifest.error()));
   if (!IsSingleFile(place)) {
+    Result<Manifest> manifest = ReadManifest(place);
+    if (!manifest) return tl::unexpected(std::move(manifest.error()));
     return std::make_shared<const ChunkedArchive>(place, *std::move(manifest));
   }
+  // Opened once, so that the manifest is that of the tiles also if the file is replaced meanwhile.
   Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(place);
   if (!file) return tl::unexpected(std::move(file.error()));
+  Result<Manifest> manifest = ManifestOf(place, (*file)->metadata());
+  if (!manifest) return tl::unexpected(std::move(manifest.error()));
   return std::make_shared<const SingleArchive>(place, *std::move(manifest), FilePtr(*std::move(file)));
 }
 

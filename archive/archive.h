@@ -44,6 +44,10 @@ class Archive {
   // The range of a tile's heights in metres. Nothing and errors: as Find.
   virtual Result<std::optional<dem::HeightRange>> FindRange(const geo::TileKey& key) const = 0;
 
+  // Whether a look-up has met files that are not those of this archive any more, or that cannot be read: the archive
+  // has to be opened again. Files in buckets are not watched in another way.
+  virtual bool is_outdated() const = 0;
+
   // Calls `take` for each tile, unit by unit, in the order of each unit's file. Ends when `take` fails. Reads and
   // checks every byte. Errors: those of `take` and of Find.
   using TakeTile = std::function<Result<void>(const geo::TileKey& key, ArchivedTile tile)>;

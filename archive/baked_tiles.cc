@@ -107,6 +107,10 @@ class Baked final : public tiler::BakedTiles {
                             std::max(extent_.heights.max, extent_.floor_m)};
   }
 
+  bool is_outdated() const override {
+    return std::ranges::any_of(archives_, [](const auto& archive) { return archive->is_outdated(); });
+  }
+
   Error WhyAbsent(const TileRequest& request) const override {
     std::string formats;
     for (const TileFormat format : extent_.formats) formats += (formats.empty() ? "" : ", ") + FolderOf(format);

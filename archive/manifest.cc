@@ -20,12 +20,16 @@ Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) 
 Result<Manifest> ReadSingle(const std::string& path) {
   const Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path);
   if (!file) return tl::unexpected(file.error());
-  const Result<std::string> json = ManifestIn((*file)->metadata());
-  if (!json) return MakeError(json.error().code, "{} is no archive of terrace: {}", path, json.error().message);
-  return WithPlace(path, ParseManifest(*json));
+  return ManifestOf(path, (*file)->metadata());
 }
 
 }  // namespace
+
+Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata) {
+  const Result<std::string> json = ManifestIn(metadata);
+  if (!json) return MakeError(json.error().code, "{} is no archive of terrace: {}", path, json.error().message);
+  return WithPlace(path, ParseManifest(*json));
+}
 
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
   const std::string path = place + "/" + kManifestFile, json = ToJson(manifest);

@@ -93,6 +93,8 @@ Result<Manifest> ParseManifest(std::string_view json);
 // Writes manifest.json by rename, so that it is complete or absent. Does not touch a manifest with the same content, so
 // that servers do not open the archive anew. Call it last. kUnavailable: the place cannot be written.
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest);
+// The manifest in the metadata of an archive in one file. Errors: those of ParseManifest; they name `path`.
+Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata);
 // kNotFound: there is no manifest: the place holds an unfinished bake, or something else. kInvalidArgument: see
 // ParseManifest. Also reads the manifest in an archive in one file (WriteSingle of export.h).
 Result<Manifest> ReadManifest(const std::string& place);

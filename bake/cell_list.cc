@@ -35,7 +35,11 @@ Result<Pyramid> PlanCells(std::string_view text, double arc_seconds, double erro
     if (line.empty()) continue;
     char north = 0, east = 0, rest = 0;
     int south = 0, west = 0;
-    const bool is_cell = std::sscanf(line.c_str(), "%c%2d%c%3d%c", &north, &south, &east, &west, &rest) == 4 &&
+    // %2d and %3d also accept a sign and blanks.
+    const bool has_digits =
+        line.size() == 7 && std::ranges::count_if(line, [](char c) { return c >= '0' && c <= '9'; }) == 5;
+    const bool is_cell = has_digits &&
+                         std::sscanf(line.c_str(), "%c%2d%c%3d%c", &north, &south, &east, &west, &rest) == 4 &&
                          (north == 'N' || north == 'S') && (east == 'E' || east == 'W');
     if (north == 'S') south = -south;
     if (east == 'W') west = -west;

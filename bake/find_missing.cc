@@ -19,10 +19,11 @@ bool IsThere(const tiler::Dataset& dataset, const Target& target, const Unit& un
 
 }  // namespace
 
-std::vector<std::size_t> FindMissing(const tiler::Dataset& dataset, const std::vector<Target>& targets,
-                                     const UnitPlan& plan) {
+Result<std::vector<std::size_t>> FindMissing(const tiler::Dataset& dataset, const std::vector<Target>& targets,
+                                             const UnitPlan& plan, const std::stop_token& stop) {
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < plan.units.size(); ++i) {
+    if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "stopped while units were looked for");
     const UnitPlan::Entry& entry = plan.units[i];
     const bool is_there = std::ranges::all_of(
         entry.targets, [&](std::size_t target) { return IsThere(dataset, targets[target], entry.unit); });

@@ -28,17 +28,23 @@ namespace fs = std::filesystem;
 constexpr const char* kIdentityFile = "bake.json";
 constexpr const char* kPlaceIdFile = "bake-place.id";
 
-// The start of a process in the kernel's ticks. It differs for a later process with the same number. Empty: unknown.
-std::string StartOf(long pid) {
-  const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid));
-  const std::size_t name_end = stat.rfind(')');
-  if (name_end == std::string::npos) return {};
-  std::istringstream fields(stat.substr(name_end + 1));
-  std::string field;
-  constexpr int kStart = 20;  // counted after the name
-  for (int i = 0; i < kStart; ++i) fields >> field;
-  return field;
-}
+// What the kernel states about a process. Empty: unknown.
+struct ProcessState {
+  std::string state;  // "R"; "Z" and "X": it has ended, but its parent does not know yet
+  std::string start;  // in the kernel's ticks; differs for a later process with the same number
+
+  static ProcessState Of(long pid) {
+    const std::string stat = ReadText(fmt::format("/proc/{}/stat", pid));
+    const std::size_t name_end = stat.rfind(')');
+    if (name_end == std::string::npos) return {};
+    ProcessState process;
+    std::istringstream fields(stat.substr(name_end + 1));
+    fields >> process.state;
+    constexpr int kStart = 20;  // counted after the name
+    for (int i = 1; i < kStart; ++i) fields >> process.start;
+    return process;
+  }
+};
 
 // Identifies the namespace of process numbers: a container has its own.
 std::string NumberSpace() {
@@ -71,8 +77,9 @@ struct Owner {
     const long number = ParseNumber<long>(pid).value_or(0);
     if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
-    const std::string now = StartOf(number);
-    return !start.empty() && !now.empty() && now != start;
+    const ProcessState now = ProcessState::Of(number);
+    if (now.state == "Z" || now.state == "X") return true;
+    return !start.empty() && !now.start.empty() && now.start != start;
   }
 };
 
@@ -98,7 +105,8 @@ Result<void> MakeFolder(const std::string& place) {
 
 // What the lock files of this process contain.
 std::string OwnLock() {
-  return fmt::format("{} {} {} {} {}", HostName(), ::getpid(), StartOf(::getpid()), BootOf(), NumberSpace());
+  return fmt::format("{} {} {} {} {}", HostName(), ::getpid(), ProcessState::Of(::getpid()).start, BootOf(),
+                     NumberSpace());
 }
 
 bool IsLock(const std::string& name) { return name.starts_with("bake") && name.ends_with(".lock"); }

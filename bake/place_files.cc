@@ -95,7 +95,7 @@ Result<bool> CreateFile(const std::string& file, const std::string& content) {
     return why(sync_error);
   }
   int error = ::link(own.c_str(), file.c_str()) == 0 ? 0 : errno;
-  if (error == EPERM || error == EOPNOTSUPP) {  // a file system without links
+  if (error == EPERM || error == EOPNOTSUPP || error == ENOSYS) {  // a file system without links
     const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
     error = made < 0 ? errno : 0;
     if (made >= 0) ::close(made);

@@ -123,7 +123,9 @@ Result<bool> RedisQueue::Fill(const std::string& incarnation) {
     arguments.push_back(std::move(name));
     arguments.push_back(std::move(value));
   }
-  for (const std::size_t unit : options_.find_missing()) arguments.push_back(options_.units[unit]);
+  const auto missing = options_.find_missing();
+  if (!missing) return tl::unexpected(missing.error());
+  for (const std::size_t unit : *missing) arguments.push_back(options_.units[unit]);
   const auto reply = connection_->Call(ScriptCommand(options_.job, scripts::kFill, std::move(arguments)));
   if (!reply) return tl::unexpected(reply.error());
   if ((*reply)[0].text() != "ok") return false;

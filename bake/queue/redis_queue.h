@@ -30,7 +30,7 @@ struct RedisQueueOptions {
   std::string worker;              // the name of this process among the workers of the job
   std::vector<std::string> units;  // the names of the units of the plan, by index
   // The indexes of the units that have no file with the right key. Called whenever the queue is filled.
-  std::function<std::vector<std::size_t>()> find_missing;
+  std::function<Result<std::vector<std::size_t>>()> find_missing;
   // A unit whose worker was silent for so long goes to another worker. The worker that fills the queue sets it for all.
   std::chrono::milliseconds lease{30'000};
   std::chrono::milliseconds patience{600'000};  // how long an unreachable Redis is waited for

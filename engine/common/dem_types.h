@@ -53,7 +53,7 @@ struct RasterCache {
 };
 
 struct DemOptions {
-  SourceOptions source = {};    // for files without options of their own
+  SourceOptions source = {};    // for files without options of their own, and for the rasters of edits
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
   // Metres: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};

@@ -144,10 +144,11 @@ Result<std::string> ElevationModel::Impl::AddFlatHeight(Edit& edit, const std::s
 
 Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemOptions& options,
                                                           std::map<std::string, std::size_t>& opened) {
-  const auto [known, is_new] = opened.emplace(edit.source, replacements.size());
+  const auto [known, is_new] = opened.emplace(edit.source_vertical + '\n' + edit.source, replacements.size());
   if (is_new) {
     DemOptions of_replacement;
     of_replacement.source = options.source;
+    if (!edit.source_vertical.empty()) of_replacement.source.vertical = edit.source_vertical;
     of_replacement.cache = options.cache;
     of_replacement.stop = options.stop;
     auto model = ElevationModel::Open(edit.source, of_replacement);

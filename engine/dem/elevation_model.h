@@ -71,8 +71,8 @@ class ElevationModel {
   // Heights at pixel centres of a Web Mercator grid, row by row from the north-western pixel. The rules of tiles apply:
   // samples are averaged to the grid's resolution, voids are filled as DemOptions says, and the floor is used
   // elsewhere. A height depends on depth and pixel alone. `depth`: of
-  // geo::MercatorGrid, 256 << depth pixels around the Earth; 0 .. geo::kMaxLevel. info().max_mercator_depth is the first
-  // as fine as the finest source.
+  // geo::MercatorGrid, 256 << depth pixels around the Earth; 0 .. geo::kMaxLevel. info().max_mercator_depth is the
+  // first as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:

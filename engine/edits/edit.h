@@ -92,6 +92,7 @@ struct Edit {
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
   int min_level = 0;                                         // of precision
   std::string source;                                        // of replace: a path
+  std::string source_vertical;  // of replace: SourceOptions::vertical; empty: that of DemOptions::source
   std::size_t replacement = 0;  // of replace: index of the model opened from `source`; ElevationModel sets it
 
   // Derived by Complete.

@@ -113,7 +113,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           } else if (edit.op == EditOp::kReplace) {
             target = static_cast<double>(other->heights[at]);
           } else if (weight > 0) {
-            target = TargetAt(edit, {x, y}, place);
+            target = row.TargetAt(x, place);
           }
           if (errors) nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {place, values[at], target};
           if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
@@ -137,6 +137,7 @@ template Result<void> EditSet::Apply(const geo::MercatorGrid&, const NodeWindow&
 
 double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
                         const std::function<double(const Edit&)>& replaced, EditRows& rows) const {
+  bool is_in_hole = false;  // as of tiles, whatever other edits say
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
     if (!edit.changes_heights() && edit.op != EditOp::kHole) continue;
@@ -151,14 +152,15 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
     const double weight = edit.WeightAt(place.distance_m);
     if (weight <= 0) continue;
     if (edit.op == EditOp::kHole) {
-      height = std::numeric_limits<double>::quiet_NaN();
+      is_in_hole = true;
       continue;
     }
     const double target = edit.op == EditOp::kOffset    ? edit.offset_m
                           : edit.op == EditOp::kReplace ? replaced(edit)
-                                                        : TargetAt(edit, point, place);
+                                                        : row->second.TargetAt(point.x, place);
     if (!std::isnan(target)) height = Edited(edit.op, height, target, weight);
   }
+  if (is_in_hole) return std::numeric_limits<double>::quiet_NaN();
   return std::isnan(height) ? height : static_cast<double>(RoundHeight(height));
 }
 

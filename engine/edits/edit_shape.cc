@@ -74,6 +74,12 @@ EditRow::EditRow(const Edit& edit, double y, double margin_m)
     edges_.push_back({a, b, length2 > 0 ? 1 / length2 : 0, r, e});
   }
   std::ranges::sort(crossings_);
+  for (std::size_t t = 0; t < edit.triangles.size(); ++t) {
+    const auto& ring = edit.rings.front();
+    const auto& [i, j, k] = edit.triangles[t];
+    const auto [low, high] = std::minmax({ring[i].y, ring[j].y, ring[k].y});
+    if (low <= y && y <= high) triangles_.push_back(static_cast<std::uint32_t>(t));
+  }
 }
 
 EditPlace EditRow::At(double x) const {
@@ -119,8 +125,34 @@ double EditUndulations::At(PlanPoint point) const {
 
 namespace {
 
-// Above the edit's own datum.
-double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place) {
+// How far a point lies inside a triangle, in twice its area; negative outside.
+double DepthIn(const std::vector<PlanPoint>& ring, const std::array<std::uint32_t, 3>& triangle, PlanPoint point) {
+  const PlanPoint a = ring[triangle[0]], b = ring[triangle[1]], c = ring[triangle[2]];
+  const double sign = Cross(a, b, c) < 0 ? -1 : 1;
+  return std::min({sign * Cross(a, b, point), sign * Cross(b, c, point), sign * Cross(c, a, point)});
+}
+
+// The triangle of a slope in which a point lies deepest. `near`: triangles that may contain it.
+const std::array<std::uint32_t, 3>& TriangleAt(const Edit& edit, PlanPoint point, std::span<const std::uint32_t> near) {
+  const auto& ring = edit.rings.front();
+  double best = -std::numeric_limits<double>::infinity();
+  std::size_t deepest = 0;
+  const auto examine = [&](std::size_t t) {
+    const double depth = DepthIn(ring, edit.triangles[t], point);
+    if (depth <= best) return;
+    best = depth;
+    deepest = t;
+  };
+  for (const std::uint32_t t : near) examine(t);
+  if (best < 0) {  // rounding left it outside of all: the one that it is nearest to
+    best = -std::numeric_limits<double>::infinity();
+    for (std::size_t t = 0; t < edit.triangles.size(); ++t) examine(t);
+  }
+  return edit.triangles[deepest];
+}
+
+// Above the edit's own datum. `near`: as for TriangleAt.
+double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place, std::span<const std::uint32_t> near) {
   if (edit.op == EditOp::kFlatten) return edit.height_m;
   if (!place.is_inside) {
     const auto& heights = edit.heights[place.ring];
@@ -129,28 +161,24 @@ double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place) {
   }
   std::array<double, 3> slope = edit.slope;
   if (!edit.triangles.empty()) {
-    // The triangle that contains the point, or is nearest to containing it: rounding may leave it outside all.
-    double best = -std::numeric_limits<double>::infinity();
     const auto& ring = edit.rings.front();
     const auto& heights = edit.heights.front();
-    for (const auto& [a, b, c] : edit.triangles) {
-      const double sign = Cross(ring[a], ring[b], ring[c]) < 0 ? -1 : 1;
-      const double depth = std::min({sign * Cross(ring[a], ring[b], point), sign * Cross(ring[b], ring[c], point),
-                                     sign * Cross(ring[c], ring[a], point)});
-      if (depth <= best) continue;
-      best = depth;
-      slope = PlaneThrough(ring[a], ring[b], ring[c], heights[a], heights[b], heights[c]);
-    }
+    const auto& [a, b, c] = TriangleAt(edit, point, near);
+    slope = PlaneThrough(ring[a], ring[b], ring[c], heights[a], heights[b], heights[c]);
   }
   return slope[0] * point.x + slope[1] * point.y + slope[2];
 }
 
-}  // namespace
-
-double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
-  const double stated = StatedTarget(edit, point, place);
+double Target(const Edit& edit, PlanPoint point, const EditPlace& place, std::span<const std::uint32_t> near) {
+  const double stated = StatedTarget(edit, point, place, near);
   return edit.undulations == nullptr ? stated : stated + edit.undulations->At(point);
 }
+
+}  // namespace
+
+double EditRow::TargetAt(double x, const EditPlace& place) const { return Target(edit_, {x, y_}, place, triangles_); }
+
+double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) { return Target(edit, point, place, {}); }
 
 // The ear with the lowest number is cut off next. For every other convex corner one point is known that lies in its
 // triangle. The corner is tested again only if this point goes, then from the next point on, or if a neighbour goes. So

@@ -24,6 +24,8 @@ class EditRow {
   EditRow(const Edit& edit, double y, double margin_m = 0);
   EditPlace At(double x) const;
   double y() const { return y_; }
+  // The height that the edit aims at, at a point of the row and its At. Precondition: flatten, slope, carve or raise.
+  double TargetAt(double x, const EditPlace& place) const;
   // Where the row enters and leaves polygons, in turns, ascending.
   const std::vector<double>& crossings() const { return crossings_; }
 
@@ -36,10 +38,11 @@ class EditRow {
   const Edit& edit_;
   double y_, margin_m_, reach_m_;
   std::vector<double> crossings_;
-  std::vector<Edge> edges_;  // within reach of the row
+  std::vector<Edge> edges_;               // within reach of the row
+  std::vector<std::uint32_t> triangles_;  // of a slope, that the row meets
 };
 
-// The height that the edit aims at. Precondition: flatten, slope, carve or raise.
+// EditRow::TargetAt of any point.
 double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place);
 
 // Divides a simple polygon into triangles by cutting off ears. Empty if it is not simple.

@@ -1,17 +1,19 @@
 #include "engine/edits/parse_edit.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <span>
 #include <string_view>
 #include <utility>
 
-#include "engine/core/nearest_name.h"
 #include "engine/edits/edit_polygon.h"
+#include "engine/edits/edit_properties.h"
 #include "engine/edits/edit_shape.h"
 #include "engine/geo/ellipsoid.h"
 
@@ -42,23 +44,11 @@ std::optional<GeoPosition> FirstPosition(const json& feature) {
   return GeoPosition{(*at)[0], (*at)[1]};
 }
 
-// Of `terrain`.
-constexpr std::array<std::string_view, 11> kKeys = {"op",      "blend_m", "height", "heights",   "metres",  "source",
-                                                    "width_m", "error_m", "factor", "min_level", "vertical"};
-
 // Whether these properties of a feature without `terrain` are its members. Other files have an "op" of their own.
 bool LooksLikeEdit(const json& properties) {
   const auto op = properties.find("op");
   if (op == properties.end() || std::ranges::find(kEditOpNames, *op) == kEditOpNames.end()) return false;
-  return std::ranges::any_of(kKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
-}
-
-// `; did you mean "..."?` with the names that may be meant; empty if there are none.
-template <typename Names>
-std::string NearestOf(std::string_view word, const Names& names) {
-  std::vector<KnownName> known;
-  for (const std::string_view name : names) known.push_back({name});
-  return DidYouMean(Quoted(NearestNames(word, known)));
+  return std::ranges::any_of(kEditKeys, [&](std::string_view key) { return key != "op" && properties.contains(key); });
 }
 
 class Parser {
@@ -73,7 +63,7 @@ class Parser {
   void Fail(std::string message, std::optional<GeoPosition> place = {}) {
     faults_.push_back({file_, feature_, place ? place : first_, std::move(message)});
   }
-  void CheckKeys(const json& terrain);
+  void CheckEditKeys(const json& terrain);
   std::optional<double> Number(const json& terrain, const char* key, double low, double high);
   void ReadGeometry(const json& geometry);
   void AddRing(const json& points);
@@ -123,7 +113,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   edit_.op = static_cast<EditOp>(known - kEditOpNames.begin());
   if (feature.contains("geometry")) ReadGeometry(feature["geometry"]);
   if (!has_failed() && rings_.empty()) Fail("has no geometry");
-  CheckKeys(*terrain);
+  CheckEditKeys(*terrain);
   if (has_failed()) return std::nullopt;
   ReadOptions(*terrain);
   ReadDatum(*terrain);
@@ -138,10 +128,15 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   return std::move(edit_);
 }
 
-void Parser::CheckKeys(const json& terrain) {
+void Parser::CheckEditKeys(const json& terrain) {
   for (const auto& [key, value] : terrain.items()) {
-    if (std::ranges::find(kKeys, key) == kKeys.end()) {
-      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kKeys)));
+    if (std::ranges::find(kEditKeys, key) == kEditKeys.end()) {
+      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kEditKeys)));
+    } else if (key != "vertical" && !HasProperty(edit_.op, key)) {
+      std::vector<std::string_view> taken;
+      std::ranges::copy_if(kEditKeys, std::back_inserter(taken),
+                           [&](std::string_view own) { return HasProperty(edit_.op, own); });
+      Fail(fmt::format("{} has no \"{}\"; it has {}", NameOf(edit_.op), key, fmt::join(taken, ", ")));
     }
   }
 }
@@ -271,7 +266,6 @@ void Parser::ReadOptions(const json& terrain) {
   } else if (!edit_.is_area && edit_.op != EditOp::kBreakline && !has_failed()) {
     Fail(fmt::format("{} along a line needs its \"width_m\"", NameOf(edit_.op)));
   }
-  if (edit_.op == EditOp::kBreakline || edit_.op == EditOp::kHole) edit_.blend_m = 0;
   if (edit_.op == EditOp::kOffset) {
     const auto metres = Number(terrain, "metres", -kMaxHeight_m, kMaxHeight_m);
     if (!metres && !has_failed()) Fail("offset needs \"metres\"");
@@ -297,6 +291,12 @@ void Parser::ReadOptions(const json& terrain) {
 void Parser::ReadDatum(const json& terrain) {
   const auto found = terrain.find("vertical");
   if (found == terrain.end()) return;
+  if (edit_.op == EditOp::kReplace) {
+    auto vertical = ParseSourceVertical(*found);
+    if (!vertical) return Fail(vertical.error());
+    edit_.source_vertical = *std::move(vertical);
+    return;
+  }
   const auto datum = ParseDatum(*found);
   if (!datum) return Fail(datum.error());
   if (!edit_.has_heights()) return Fail(fmt::format("vertical is of heights, and {} has none", NameOf(edit_.op)));
@@ -363,6 +363,11 @@ std::vector<std::optional<double>> Parser::HeightsOf(const json& terrain, const 
     }
   } else {
     Fail(fmt::format("{} must be {} heights, one for each position", key, ring.size()));
+  }
+  if (given != terrain.end() && given->is_array() && given->size() == ring.size() + 1 &&
+      given->back() != given->front()) {
+    Fail(fmt::format("{} begins with {} and ends with {}, which are of one position", key, given->front().dump(),
+                     given->back().dump()));
   }
   for (const auto& height : heights) {
     if (height && !(std::abs(*height) <= kMaxHeight_m)) {
@@ -474,17 +479,6 @@ void Parser::FitSlope(std::vector<std::optional<double>> heights) {
 }
 
 }  // namespace
-
-tl::expected<EditDatum, std::string> ParseDatum(const json& value) {
-  constexpr std::array<const char*, 2> kNames = {"ellipsoid", "orthometric"};
-  if (value == kNames[0]) return EditDatum::kEllipsoid;
-  if (value == kNames[1]) return EditDatum::kOrthometric;
-  const std::string hint = value.is_string() ? NearestOf(value.get<std::string>(), kNames) : "";
-  return tl::unexpected(
-      fmt::format("vertical is {}; it must be \"ellipsoid\", or \"orthometric\" for heights above the geoid of the "
-                  "sources{}",
-                  value.dump(), hint));
-}
 
 std::optional<Edit> ParseEdit(const json& feature, const std::string& file, std::size_t index,
                               std::vector<EditFault>& faults) {

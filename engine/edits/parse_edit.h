@@ -17,7 +17,4 @@ namespace terrace::dem {
 std::optional<Edit> ParseEdit(const nlohmann::json& json, const std::string& file, std::size_t feature,
                               std::vector<EditFault>& faults);
 
-// The value of a member "vertical"; or what is wrong with it.
-tl::expected<EditDatum, std::string> ParseDatum(const nlohmann::json& value);
-
 }  // namespace terrace::dem

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "engine/edits/edit_properties.h"
 #include "engine/edits/parse_edit.h"
 
 namespace terrace::dem {

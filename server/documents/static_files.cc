@@ -1,10 +1,14 @@
 #include "server/documents/static_files.h"
 
+#include <spdlog/spdlog.h>
+
 #include <fstream>
 #include <iterator>
 #include <optional>
 #include <system_error>
 #include <utility>
+
+#include "proto/compress.h"
 
 namespace terrace::server {
 namespace {
@@ -26,7 +30,12 @@ Result<Document> LoadDocument(const fs::path& path) {
   if (const fs::path sibling = path.string() + ".gz"; fs::is_regular_file(sibling, ignored)) {
     Result<std::string> compressed = ReadFile(sibling);
     if (!compressed) return tl::unexpected(compressed.error());
-    gzipped = std::move(*compressed);
+    if (proto::Gunzip(*compressed, bytes->size()) == *bytes) {
+      gzipped = std::move(*compressed);
+    } else {
+      spdlog::warn("{} is not the compressed form of {}, and is not used; make it anew with `gzip -kf {}`",
+                   sibling.string(), path.string(), path.string());
+    }
   }
   return Document::Make(std::move(*bytes), MediaTypeOf(path.string()), std::move(gzipped));
 }

@@ -112,8 +112,7 @@ void DatasetSlot::Want(config::DatasetConfig wanted) {
 
 std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
   if (!serving_ || stale_since_) return 0;
-  if (HasToRecoverCache()) {
-    spdlog::info("dataset {}: its statistics in cache_dir are missing; reopening the dataset", wanted_.name);
+  if (HasToRecover()) {
     MarkStale();
     return 0;
   }
@@ -130,8 +129,13 @@ std::size_t DatasetSlot::CheckFiles(std::size_t max_files) {
   return count;
 }
 
-bool DatasetSlot::HasToRecoverCache() {
-  if (Clock::now() < recover_at_ || !serving_->model || !serving_->model->has_lost_cache()) return false;
+bool DatasetSlot::HasToRecover() {
+  if (Clock::now() < recover_at_) return false;
+  const bool has_lost_cache = serving_->model && serving_->model->has_lost_cache();
+  if (!has_lost_cache && !(serving_->baked && serving_->baked->is_outdated())) return false;
+  spdlog::info("dataset {}: {}; reopening the dataset", wanted_.name,
+               has_lost_cache ? "its statistics in cache_dir are missing"
+                              : "its archive is no longer the one that was opened, or cannot be read");
   recover_delay_ = std::clamp<Clock::duration>(2 * recover_delay_, kFirstRecovery, kLastRecovery);
   recover_at_ = Clock::now() + recover_delay_;
   return true;

@@ -66,7 +66,7 @@ class DatasetSlot {
   bool IsSettled();
   void Fail(const Error& error);
   void MarkStale();
-  bool HasToRecoverCache();
+  bool HasToRecover();
 
   config::DatasetConfig wanted_;
   std::optional<tiler::Dataset> serving_;
@@ -79,7 +79,8 @@ class DatasetSlot {
   bool reopen_ = false;                               // the dataset being opened is no longer the wanted one
   std::string problem_;                               // of the last attempt
   std::vector<std::optional<dem::FileStamp>> tried_;  // the named files at the last attempt that failed
-  Clock::time_point recover_at_;                      // when to reopen it next, after data in the cache folder was lost
+  // When to reopen it next, after data in the cache folder was lost, or an archive was replaced.
+  Clock::time_point recover_at_;
   Clock::duration recover_delay_{0};
   Clock::time_point retry_at_;
   Clock::duration retry_delay_{0};

@@ -55,17 +55,11 @@ class SharedCache final : public tiler::TileStore {
 
   Result<std::size_t> Erase(const tiler::TileSelection& selection, const std::stop_token& stop) override {
     const std::string program = Prefix();
-    std::size_t erased = 0;
-    for (int level = selection.min_level; level <= selection.max_level; ++level) {
-      const auto is_chosen = [&](std::string_view key) {
-        return tiler::IsSelected(selection, key.substr(program.size()));
-      };
-      const Result<std::size_t> of_level =
-          tier_.Erase(program + tiler::RecordPrefix(selection.generation, level), is_chosen, stop);
-      if (!of_level) return of_level;
-      erased += *of_level;
-    }
-    return erased;
+    const auto is_chosen = [&](std::string_view key) {
+      return tiler::IsSelected(selection, key.substr(program.size()));
+    };
+    // One prefix for all levels: Redis examines all of its keys for each.
+    return tier_.Erase(program + tiler::RecordPrefix(selection.generation), is_chosen, stop);
   }
 
   std::optional<tiler::EncodedTile> Find(const tiler::CacheKey& key) override {

@@ -94,10 +94,13 @@ TEST_F(ArchiveTest, UnitOfAnotherBakeIsNotUsed) {
   Bake();
   // The same tiles and sizes, another key.
   ASSERT_EQ(WriteUnits(Place(), InventedKeys(), 8).units.front().bytes, manifest_.units.front().bytes);
-  const auto found = OpenBaked()->Find({0, 0, 0});
+  const auto archive = OpenBaked();
+  EXPECT_FALSE(archive->is_outdated());
+  const auto found = archive->Find({0, 0, 0});
   ASSERT_FALSE(found);
   EXPECT_EQ(found.error().code, ErrorCode::kUnavailable);
   EXPECT_NE(found.error().message.find("another bake"), std::string::npos);
+  EXPECT_TRUE(archive->is_outdated());
 }
 
 TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {

@@ -3,6 +3,7 @@ import contextlib
 import http.client
 import json
 import math
+import pathlib
 import random
 import re
 import resource
@@ -294,8 +295,11 @@ class Bake(BakeCase):
         part = self.run_bake("--out", place, "--shard", "0/2")
         self.assertEqual((part.returncode, f"process {first.pid}" in part.stderr), (1, True), part.stderr)
         first.kill()
-        first.communicate()
+        state = pathlib.Path(f"/proc/{first.pid}/stat")
+        while state.read_text().rpartition(")")[2].split()[0] != "Z":  # ended, but nobody has waited for it
+            time.sleep(0.01)
         self.assertEqual(self.run_bake("--out", place).returncode, 0)
+        first.communicate()
         self.expect_equal(place)
 
     def test_shards_that_start_together_and_other_divisions(self):
@@ -347,6 +351,9 @@ class Bake(BakeCase):
         (other / "photo.jpg").write_text("x")
         file = self.scratch / "a-file"
         file.write_text("x")
+        empty, link = self.place("empty.pmtiles"), self.place("link")
+        empty.mkdir()
+        link.symlink_to(empty)
         loop = self.scratch / "loop"
         loop.symlink_to(loop)
         done = self.run_bake("--out", loop)
@@ -375,6 +382,9 @@ class Bake(BakeCase):
                 (("--out", other, "--extensions", "watermask"), "0-9", "no water"),
                 (("--out", other, "--update", other), "0-9", "same place"),
                 (("--out", "/vsis3/bucket/place", "--form", "single"), "0-9", "a folder of this machine"),
+                (("--out", self.place("one.dat"), "--form", "single"), "0-9", "ends with .pmtiles"),
+                (("--out", empty, "--form", "single"), "0-9", "is there already"),
+                (("--out", link, "--form", "folder"), "0-9", "is there already"),
                 ((), "0-9", "--out PLACE"),
         ):
             with self.subTest(arguments=arguments, levels=levels):

@@ -393,6 +393,29 @@ class ArchiveTest(unittest.TestCase):
         self.assertEqual(done.returncode, 1)
         self.assertIn("allowed prefix", done.stderr)
 
+    def test_archive_in_a_bucket_that_is_baked_again_is_opened_again(self):
+        """Nothing watches its files: look-ups find that they are of another bake."""
+        place = self.copy()
+        bucket = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Bucket, directory=place))
+        threading.Thread(target=bucket.serve_forever, daemon=True).start()
+        self.addCleanup(bucket.server_close)
+        self.addCleanup(bucket.shutdown)
+        url = f"/vsicurl/http://127.0.0.1:{bucket.server_address[1]}/"
+        other = self.bake("other-errors", "--error", "5000", levels="0-10")
+        tile = "/cell/9/532/387.terrain"
+        with self.serve_alone(other) as local:
+            wanted = local.get(tile)[2]
+        with Server({"datasets": [{"name": "cell", "baked": url + "terrain"}], "allowed_prefixes": [url]}, self.scratch) as remote:
+            self.assertEqual(remote.get("/cell/0/0/0.terrain")[0], 200)  # of another file
+            (place / "terrain").rename(place / "old")
+            other.rename(place / "terrain")
+            end = time.monotonic() + 60
+            while remote.get(tile)[2] != wanted and time.monotonic() < end:
+                time.sleep(0.2)
+            self.assertEqual(remote.get(tile)[2], wanted, remote.log())
+            self.assertIn("its archive is no longer the one that was opened", remote.log())
+            self.assertNotEqual(json.loads(gzip.decompress(remote.get("/datasets")[2]))["datasets"][0]["version"], remote.version)
+
     def test_a_bucket_that_is_away_is_not_an_empty_one(self):
         class Away(http.server.BaseHTTPRequestHandler):
             status = 500

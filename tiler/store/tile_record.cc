@@ -81,6 +81,12 @@ std::string RecordKey(const RefinedTileKey& key) {
   return writer.Take();
 }
 
+std::string RecordPrefix(std::uint64_t generation) {
+  ByteWriter writer;
+  writer.Put(generation);
+  return writer.Take();
+}
+
 std::string RecordPrefix(std::uint64_t generation, int level) {
   ByteWriter writer;
   writer.Put(generation);

@@ -22,6 +22,8 @@ std::string RecordKey(const RefinedTileKey& key);
 
 // The prefix of the keys of a generation's records of one level. Other keys do not begin with it.
 std::string RecordPrefix(std::uint64_t generation, int level);
+// The same for the records of all levels.
+std::string RecordPrefix(std::uint64_t generation);
 // Whether a record's key belongs to a selected tile or to the refinement of one.
 bool IsSelected(const TileSelection& selection, std::string_view record_key);
 

@@ -165,8 +165,8 @@ std::string EstimateText(const bake::Estimate& estimate) {
   const std::string hours = estimate.core_hours < 0.1 ? fmt::format("{:.1f} core-minutes", estimate.core_hours * 60)
                                                       : fmt::format("{:.1f} core-hours", estimate.core_hours);
   fmt::format_to(std::back_inserter(text), "{} tiles in {} files ({} subtrees), about {} and {}; {}\n",
-                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.subtree_files), Bytes(estimate.bytes),
-                 hours,
+                 Grouped(estimate.tiles), Grouped(estimate.files), Grouped(estimate.subtree_files),
+                 Bytes(estimate.bytes), hours,
                  estimate.sampled > 0 ? fmt::format("from {} tiles that were built", estimate.sampled)
                                       : std::string("from the assumed bytes and milliseconds a tile"));
   return text;

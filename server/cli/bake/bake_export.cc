@@ -17,16 +17,40 @@ namespace terrace::cli {
 
 namespace fs = std::filesystem;
 
-Result<void> CheckExportPlace(const std::string& out) {
+namespace {
+
+bool IsMountPoint(const fs::path& folder) {
+  struct stat here {
+  }, above{};
+  return ::stat(folder.c_str(), &here) == 0 && ::stat((folder / "..").c_str(), &above) == 0 &&
+         (here.st_dev != above.st_dev || here.st_ino == above.st_ino);
+}
+
+}  // namespace
+
+Result<void> CheckExportPlace(const std::string& out, const std::string& form) {
   const fs::path name = fs::path(out).filename();
   if (name == "." || name == "..") {
     return MakeError(
         ErrorCode::kInvalidArgument,
         "--out {}: the tiles replace the folder when all are done, which needs its name; give a new folder", out);
   }
+  if (form == kSingle && name.extension() != ".pmtiles") {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--out {}: a single file needs a name that ends with .pmtiles, by which it is known", out);
+  }
   std::error_code error;
-  const bool is_taken = fs::is_directory(out, error) ? !fs::is_empty(out, error) : fs::exists(out, error);
-  if (!is_taken) return {};
+  const bool is_folder = fs::is_directory(fs::symlink_status(out, error));
+  if (!fs::exists(fs::symlink_status(out, error))) return {};
+  // An empty folder is replaced by that of the export.
+  const bool is_free = form == kFolder && is_folder && fs::is_empty(out, error);
+  if (is_free && !IsMountPoint(out)) return {};
+  if (is_free) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "--out {}: a file system is mounted there, and the folder cannot be replaced when all tiles are "
+                     "done; give a new folder in it",
+                     out);
+  }
   return MakeError(ErrorCode::kInvalidArgument, "{}: is there already; remove it, or give another place with --out",
                    out);
 }
@@ -77,7 +101,7 @@ Result<void> Export(const BakeArguments& arguments, const std::string& baked, co
   if (auto written = write(**archive, made, stop); !written) return written;
   const std::string note = NoteOf(made, arguments.form, identity, generation);
   if (auto noted = archive::WriteUnsynced(folder / kNoteFile, note); !noted) return noted;
-  if (auto free = CheckExportPlace(arguments.out); !free) return free;
+  if (auto free = CheckExportPlace(arguments.out, arguments.form); !free) return free;
   if (auto renamed = archive::Rename(made, arguments.out); !renamed) return renamed;
   RemoveBake(baked);
   return {};

@@ -12,7 +12,7 @@
 namespace terrace::cli {
 
 // kInvalidArgument: something is there, or the last part of the path is "." or "..".
-Result<void> CheckExportPlace(const std::string& out);
+Result<void> CheckExportPlace(const std::string& out, const std::string& form);
 
 // Whether the `out` of the arguments was made from `baked` by a process that ended before it had removed `baked`.
 bool WasExported(const std::string& baked, const BakeArguments& arguments, const bake::BakeIdentity& identity,

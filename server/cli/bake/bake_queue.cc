@@ -72,7 +72,9 @@ Result<std::unique_ptr<bake::RedisQueue>> Join(const QueuedBake& bake) {
   options.identity.emplace_back("place (bake-place.id)", *place_id);
   options.worker = bake.worker;
   for (const bake::UnitPlan::Entry& entry : bake.plan.units) options.units.push_back(NameInQueue(entry, bake.targets));
-  options.find_missing = [&bake, &dataset] { return bake::FindMissing(dataset, bake.targets, bake.plan); };
+  options.find_missing = [&bake, &dataset] {
+    return bake::FindMissing(dataset, bake.targets, bake.plan, bake.options.stop);
+  };
   options.lease = std::chrono::milliseconds(static_cast<std::int64_t>(bake.arguments.lease * 1000));
   options.on_message = PrintMessage;
   return bake::RedisQueue::Join(std::move(options));

@@ -288,7 +288,7 @@ int BakeInto(const BakeArguments& arguments, const tiler::TilePipeline& pipeline
   const std::string place = is_chunked ? arguments.out : arguments.out + ".bake";
   const bake::BakeIdentity identity = IdentityOf(arguments, dataset, targets);
   const auto is_exported = [&] { return WasExported(place, arguments, identity, dataset.generation); };
-  const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out);
+  const auto free = is_chunked ? Result<void>() : CheckExportPlace(arguments.out, arguments.form);
   if (!free && !is_exported()) return Fail(free.error());
   for (bake::Target& target : targets) target.place = bake::ArchivePlace(place, target.manifest, targets.size() == 1);
   const std::string worker = arguments.queue.empty() ? std::string() : WorkerName();

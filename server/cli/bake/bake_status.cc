@@ -79,11 +79,17 @@ int ShowStatus(const BakeArguments& arguments, const StatusView& view) {
   const auto job = JobAddressOf(arguments);
   if (!job) return Fail(job.error());
   std::unique_ptr<redis::Connection> connection;
+  bool was_connected = false;  // then --watch waits for Redis, as workers do
   const bool is_screen = view.watch && !view.json && ::isatty(STDOUT_FILENO) != 0;
   while (true) {
     if (!connection) {
       auto connected = bake::ConnectToJob(*job);
+      if (!connected && was_connected && connected.error().code == ErrorCode::kUnavailable) {
+        std::this_thread::sleep_for(std::chrono::seconds(2));
+        continue;
+      }
       if (!connected) return Fail(connected.error());
+      was_connected = true;
       connection = *std::move(connected);
     }
     if (view.remove) {
@@ -91,6 +97,12 @@ int ShowStatus(const BakeArguments& arguments, const StatusView& view) {
       return removed ? kExitOk : Fail(removed.error());
     }
     const auto status = bake::ReadJobStatus(*connection, *job);
+    if (!status && view.watch && status.error().code == ErrorCode::kUnavailable) {  // as workers wait for Redis
+      std::fprintf(stderr, "terrace: %s; trying again\n", status.error().message.c_str());
+      connection.reset();
+      std::this_thread::sleep_for(std::chrono::seconds(2));
+      continue;
+    }
     if (!status) return Fail(status.error());
     if (is_screen) fmt::print("\033[H\033[2J");
     fmt::print("{}", view.json ? StatusJson(*status, arguments.job) + "\n" : StatusText(*status, arguments.job));

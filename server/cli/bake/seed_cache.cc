@@ -64,6 +64,7 @@ class SeedWriter final : public archive::UnitWriter {
     if (!seed_.Take(tile.bytes.size() + kRecordOverheadBytes)) {
       return MakeError(ErrorCode::kCancelled, "the cache is full");
     }
+    if (!IsWriting()) return NotWritten();  // before more tiles are built in vain
     ++summary_.tiles;
     summary_.bytes += tile.bytes.size();
     seed_.store->Insert(seed_.KeyOf(bake::RequestOf(manifest_, key)), std::make_shared<const tiler::EncodedTile>(tile));
@@ -72,15 +73,20 @@ class SeedWriter final : public archive::UnitWriter {
 
   Result<archive::FileSummary> Finish() override {
     seed_.store->Flush();
-    const tiler::StoreStats stats = seed_.store->stats();
-    if (!stats.on || stats.dropped != dropped_before_) {
-      return MakeError(ErrorCode::kUnavailable,
-                       "the cache cannot be written; look at its disk, and run the same command again");
-    }
+    if (!IsWriting()) return NotWritten();
     return summary_;
   }
 
  private:
+  bool IsWriting() const {
+    const tiler::StoreStats stats = seed_.store->stats();
+    return stats.on && stats.dropped == dropped_before_;
+  }
+  static tl::unexpected<Error> NotWritten() {
+    return MakeError(ErrorCode::kUnavailable,
+                     "the cache cannot be written; look at its disk, and run the same command again");
+  }
+
   Seed& seed_;
   const archive::Manifest manifest_;
   const std::uint64_t dropped_before_;

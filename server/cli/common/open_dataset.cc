@@ -93,6 +93,7 @@ Result<std::unique_ptr<dem::ElevationModel>> OpenModel(const config::DatasetConf
                                                        std::stop_token stop, std::function<void(const Error&)> fault,
                                                        bool only_cached) {
   dem::DemOptions options;
+  options.source = SourceOptionsOf(wanted, {});  // of the rasters of edits
   options.error_fraction = wanted.error_fraction;
   options.finest_error = wanted.finest_error;
   options.floor = wanted.floor;

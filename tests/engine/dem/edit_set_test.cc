@@ -58,6 +58,24 @@ TEST(EditRow, HasThePlacesOfAllEdges) {
   }
 }
 
+TEST(EditRow, HasTheTargetsOfAllTriangles) {
+  Edit edit = Star(300, 0);
+  edit.op = EditOp::kSlope;
+  auto& heights = edit.heights.emplace_back();
+  for (std::size_t i = 0; i < 300; ++i) heights.push_back(static_cast<double>(i * i % 97));
+  edit.triangles = CutEars(edit.rings.front());
+  ASSERT_EQ(edit.triangles.size(), 298u);
+  Complete(edit);
+  for (int j = -60; j <= 60; ++j) {
+    const double y = j % 3 == 0 ? edit.rings[0][static_cast<std::size_t>(j + 60) * 2].y : j * 170.0;
+    const EditRow row(edit, y);
+    for (int i = -60; i <= 60; ++i) {
+      const EditPlace place = row.At(i * 170.0);
+      EXPECT_EQ(row.TargetAt(i * 170.0, place), TargetAt(edit, {i * 170.0, y}, place)) << i << " " << j;
+    }
+  }
+}
+
 TEST(EditSet, StopsBetweenRows) {
   std::vector<Edit> list;
   list.push_back(Star(100, 0));

@@ -96,6 +96,10 @@ TEST_F(TerrainEdits, HolesHaveNoHeight) {
   ASSERT_NE(source, nullptr);
   EXPECT_TRUE(std::isnan(At(*source, 10.2, 50.2)));
   EXPECT_FALSE(std::isnan(At(*source, 10.3, 50.2)));
+  // Tiles have no triangles there, whatever follows.
+  const auto filled = Open(Middle(R"({"op":"hole"})") + "," + Middle(R"({"op":"flatten","height":1500})"));
+  ASSERT_NE(filled, nullptr);
+  EXPECT_TRUE(std::isnan(At(*filled, 10.2, 50.2)));
 }
 
 TEST_F(TerrainEdits, AreNeverLeftOutOfALineOfSight) {
@@ -119,6 +123,26 @@ TEST_F(TerrainEdits, ReplaceTakesTheHeightsOfAnotherFile) {
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(At(*source, 10.2, 50.2), 42);
   EXPECT_NEAR(At(*source, 10.3, 50.2), 399.5, 0.01);
+}
+
+// A raster that is replaced by itself stays as it is.
+TEST_F(TerrainEdits, ReplaceHasTheDatumOfTheDatasetOrItsOwn) {
+  DemOptions options;
+  options.source.vertical = "egm96";
+  const auto height = [&](const std::string& terrain) {
+    options.edits = terrain.empty() ? std::vector<std::string>() : std::vector{WriteEdits(dir_, Middle(terrain))};
+    const auto model = OpenOrFail(slope_, options);
+    return model == nullptr ? 0 : At(*model, 10.2, 50.2);
+  };
+  const double unedited = height("");
+  EXPECT_GT(unedited, 340) << "299.5 m above a geoid of more than 40 m";
+  EXPECT_EQ(height(R"({"op":"replace","source":"dem.tif"})"), unedited);
+  EXPECT_NEAR(height(R"({"op":"replace","source":"dem.tif","vertical":"ellipsoid"})"), 299.5, 0.01);
+  options.source.vertical = "unknown";
+  EXPECT_EQ(height(R"({"op":"replace","source":"dem.tif","vertical":"egm96"})"), unedited);
+  EXPECT_NE(MessageOf(Middle(R"({"op":"replace","source":"dem.tif","vertical":"orthometric"})"))
+                .find("vertical is \"orthometric\"; of a source it is"),
+            std::string::npos);
 }
 
 // Points, nodes and pixels of height images have the same edit.
@@ -229,6 +253,14 @@ TEST_F(TerrainEdits, RefuseWhatWouldBeIgnored) {
         "heights has \"100\"; heights are numbers", "feature 2: is no object of the type", "feature 3 at",
         "min_level is 3.5; it must be a whole number", "feature 4: \"op\" belongs into \"terrain\""}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
+  }
+  const std::string of_others = MessageOf(
+      Middle(R"({"op":"flatten","height":1,"error_m":0.1})") + "," + Middle(R"({"op":"slope","height":900})") + "," +
+      Middle(R"({"op":"hole","blend_m":5})") + "," + Middle(R"({"op":"slope","heights":[1,2,3,4,9999]})"));
+  for (const char* part :
+       {"flatten has no \"error_m\"; it has op, blend_m, height, vertical", "slope has no \"height\"",
+        "hole has no \"blend_m\"", "heights begins with 1 and ends with 9999"}) {
+    EXPECT_NE(of_others.find(part), std::string::npos) << part << " in:\n" << of_others;
   }
   // Properties of somebody else.
   EXPECT_NE(Open(Middle(R"({"op":"hole"})") + R"(,{"type":"Feature","properties":{"op":"replace","asset":7},)"

@@ -5,6 +5,8 @@
 
 #include <fstream>
 
+#include "proto/compress.h"
+
 namespace terrace::server {
 namespace {
 
@@ -35,7 +37,10 @@ TEST_F(StaticFilesTest, LoadsTheTreeWithItsTypes) {
 
 TEST_F(StaticFilesTest, ServesTheCompressedSiblingToThoseWhoTakeIt) {
   Write("a.js", std::string(100, 'a'));
-  Write("a.js.gz", "compressed");
+  const std::string compressed = proto::Gzip(std::string(100, 'a'));
+  Write("a.js.gz", compressed);
+  Write("b.js", "new");
+  Write("b.js.gz", proto::Gzip("old"));
   Write("alone.gz", "an archive");
   const Result<StaticFiles> files = StaticFiles::Load(folder_);
   ASSERT_TRUE(files);
@@ -43,10 +48,12 @@ TEST_F(StaticFilesTest, ServesTheCompressedSiblingToThoseWhoTakeIt) {
   EXPECT_EQ(Serve(*files->Find("a.js"), request, "").body->size(), 100u);
   request.fields.Set(&RequestFields::accept_encoding, "gzip");
   const Response gzip = Serve(*files->Find("a.js"), request, "");
-  EXPECT_EQ(*gzip.body, "compressed");
+  EXPECT_EQ(*gzip.body, compressed);
   EXPECT_EQ(gzip.content_encoding, "gzip");
   EXPECT_EQ(files->Find("a.js.gz"), nullptr);
   EXPECT_NE(files->Find("alone.gz"), nullptr);
+  const Response changed = Serve(*files->Find("b.js"), request, "");
+  EXPECT_EQ(changed.content_encoding == "gzip" ? proto::Gunzip(*changed.body, 100) : *changed.body, "new");
 }
 
 TEST_F(StaticFilesTest, IsEmptyWithoutAFolder) {
