@@ -103,6 +103,8 @@ void DatasetSlot::MarkStale() {
 
 void DatasetSlot::Want(config::DatasetConfig wanted) {
   wanted_ = std::move(wanted);
+  files_.clear();  // perhaps not those of the wanted dataset
+  next_file_ = 0;
   MarkStale();
   reopen_ = is_opening();
   if (reopen_) stop_opening_.request_stop();
@@ -141,9 +143,18 @@ bool DatasetSlot::HasToRecover() {
   return true;
 }
 
+// The named files, and the others of the dataset that is served, such as the rasters of edits.
+std::vector<std::string> DatasetSlot::KnownFiles() const {
+  std::vector<std::string> files = NamedFiles(wanted_);
+  for (const tiler::WatchedFile& file : files_) files.push_back(file.path);
+  std::ranges::sort(files);
+  files.erase(std::unique(files.begin(), files.end()), files.end());
+  return files;
+}
+
 // Also true for times in the future, which say nothing.
 bool DatasetSlot::IsSettled() {
-  for (const std::string& file : NamedFiles(wanted_)) {
+  for (const std::string& file : KnownFiles()) {
     const auto stamp = dem::StampOf(file);
     if (!stamp) continue;
     // Read after the stamp: otherwise a file written to in between would have a time in the future.
@@ -161,10 +172,10 @@ bool DatasetSlot::IsSettled() {
 
 void DatasetSlot::OpenIfDue(const DatasetOpener& open) {
   if (is_opening() || (serving_ && !stale_since_)) return;
-  if (Clock::now() < retry_at_ && StampsOf(NamedFiles(wanted_)) == tried_) return;
+  if (Clock::now() < retry_at_ && StampsOf(KnownFiles()) == tried_) return;
   if (!IsSettled()) return;
   spdlog::info("dataset {}: opening {}", wanted_.name, PlaceOf(wanted_));
-  tried_ = StampsOf(NamedFiles(wanted_));
+  tried_ = StampsOf(KnownFiles());
   stop_opening_ = std::stop_source();
   try {
     opening_ = std::async(std::launch::async, OpenQuietly, open, wanted_, stop_opening_.get_token());

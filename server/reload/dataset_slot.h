@@ -64,6 +64,7 @@ class DatasetSlot {
 
  private:
   bool IsSettled();
+  std::vector<std::string> KnownFiles() const;
   void Fail(const Error& error);
   void MarkStale();
   bool HasToRecover();

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <future>
 #include <stdexcept>
@@ -207,6 +208,29 @@ TEST_F(ReloaderTest, AnArchiveThatStaysAbsentIsNoChange) {
   DatasetSlot slot(config_.datasets[0], dataset);
   slot.CheckFiles(10);
   EXPECT_TRUE(slot.is_current());
+}
+
+// Of an edit, say, whose raster no option names.
+TEST_F(ReloaderTest, WaitsUntilTheOtherFilesOfADatasetAreComplete) {
+  tiler::Dataset dataset = *Open(config_.datasets[0], {});
+  const fs::path file = folder_ / "raster_of_an_edit.tif";
+  std::ofstream(file) << "1";
+  dataset.baked_files = {{file.string(), dem::StampOf(file.string())}};
+  DatasetSlot slot(config_.datasets[0], dataset);
+  const auto open = [this](const config::DatasetConfig& wanted, const std::stop_token& stop) {
+    return Open(wanted, stop);
+  };
+  std::ofstream(file) << "two";
+  EXPECT_EQ(slot.CheckFiles(10), 1u);
+  const auto begun = std::chrono::steady_clock::now();
+  std::ofstream(file, std::ios::app) << "3";  // it is being written to
+  slot.OpenIfDue(open);
+  if (std::chrono::steady_clock::now() - begun < 900ms) {
+    EXPECT_FALSE(slot.is_opening());
+  }
+  fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(1));
+  slot.OpenIfDue(open);
+  EXPECT_TRUE(slot.is_opening());
 }
 
 TEST_F(ReloaderTest, KeepsUnchangedDatasetsWhateverTheirPlace) {
