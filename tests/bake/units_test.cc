@@ -118,7 +118,8 @@ TEST(Shards, HaveEachUnitOnceAndSimilarNumbers) {
 }
 
 TEST(Catalogue, RefusesWhatIsNoCell) {
-  for (const char* text : {"", "\n\n", "N46E008\nN46", "X46E008", "N90E000", "S91E000", "N46E180", "N46E008x", "N 6E008", "N-6E008", "N46E+08"}) {
+  for (const char* text : {"", "\n\n", "N46E008\nN46", "X46E008", "N90E000", "S91E000", "N46E180", "N46E008x",
+                           "N 6E008", "N-6E008", "N46E+08"}) {
     EXPECT_FALSE(PlanCells(text, 1, 0.5)) << text;
   }
   EXPECT_TRUE(PlanCells("N46E008\r\nS90W180\n", 1, 0.5));
