@@ -40,12 +40,11 @@ Result<void> CheckExportPlace(const std::string& out, const std::string& form) {
                      "--out {}: a single file needs a name that ends with .pmtiles, by which it is known", out);
   }
   std::error_code error;
-  const bool is_folder = fs::is_directory(fs::symlink_status(out, error));
-  if (!fs::exists(fs::symlink_status(out, error))) return {};
+  const fs::file_status there = fs::symlink_status(out, error);
+  if (!fs::exists(there)) return {};
   // An empty folder is replaced by that of the export.
-  const bool is_free = form == kFolder && is_folder && fs::is_empty(out, error);
-  if (is_free && !IsMountPoint(out)) return {};
-  if (is_free) {
+  if (form == kFolder && fs::is_directory(there) && fs::is_empty(out, error)) {
+    if (!IsMountPoint(out)) return {};
     return MakeError(ErrorCode::kInvalidArgument,
                      "--out {}: a file system is mounted there, and the folder cannot be replaced when all tiles are "
                      "done; give a new folder in it",
