@@ -166,7 +166,7 @@ struct Config {
   DiskCacheConfig disk_cache;
   SharedCacheConfig shared_cache;
   std::string cache_dir = std::string(kDefaultCacheDir);  // folder of the statistics cache; empty: none
-  std::size_t cache_dir_bytes = std::size_t{2} << 30;     // limit of its files; 0: no cache
+  std::size_t cache_dir_bytes = std::size_t{8} << 30;     // limit of its files; 0: no cache
   std::size_t gdal_cache_bytes = std::size_t{256} << 20;  // blocks of sources
   std::size_t max_open_sources = 256;                     // files of all datasets kept open between reads
   std::size_t max_connections = 1024;

@@ -1,6 +1,7 @@
 #include "engine/statistics/kept_factors.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace terrace::dem {
 namespace {
@@ -10,14 +11,10 @@ bool IsFarFromItsStart(const RasterLayout& layout, int factor) {
   constexpr std::int64_t kMaxReadWhole = std::int64_t{512} * 512;
   const int start = StartingFactor(layout, factor);
   const std::int64_t samples = std::int64_t{DivideUp(layout.width, start)} * DivideUp(layout.height, start);
-  return samples > kMaxReadWhole && factor / start > (IsLargeWithoutOverviews(layout) ? 1 : 2);
+  return start < factor && samples > kMaxReadWhole;
 }
 
 }  // namespace
-
-bool IsLargeWithoutOverviews(const RasterLayout& layout) {
-  return layout.overview_factors.empty() && std::int64_t{layout.width} * layout.height > kMaxSamplesWithoutAverages;
-}
 
 unsigned KeptFactors(const RasterLayout& layout) {
   unsigned factors = 0;
