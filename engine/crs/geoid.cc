@@ -236,7 +236,10 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
     return checked;
   }
   return MakeError(ErrorCode::kInvalidArgument, "{} cannot be converted to ellipsoidal heights: {}", geoid->name_,
-                   missing.empty() ? "PROJ knows no way from there to WGS 84 at the centre of the source" : missing);
+                   missing.empty()
+                       ? "PROJ knows no way from there to WGS 84 at the centre of the source; if the source names a "
+                         "geoid grid, give that grid's file as `vertical`"
+                       : missing);
 }
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfGrid(const std::string& path, Position centre) {

@@ -51,13 +51,23 @@ class MemoryFile {
   std::string path_;
 };
 
+// Without the code of a deprecated system, for which GDAL reads that of its successor, which may lie elsewhere.
+std::string WktOf(const OutputGrid& grid) {
+  const CPLConfigOptionSetter as_readers("OSR_USE_NON_DEPRECATED", "YES", /*bSetOnlyIfUndefined=*/false);
+  OGRSpatialReference read;
+  const std::string code = std::to_string(grid.epsg), id = fmt::format(",ID[\"EPSG\",{}]]", code);
+  const bool is_read = read.importFromEPSG(grid.epsg) == OGRERR_NONE && read.GetAuthorityCode(nullptr) != nullptr;
+  if (!is_read || read.GetAuthorityCode(nullptr) == code || !grid.wkt.ends_with(id)) return grid.wkt;
+  return grid.wkt.substr(0, grid.wkt.size() - id.size()) + "]";
+}
+
 // Pixels are centred on the nodes.
 void Place(const OutputGrid& grid, GDALDataset& dataset) {
   const double x = grid.step_x(), y = grid.step_y();
   double transform[6] = {grid.west - x / 2, x, 0, grid.north + y / 2, 0, -y};
   dataset.SetGeoTransform(transform);
   OGRSpatialReference srs;
-  srs.importFromWkt(grid.wkt.c_str());
+  srs.importFromWkt(WktOf(grid).c_str());
   srs.SetAxisMappingStrategy(OAMS_TRADITIONAL_GIS_ORDER);
   dataset.SetSpatialRef(&srs);
 }

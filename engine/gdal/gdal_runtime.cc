@@ -81,6 +81,8 @@ void InitOnce() {
   CPLSetConfigOption("GDAL_DRIVER_PATH", "disable");
   // Without this setting, GDAL ignores the vertical datum of GeoTIFFs before version 1.1.
   CPLSetConfigOption("GTIFF_REPORT_COMPD_CS", "YES");
+  // Without this one, GDAL reads the code of a deprecated system as that of its successor, up to 199 km elsewhere.
+  CPLSetConfigOption("OSR_USE_NON_DEPRECATED", "NO");
   OSRSetPROJEnableNetwork(0);
   proj_log_level(nullptr, PJ_LOG_NONE);  // of the default context, which proj_grid_info uses
   GDALSetCacheMax64(kBlockCacheBytes);

@@ -248,6 +248,13 @@ Error CannotOpen(const std::string& path, const std::string& problem) {
                         path, *format, *format)};
   }
   const std::string ending = CPLGetExtension(path.c_str());
+  if (EQUAL(ending.c_str(), "hgt")) {
+    return {
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: cannot be opened as a raster ({}); name it by the corner of its cell, such as N46E008.hgt, "
+                    "and check its size: 1201 x 1201 or 3601 x 3601 samples of two bytes",
+                    path, problem)};
+  }
   const bool is_packed = EQUAL(ending.c_str(), "zip") || EQUAL(ending.c_str(), "gz") || EQUAL(ending.c_str(), "tar");
   return {ErrorCode::kInvalidArgument,
           fmt::format("{}: cannot be opened as a raster ({}); {}", path, problem,

@@ -49,9 +49,13 @@ bool IsSignedByte(GDALRasterBand& band) {
 
 }  // namespace
 
-bool StatesDepths(GDALRasterBand& band) {
-  const char* const direction = band.GetMetadataItem("positive");
-  return direction != nullptr && EQUAL(direction, "down");
+std::string AttributeOfDepths(GDALRasterBand& band) {
+  if (const char* const direction = band.GetMetadataItem("positive")) {
+    return EQUAL(direction, "down") ? "positive: down" : "";
+  }
+  const char* const quantity = band.GetMetadataItem("standard_name");
+  const std::string name = quantity == nullptr ? "" : quantity;
+  return name == "depth" || name.find("_depth_below_") != std::string::npos ? "standard_name: " + name : "";
 }
 
 std::optional<double> DeclaredNodata(GDALRasterBand& band) {

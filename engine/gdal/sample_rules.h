@@ -62,8 +62,9 @@ struct SampleRules {
 // The nodata value that a band states; nothing if it states none.
 std::optional<double> DeclaredNodata(GDALRasterBand& band);
 
-// Whether the samples of a band count downwards, as the attribute `positive` of a netCDF variable may state.
-bool StatesDepths(GDALRasterBand& band);
+// The attribute of a netCDF variable that states that its samples count downwards, such as `positive: down` or
+// `standard_name: sea_floor_depth_below_geoid` (CF conventions 1.11, section 3.3); empty: none does.
+std::string AttributeOfDepths(GDALRasterBand& band);
 
 // Why the overviews of a band with a mask, or with an alpha band, show samples that it hides, and the remedy; empty:
 // they hide them too, or there is nothing that hides samples.

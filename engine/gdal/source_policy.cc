@@ -204,7 +204,10 @@ Result<void> CheckLinks(GDALDataset& dataset, const std::string& path) {
 }
 
 std::vector<std::string> ClearGdalEnvironment() {
-  constexpr std::array<std::string_view, 6> kPrefixes = {"GDAL_", "CPL_", "OGR_", "PROJ_", "VSI_", "VRT_"};
+  // The last ones are of drivers.
+  constexpr std::array<std::string_view, 16> kPrefixes = {"GDAL_", "CPL_",   "OGR_",     "OSR_",     "PROJ_", "VSI_",
+                                                          "VRT_",  "GTIFF_", "TIFF_",    "AAIGRID_", "DTED_", "HFA_",
+                                                          "NITF_", "GRIB_",  "USGSDEM_", "ISIS3_"};
   constexpr std::array<std::string_view, 3> kKept = {"GDAL_DATA", "PROJ_DATA", "PROJ_LIB"};
   std::vector<std::string> names;
   for (char** entry = environ; *entry != nullptr; ++entry) {

@@ -153,7 +153,14 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
     georeference_.ToPixels(batch);
     const std::vector<std::uint8_t> inside = cover_.Inside(batch);
     for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (inside[i] == 0 || !std::isnan(heights[done + i])) continue;
+      if (!std::isnan(heights[done + i])) continue;
+      // A pole has one height at all longitudes, as in tiles.
+      const double latitude = points[done + i].latitude;
+      if (const auto& pole = pole_heights_[latitude < 0 ? 0 : 1]; pole && std::abs(latitude) == 90) {
+        heights[done + i] = RoundHeight(converted->Of(*pole, {0, latitude}));
+        continue;
+      }
+      if (inside[i] == 0) continue;
       found.push_back({done + i, axes.CellAt(batch[i])});
     }
   }

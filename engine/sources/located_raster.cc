@@ -49,11 +49,10 @@ Result<LocatedRaster> OpenLocatedRaster(const std::string& path) {
   TakeGdalWarnings();  // earlier ones
   auto dataset = OpenRaster(path);
   if (!dataset) return tl::unexpected(dataset.error());
-  std::vector<std::string> warnings = WarningsOfGdal(path);
   auto located = LocateRaster(**dataset, path, before);
   if (!located) return located;
   located->dataset = *std::move(dataset);
-  located->warnings = std::move(warnings);
+  located->warnings = WarningsOfGdal(path);  // some formats read the reference system only when it is asked for
   return located;
 }
 

@@ -38,6 +38,12 @@ void WarnOfPosition(const Georeference& georeference, double spacing_m, const Ra
                     "correct it with `gdal_translate -a_ullr west north east south in out`",
                     PlainNumber(latitude)));
   }
+  if (georeference.transform().find("Ballpark") != std::string::npos) {
+    warnings.push_back(
+        fmt::format("PROJ knows no exact way from {} to WGS 84 here ({}): positions may be off by up to some hundred "
+                    "metres; warp the raster to a system that PROJ can convert",
+                    georeference.crs(), georeference.transform()));
+  }
   constexpr double kSmallestPixel = 0.005;  // metres; of degrees, 500 m
   if (!georeference.is_geographic() && georeference.MayBeInDegrees() && spacing_m < kSmallestPixel) {
     warnings.push_back(
@@ -67,11 +73,12 @@ void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const V
                       *depths));
     }
   }
-  if (wanted_vertical != "crs" && StatesDepths(*dataset.GetRasterBand(1))) {
-    warnings.push_back(
-        "its band states \"positive: down\", but `vertical` takes its samples for heights; if they are not negated "
-        "yet, "
-        "negate them with `gdal_calc.py -A in --outfile=out --calc=-A`");
+  if (const std::string depths = AttributeOfDepths(*dataset.GetRasterBand(1));
+      wanted_vertical != "crs" && !depths.empty()) {
+    warnings.push_back(fmt::format(
+        "its band states \"{}\", but `vertical` takes its samples for heights; if they are not negated yet, "
+        "negate them with `gdal_calc.py -A in --outfile=out --calc=-A`",
+        depths));
   }
   if (!vertical.geoid) return;
   // Some programs write feet in places that GDAL does not read.

@@ -245,5 +245,16 @@ TEST(ElevationModel, OpensFromKeptStatisticsAloneAndChecksAllFiles) {
   EXPECT_FALSE(ElevationModel::OpenFromCache({{path}}, options)) << "without a cache nothing is kept";
 }
 
+// By default, GDAL takes such a code for that of a successor; that of EPSG:5577 lies 2.8 degrees further east.
+TEST(ElevationModel, ADeprecatedSystemIsNotReplaced) {
+  const TempDir dir;
+  const auto model = OpenOrFail(WriteRaster(
+      dir, {.width = 32, .height = 26, .geo_transform = {500'000, 150, 0, 5'600'000, 0, -150}, .crs = "EPSG:5577"}));
+  ASSERT_NE(model, nullptr);
+  const RasterInfo& raster = model->info().sources.front();
+  EXPECT_NE(raster.crs.find("EPSG:5577"), std::string::npos) << raster.crs;
+  EXPECT_NEAR(raster.bounds.west, 20.998, 0.01);
+}
+
 }  // namespace
 }  // namespace terrace::dem

@@ -1,6 +1,9 @@
+#include <cpl_conv.h>
 #include <cpl_string.h>
 #include <cpl_vsi.h>
+#include <gdal_priv.h>
 #include <gtest/gtest.h>
+#include <ogr_spatialref.h>
 
 #include <set>
 #include <string>
@@ -35,6 +38,22 @@ TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
   EXPECT_EQ(checked.error().message, file.error().message);
   EXPECT_TRUE(
       CheckGeoTiff(*PlanOutputGrid({.west = 7, .south = 46, .east = 8, .north = 47, .columns = 2, .rows = 2}, 100)));
+}
+
+// EPSG:3411 is on an ellipsoid of its own, its successor 3413 on that of WGS 84: up to 57 m apart.
+TEST(GridFile, OfADeprecatedSystemIsReadAsThatSystem) {
+  const auto plan = PlanOutputGrid(
+      {.epsg = 3411, .west = 1e6, .south = -1e6, .east = 1.2e6, .north = -0.8e6, .columns = 2, .rows = 2}, 100);
+  ASSERT_TRUE(plan) << plan.error().message;
+  auto bytes = WriteGeoTiff(*plan, std::vector<float>(4, 1.0F));
+  ASSERT_TRUE(bytes) << bytes.error().message;
+  constexpr const char* kFile = "/vsimem/deprecated.tif";
+  VSIFCloseL(VSIFileFromMemBuffer(kFile, reinterpret_cast<GByte*>(bytes->data()), bytes->size(), FALSE));
+  const CPLConfigOptionSetter as_clients("OSR_USE_NON_DEPRECATED", "YES", /*bSetOnlyIfUndefined=*/false);
+  const GDALDatasetUniquePtr file(GDALDataset::Open(kFile));
+  ASSERT_NE(file, nullptr);
+  ASSERT_NE(file->GetSpatialRef(), nullptr);
+  EXPECT_EQ(file->GetSpatialRef()->GetSemiMajor(), 6378273);
 }
 
 }  // namespace

@@ -129,8 +129,10 @@ TEST(RasterWarnings, NameDepths) {
   ExpectOne(WarningsAbout(path, {.vertical = "ellipsoid"}), "has depths (NAVD88 depth)");
 }
 
-// Writes a netCDF file of heights at these latitudes, half a degree apart from west to east. `positive`: an attribute.
-std::string WriteNetCdf(const TempDir& dir, const std::vector<double>& latitudes, const char* positive = nullptr) {
+// Writes a netCDF file of heights at these latitudes, half a degree apart from west to east. `positive`, `quantity`:
+// attributes; null: none.
+std::string WriteNetCdf(const TempDir& dir, const std::vector<double>& latitudes, const char* positive = nullptr,
+                        const char* quantity = nullptr) {
   OpenRaster("none");  // registers the drivers
   constexpr std::size_t kColumns = 20;
   const std::string path = (dir.path() / "grid.nc").string();
@@ -163,6 +165,7 @@ std::string WriteNetCdf(const TempDir& dir, const std::vector<double>& latitudes
   put(*crs, "grid_mapping_name", "latitude_longitude");
   put(*z, "grid_mapping", "crs");
   if (positive != nullptr) put(*z, "positive", positive);
+  if (quantity != nullptr) put(*z, "standard_name", quantity);
   return path;
 }
 
@@ -200,6 +203,13 @@ TEST(RasterWarnings, BandsThatStateDepthsAreRefused) {
       << refused.error().message;
   ExpectOne(WarningsAbout(path, {.vertical = "ellipsoid"}), "its band states \"positive: down\"");
   EXPECT_TRUE(RasterSource::Open(WriteNetCdf(dir, Latitudes(40, 0), "up")));
+  const auto of_quantity = [&](const char* positive, const char* quantity) {
+    return static_cast<bool>(RasterSource::Open(WriteNetCdf(dir, Latitudes(40, 0), positive, quantity)));
+  };
+  EXPECT_FALSE(of_quantity(nullptr, "sea_floor_depth_below_geoid"));
+  EXPECT_FALSE(of_quantity(nullptr, "depth"));
+  EXPECT_TRUE(of_quantity("up", "sea_floor_depth_below_geoid"));
+  EXPECT_TRUE(of_quantity(nullptr, "surface_altitude"));
 }
 
 // Tools copy the header of a DTED file into the metadata of GeoTIFFs.

@@ -115,6 +115,8 @@ TEST(Resampling, PolesOfGlobalSourcesAreTheMeanOfTheirRow) {
   const auto source = OpenOrFail(WriteRaster(dir, spec));
   EXPECT_EQ(source->Read({2, 1, 3})->At(4, source->LatticeOf(2).cells), 5);
   EXPECT_EQ(source->Read({2, 6, 0})->At(4, 0), 7);
+  const std::vector<GeoPosition> poles{{0, 90}, {91, 90}, {-179.5, 90}, {33, -90}};
+  EXPECT_EQ(*source->ReadPoints(poles), (std::vector<float>{5, 5, 5, 7}));
 }
 
 TEST(Resampling, SmallVoidsAreBridgedAndLargeOnesFallToTheFloorOnDemand) {

@@ -382,10 +382,11 @@ TEST(SourceNames, PartsOfArchivesAreToBeExtracted) {
 TEST(GdalEnvironment, IsClearedButForTheFoldersOfData) {
   ::setenv("GDAL_SKIP", "GTiff", 1);
   ::setenv("CPL_DEBUG", "ON", 1);
+  ::setenv("GTIFF_POINT_GEO_IGNORE", "YES", 1);
   ::setenv("PROJ_NETWORK", "ON", 1);
   ::setenv("PROJ_DATA", "/usr/share/proj", 1);
   const std::vector<std::string> cleared = ClearGdalEnvironment();
-  EXPECT_EQ(cleared, (std::vector<std::string>{"CPL_DEBUG", "GDAL_SKIP", "PROJ_NETWORK"}));
+  EXPECT_EQ(cleared, (std::vector<std::string>{"CPL_DEBUG", "GDAL_SKIP", "GTIFF_POINT_GEO_IGNORE", "PROJ_NETWORK"}));
   EXPECT_EQ(::getenv("GDAL_SKIP"), nullptr);
   EXPECT_NE(::getenv("PROJ_DATA"), nullptr);
   ::unsetenv("PROJ_DATA");
