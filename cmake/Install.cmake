@@ -1,5 +1,5 @@
-# Installs the tiler library for find_package(terrace): static libraries, the headers of its interface, and the package
-# files. Component "development"; `cmake --install` without a component leaves it out, so packages of the server do not
+# Installs the tiler library for find_package(terrace): static libraries, the headers of its interface with those that
+# they include, and the package files. Component "development"; `cmake --install` without a component leaves it out, so packages of the server do not
 # contain it.
 include(CMakePackageConfigHelpers)
 
@@ -53,6 +53,7 @@ install(EXPORT terrace_targets NAMESPACE terrace:: FILE terraceTargets.cmake
 
 file(GLOB terrace_interface RELATIVE "${PROJECT_SOURCE_DIR}"
   "${PROJECT_SOURCE_DIR}/tiler/*.h" "${PROJECT_SOURCE_DIR}/engine/dem/*.h" "${PROJECT_SOURCE_DIR}/engine/geo/*.h")
+list(REMOVE_ITEM terrace_interface engine/dem/dem_impl.h tiler/encoders.h)
 terrace_reached_headers(terrace_headers ${terrace_interface} tiler/store/tile_tiers.h)
 foreach(header IN LISTS terrace_headers)
   cmake_path(GET header PARENT_PATH folder)

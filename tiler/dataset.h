@@ -56,12 +56,14 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
-  std::uint64_t generation = 0;   // hash of contents, of all options that change bytes, and of the encoders
-  // The same without edits; 0: there are none. Caches are keyed by it and by TileEditsHash: tiles that no edit touches
-  // stay.
+  // Identifies the dataset and its contents in caches: a hash of contents, of all options that change bytes, and of the
+  // encoders. 0: TilePipeline takes the dataset's number, which suffices if no other pipeline shares its cache.
+  std::uint64_t generation = 0;
+  // The same without edits; 0: there are none. Caches of tiles and refinements are keyed by cache_generation() and by
+  // TileEditsHash, so that tiles that no edit touches stay.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
-  ErrorScale error_scale() const;  // its `default_steps` is a view into `baked`, if there is one
+  ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`
   std::uint64_t options_hash = 0;  // of everything in `generation` that ElevationModel::fingerprint leaves out
 };
 

@@ -45,9 +45,17 @@ Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface
   const bool has = std::ranges::find(formats, TileFormat::kQuantizedMesh) != formats.end();
   if (has && surface.format == TileFormat::kQuantizedMesh) return {};
   return MakeError(ErrorCode::kNotFound,
-                   "the dataset is an archive of finished tiles alone; heights are read from its tiles of "
-                   "quantized-mesh{}",
-                   has ? ", without format" : ", and it has none");
+                   "the dataset is an archive of finished tiles alone, and its heights are read from quantized-mesh "
+                   "tiles: {}",
+                   has ? "leave out the parameter format" : "it has none");
+}
+
+// Dataset::generation of those that have none.
+std::vector<Dataset> Numbered(std::vector<Dataset> datasets) {
+  for (std::size_t i = 0; i < datasets.size(); ++i) {
+    if (datasets[i].generation == 0) datasets[i].generation = i + 1;
+  }
+  return datasets;
 }
 
 const std::vector<std::vector<geo::TileRange>>& AvailableIn(const Dataset& dataset) {
@@ -66,7 +74,7 @@ TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement
     : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
 
 TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
-    : datasets_(std::move(datasets)),
+    : datasets_(Numbered(std::move(datasets))),
       drawn_(std::make_unique<DrawnMeshCache>(kDrawnMeshBytes)),
       refinements_(std::move(refinements)) {}
 

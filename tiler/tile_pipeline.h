@@ -35,7 +35,7 @@ class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
-  // Uses a shared cache, which may outlive the catalog.
+  // Uses a cache that other pipelines may share, and that may outlive this one.
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
   virtual ~TilePipeline() = default;
@@ -66,7 +66,8 @@ class TilePipeline {
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
-  // rays cross too many samples. Other errors: those of ReadPoints and ReadDrawnPoints.
+  // rays cross too many samples; or, over the sources' surface, an edit changes the ground below a ray. Other errors:
+  // those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

@@ -16,7 +16,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# A room is a module. The order is core <- {geo, tin}; geo <- DEM <- dem; {geo, tin} <- proto; {dem, proto} <- tiler <- archive
+# The order of modules is core <- {geo, tin}; geo <- DEM <- dem; {geo, tin} <- proto; {dem, proto} <- tiler <- archive
 # <- {bake, server}, and core <- config <- server (config may also include VALUES). In the server, asio.h is below all modules, the files of the folder
 # itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
 # jobs <- tiles; http <- query <- api; {http, tiles} <- {telemetry, api}; {telemetry, api} <- access; api <- documents
@@ -60,12 +60,12 @@ MODULES = {
     "engine/tin": ["engine/core", "engine/tin/mesh", "engine/tin/scan"],
     "engine/tin/extended": ["engine/core", "engine/tin/mesh", "engine/tin/scan", "engine/tin"],
     "engine/tin/decimate": ["engine/core", "engine/tin/mesh", "engine/tin/scan", "engine/tin"],
-    **{room: ["engine/core", "engine/geo"] + DEM[:i] for i, room in enumerate(DEM)},
+    **{module: ["engine/core", "engine/geo"] + DEM[:i] for i, module in enumerate(DEM)},
     "engine/dem": ["engine/core", "engine/geo"] + DEM,
     "proto": GEOMETRY,
-    **{room: GEOMETRY + PROTO[:i] for i, room in enumerate(PROTO) if i > 0},
-    **{room: ["engine/core"] + CONFIG[:i] for i, room in enumerate(CONFIG)},
-    **{room: GEOMETRY + ["engine/dem"] + PROTO + others for room, others in {**TILER_OF, "tiler": [*TILER_OF]}.items()},
+    **{module: GEOMETRY + PROTO[:i] for i, module in enumerate(PROTO) if i > 0},
+    **{module: ["engine/core"] + CONFIG[:i] for i, module in enumerate(CONFIG)},
+    **{module: GEOMETRY + ["engine/dem"] + PROTO + others for module, others in {**TILER_OF, "tiler": [*TILER_OF]}.items()},
     "archive/files": ["engine/core", "engine/dem"] + PROTO,
     "archive/pmtiles": ["engine/core", "engine/dem"] + PROTO + TILER + ["archive/files"],
     "archive": GEOMETRY + ["engine/dem"] + PROTO + TILER + ARCHIVE[:2],
@@ -148,10 +148,10 @@ PUBLIC = {"expected", "fmt", "the standard library", "threads", "clocks", "files
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:<([^>\n]+)>|"([^"\n]+)")', re.MULTILINE)
 
 
-def room_of(path):
+def module_of(path):
     """The module of a file: the file itself, or the longest module that is a folder of its path."""
-    rooms = [room for room in MODULES if path == room or path.startswith(room + "/")]
-    return max(rooms, key=len, default=None)
+    modules = [module for module in MODULES if path == module or path.startswith(module + "/")]
+    return max(modules, key=len, default=None)
 
 
 def library_of(header):
@@ -161,8 +161,8 @@ def library_of(header):
 class Tree:
     def __init__(self, root):
         self.sources = {}  # path -> [(line, header or None, quoted path or None)]
-        for room in sorted({room.split("/")[0] for room in MODULES}):
-            for folder, folders, names in os.walk(root / room):
+        for module in sorted({module.split("/")[0] for module in MODULES}):
+            for folder, folders, names in os.walk(root / module):
                 folders[:] = sorted(set(folders) - {"node_modules"})
                 for name in sorted(names):
                     if name.endswith((".h", ".cc")):
@@ -198,22 +198,22 @@ class Tree:
 
     def judge(self, path, quoted):
         if quoted not in self.sources:
-            return f'"{quoted}" is no file of a room: name it from the root of the repository'
-        room, other = room_of(path), room_of(quoted)
-        if room is None or other is None:
-            return f'"{quoted}": {path if room is None else quoted} lies in no room; add its folder to MODULES'
-        if room == other:
+            return f'"{quoted}" is no file of a module: name it from the root of the repository'
+        module, other = module_of(path), module_of(quoted)
+        if module is None or other is None:
+            return f'"{quoted}": {path if module is None else quoted} lies in no module; add its folder to MODULES'
+        if module == other:
             return None
-        if PUBLIC_HEADERS.get(quoted) in MODULES[room]:
+        if PUBLIC_HEADERS.get(quoted) in MODULES[module]:
             other = PUBLIC_HEADERS[quoted]
-        if other not in MODULES[room] and not (room in CONFIG and quoted in VALUES):
-            return f'{room} may not know {other} ("{quoted}")'
-        public = PUBLIC - ({"clocks"} if room in GEOMETRY + PROTO else set()) | ({"Boost"} if room.startswith("server") and other.startswith("server") else set())
-        public |= {"GDAL", "Boost.Geometry"} if other in DEM and room in [*DEM, "engine/dem"] else set()
-        public |= {"nlohmann_json"} if room in CONFIG and other in CONFIG else set()
+        if other not in MODULES[module] and not (module in CONFIG and quoted in VALUES):
+            return f'{module} may not know {other} ("{quoted}")'
+        public = PUBLIC - ({"clocks"} if module in GEOMETRY + PROTO else set()) | ({"Boost"} if module.startswith("server") and other.startswith("server") else set())
+        public |= {"GDAL", "Boost.Geometry"} if other in DEM and module in [*DEM, "engine/dem"] else set()
+        public |= {"nlohmann_json"} if module in CONFIG and other in CONFIG else set()
         hidden = self.libraries_behind(quoted) - public
         if hidden:
-            return f'"{quoted}" shows {", ".join(sorted(hidden))} to {room}: keep it in .cc files or in headers of {other} alone'
+            return f'"{quoted}" shows {", ".join(sorted(hidden))} to {module}: keep it in .cc files or in headers of {other} alone'
         return None
 
     @staticmethod
@@ -271,7 +271,7 @@ class SelfTest(unittest.TestCase):
         self.assertIn("shows GDAL to config", found[0])
         self.assertIn("GDAL (<gdal.h>) may not appear here", found[1])
 
-    def test_front_room_shows_its_doors_alone(self):
+    def test_other_modules_see_only_public_headers(self):
         self.assert_clean({"config/options/options.h": "", "server/cli/serve/a.cc": '#include "config/options/options.h"\n'})
         self.assert_refused({"config/input/config_location.h": "", "server/cli/serve/a.cc": '#include "config/input/config_location.h"\n'},
                             "server/cli/serve may not know config/input")
@@ -282,8 +282,8 @@ class SelfTest(unittest.TestCase):
         self.assert_refused({"engine/geo/b.h": "", "engine/core/a.h": '// first\n\n#  include "engine/geo/b.h"\n'}, "engine/core/a.h:3:")
 
     def test_unknown_file_and_folder(self):
-        self.assert_refused({"engine/geo/a.cc": '#include "key.h"\n'}, "is no file of a room")
-        self.assert_refused({"engine/a.h": "", "engine/geo/b.cc": '#include "engine/a.h"\n'}, "lies in no room")
+        self.assert_refused({"engine/geo/a.cc": '#include "key.h"\n'}, "is no file of a module")
+        self.assert_refused({"engine/a.h": "", "engine/geo/b.cc": '#include "engine/a.h"\n'}, "lies in no module")
 
     def test_libraries_stay_in_their_places(self):
         for path, header in (("engine/tin/a.cc", "gdal_priv.h"), ("server/tiles/a.cc", "gdal.h"), ("proto/a.cc", "cpl_conv.h"),
@@ -312,7 +312,7 @@ class SelfTest(unittest.TestCase):
             "server/tiles/pipeline.cc": '#include "engine/dem/source.h"\n',
         }, "shows GDAL to server/tiles")
 
-    def test_boost_crosses_rooms_of_the_server(self):
+    def test_boost_crosses_modules_of_the_server(self):
         self.assert_clean({
             "server/asio/asio.h": "#include <boost/asio/awaitable.hpp>\n",
             "server/tiles/service.h": '#include "server/asio/asio.h"\n',

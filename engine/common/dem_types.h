@@ -138,7 +138,7 @@ struct RasterInfo {
   std::string heights_doubted;               // why they may not be metres, with the remedy; empty: plausible
   HeightRange ellipsoidal;                   // contains all ellipsoidal heights
   std::uint64_t valid_samples = 0, void_samples = 0;
-  std::uint64_t hole_samples = 0;  // voids that do not touch the rim
+  std::uint64_t enclosed_samples = 0;  // of voids with data all around them
   std::optional<double> nodata;
   std::string found_voids;  // detected nodata values, for people; empty: none
   std::vector<int> overview_factors;
@@ -146,8 +146,7 @@ struct RasterInfo {
   std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
   std::string wide_blocks;            // why preparing it decodes blocks many times, with the remedy; empty: it does not
   std::string transform;              // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  bool is_large_without_overviews = false;    // kMaxSamplesWithoutAverages (statistics/kept_factors.h)
-  int min_kept_factor = 0;                    // smallest factor of stored averages; 0: none
+  int min_kept_factor = 0;            // smallest factor of stored averages; 0: none
   bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;
 };
@@ -179,7 +178,7 @@ struct SampleCounts {
 };
 
 // Height samples of a tile and a halo of one sample on each side, row by row from the south-western halo sample. All
-// values are finite. A global node has the same bits in every tile.
+// values are finite. A lattice node that several tiles share has the same height in each, bit for bit.
 struct TileHeights {
   geo::Lattice lattice;
   int stride = 0;              // cells + 3

@@ -1,4 +1,4 @@
-// The state of an ElevationModel. Immutable after Open.
+// Private: the state of an ElevationModel. Immutable after Open.
 #pragma once
 
 #include <algorithm>
@@ -86,6 +86,7 @@ class ElevationModel::Impl {
   Result<std::vector<float>> PointsUnedited(std::span<const GeoPosition> points, HeightDatum datum,
                                             const std::stop_token& stop, std::span<std::uint8_t> filled = {}) const;
   HeightRange UneditedRange(const geo::Lattice& lattice, const geo::TileKey& key) const;
+  // dem_edits.cc.
   HeightRange RangeOfReplacement(const Edit& edit, const geo::Lattice& lattice, const geo::TileKey& key) const;
   std::uint64_t ComputeEditsHash(const geo::TileKey& key) const;
   // The numbers of the edits that ask for precision on edges beyond a tile's corners.

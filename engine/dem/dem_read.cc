@@ -19,10 +19,11 @@ bool IsVoid(float height) { return std::isnan(height); }
 
 // Up to this number of raster grids, each is asked for the whole window.
 constexpr std::size_t kFewGrids = 8;
-// Nodes around a raster grid's footprint whose positions are computed: those of groups that touch it, and one more.
+// Nodes around a raster grid's footprint whose positions are computed: the certified error needs those of each group of
+// cells (SourceErrorBound::kGroup) that touches it, and one more.
 constexpr int kAround = SourceErrorBound::kGroup + 1;
 
-// A range of steps of an axis, as nodes.
+// The nodes at the ends of a range of lattice steps.
 struct NodeRange {
   int first = std::numeric_limits<int>::max(), last = -1;
 

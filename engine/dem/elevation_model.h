@@ -27,7 +27,9 @@ namespace terrace::dem {
 
 class ElevationModel {
  public:
-  // Opens and checks rasters, and reads each once for its statistics. Errors name the file, the fault and the remedy.
+  // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
+  // raster; a raster that may have undeclared voids takes up to four passes. Errors name the file, the fault and the
+  // remedy.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks the statistics of a
@@ -52,8 +54,8 @@ class ElevationModel {
   const std::vector<std::vector<geo::TileRange>>& Availability() const;
   bool IsAvailable(const geo::TileKey& key) const;
 
-  // A range that contains all heights of the tile's samples, without the halo. Depends on the key alone. Accepts any
-  // valid key; tiles outside all sources hold only the floor.
+  // A range that contains all heights of the tile's samples, without the halo. Reads no samples. Accepts any valid key;
+  // tiles outside all sources hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
   // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid.
@@ -76,7 +78,8 @@ class ElevationModel {
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
-  // kEllipsoid, or kSource for what a map calls elevation; an edit changes both by the same difference.
+  // kEllipsoid, or kSource for what a map calls elevation. An edit changes a height by as many metres in kSource as in
+  // kEllipsoid.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 
@@ -88,13 +91,15 @@ class ElevationModel {
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
 
-  // Looks along rays over the surface of ReadPoints before edits, without its rounding; one answer for each ray.
+  // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit lies below a ray.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a hole, or an edit that changes heights, lies below
+  // a ray.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 
-  // Whether the vertical datum of every source is known. Orthometric heights need it.
+  // Whether the vertical datum of every source is known. HeightDatum::kOrthometric leaves heights of an unknown datum
+  // unchanged.
   bool has_datum() const;
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool has_geoid() const;

@@ -13,7 +13,8 @@ namespace terrace::dem {
 // with it do not overlap it.
 std::vector<geo::TileRange> TilesOverlapping(const GeoBounds& box, int level);
 
-// The intersection of two boxes: none, one, or two boxes if one of them surrounds the gap of the other.
+// The intersection of two boxes: none, one, or two boxes. Two if each end of one overlaps the other, as boxes that
+// reach around most of the Earth may.
 std::vector<GeoBounds> CommonBounds(const GeoBounds& a, const GeoBounds& b);
 
 // The properties of a raster that decide which tiles exist.

@@ -32,7 +32,7 @@ using EditRows = std::unordered_map<std::size_t, EditRow>;
 
 class EditSet {
  public:
-  // Complete edits.
+  // `edits`: ResolveEdit has completed them (engine/dem/dem_impl.h).
   explicit EditSet(std::vector<Edit> edits);
 
   const std::vector<Edit>& edits() const { return edits_; }

@@ -12,7 +12,7 @@ namespace terrace::dem {
 struct EditPlace {
   double distance_m = 0;   // 0 inside a polygon; beyond the row's reach any number above it
   bool is_inside = false;  // of a polygon
-  double depth_m = 0;      // inside a polygon, a distance at which its outline is not nearer; at most the row's margin
+  double depth_m = 0;      // inside a polygon, a lower bound of the distance to its outline, at most the row's margin
   std::uint32_t ring = 0, edge = 0;
   double along = 0;  // 0 .. 1 on the edge
 };

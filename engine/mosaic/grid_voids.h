@@ -1,5 +1,5 @@
-// Divides the voids of a raster grid into holes, with data all around them, and collars, which touch a place without a
-// raster. A void that extends over several rasters is one void.
+// Divides the voids of a raster grid that are too wide to be filled from their edges into holes, with data all around
+// them, and collars, which touch a place without a raster. A void that extends over several rasters is one void.
 #pragma once
 
 #include <cstdint>

@@ -42,8 +42,8 @@ struct GridReading {
   // The cell of averages by `factor` that contains each node. Valid where `heights` is not NaN. Nodes far from the
   // raster grid may have no position.
   NodeCells cells;
-  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending also at nodes
-  // that have a height of another raster grid, if their cell lies in `window` and has a sample.
+  // Per node, the raster grid's interpolated height before blending; NaN where it has none. With blending, nodes that
+  // another raster grid has filled also have one, if their cell lies in `window` and has a sample.
   std::vector<float> heights;
   std::vector<double> undulations;  // per node, metres, included in `heights`; empty: no geoid was applied
   GridWindow window;

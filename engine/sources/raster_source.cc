@@ -223,12 +223,12 @@ Result<std::unique_ptr<RasterSource>> RasterSource::Open(const std::string& path
 }
 
 Result<void> RasterSource::FindLayout(GDALDataset& dataset, const std::string& path, const SourceOptions& options) {
-  if (options.vertical == "crs" && StatesDepths(*dataset.GetRasterBand(1))) {
-    return MakeError(
-        ErrorCode::kInvalidArgument,
-        "{}: its band states \"positive: down\", so that its samples are depths; make heights of them with "
-        "`gdal_calc.py -A in --outfile=out --calc=-A`, and let `vertical` say what the heights count from",
-        path);
+  const std::string depths = AttributeOfDepths(*dataset.GetRasterBand(1));
+  if (options.vertical == "crs" && !depths.empty()) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: its band states \"{}\", so that its samples are depths; make heights of them with "
+                     "`gdal_calc.py -A in --outfile=out --calc=-A`, and let `vertical` say what the heights count from",
+                     path, depths);
   }
   auto vertical = ResolveVertical(options.vertical, georeference_, CentreOf(georeference_));
   if (!vertical) return MakeError(vertical.error().code, "{}: {}", path, vertical.error().message);
@@ -267,7 +267,6 @@ Result<PreparedRaster> RasterSource::Prepare(GDALDataset& dataset, const std::st
 void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const PreparedRaster& prepared) {
   const RasterStatistics& statistics = prepared.statistics;
   info_ = Describe(dataset, path, georeference_, layout_);
-  info_.is_large_without_overviews = IsLargeWithoutOverviews(layout_);
   info_.has_averages_in_cache_folder = averages_ != nullptr;
   if (averages_) info_.min_kept_factor = averages_->min_factor();
   if (memory_averages_) info_.min_kept_factor = memory_averages_->min_factor();
@@ -281,7 +280,7 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   info_.heights_doubted = DoubtsOf(info_.heights);
   info_.valid_samples = statistics.valid;
   info_.void_samples = statistics.voids;
-  info_.hole_samples = statistics.hole_samples;
+  info_.enclosed_samples = statistics.enclosed_samples;
 }
 
 void RasterSource::LogOpened(GDALDataset& dataset) const {

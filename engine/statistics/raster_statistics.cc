@@ -224,7 +224,7 @@ StatisticsAssembler::StatisticsAssembler(const RasterLayout& layout)
         // A hole of one sample is filled from its neighbours, whose heights are in the ranges of every box with this
         // sample.
         if (samples > 1) statistics_.table.MarkHole(row, first, last);
-        statistics_.hole_samples += static_cast<std::uint64_t>(last - first + 1);
+        statistics_.enclosed_samples += static_cast<std::uint64_t>(last - first + 1);
       }) {
   content_.Add(layout.width);
   content_.Add(layout.height);
@@ -358,7 +358,7 @@ Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const
               "configuration \"nodata\": \"declared\") they are not");
   }
   statistics_.rim_voids = voids_.Finish();
-  if (statistics_.rim_voids.is_everything()) statistics_.hole_samples = 0;
+  if (statistics_.rim_voids.is_everything()) statistics_.enclosed_samples = 0;
   const BlockRange samples = statistics_.table.OfFinest();
   statistics_.lowest = samples.min;
   statistics_.highest = samples.max;

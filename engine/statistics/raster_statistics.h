@@ -56,7 +56,7 @@ struct RasterStatistics {
   bool has_stray_overviews = false;
   std::uint64_t valid = 0, voids = 0;
   RimVoids rim_voids;
-  std::uint64_t hole_samples = 0;  // voids that do not touch the rim; 0 if rim_voids.is_everything()
+  std::uint64_t enclosed_samples = 0;  // of voids that do not touch the rim; 0 if rim_voids.is_everything()
   ZeroEdges zeros;
   std::array<std::optional<double>, 2> edge_row_means;  // of the first and the last row's valid samples
   AveragingErrors errors;

@@ -1,5 +1,5 @@
 // Voids of a raster that touch its rim: collars around the data, and voids cut by the raster's edge. All other voids
-// are holes, with data all around them. Voids that share a side form one region.
+// are enclosed: they have data all around them. Voids that share a side form one region.
 #pragma once
 
 #include <cstddef>

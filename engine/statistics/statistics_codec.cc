@@ -106,7 +106,7 @@ struct TableParts {
 template <typename Archive, typename Statistics>
 void StatisticsFields(Archive& archive, Statistics& statistics, TableParts& parts, const RasterLayout& layout) {
   archive(statistics.content.high, statistics.content.low);
-  archive(statistics.lowest, statistics.highest, statistics.valid, statistics.voids, statistics.hole_samples);
+  archive(statistics.lowest, statistics.highest, statistics.valid, statistics.voids, statistics.enclosed_samples);
   auto has_stray_overviews = static_cast<std::uint8_t>(statistics.has_stray_overviews ? 1 : 0);
   archive(has_stray_overviews);
   if constexpr (Archive::kReads) statistics.has_stray_overviews = has_stray_overviews != 0;

@@ -207,8 +207,8 @@ bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_toke
   }
 }
 
-// Until the goal is met, this depends only on the mesh: a run to a coarser error is a prefix of a run to a finer one.
-// Therefore seeds are due at the larger of the current and the requested error, not only when a sample is inserted.
+// A run to a coarser error has to be a prefix of a run to a finer one. A seed grid belongs to every mesh whose error is
+// below the grid's, so it is due when that error exceeds both the current and the requested one.
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextInsertion(const GreedyGoal& goal) {
   if (IsMet(goal)) return std::nullopt;
   if (seeds_.HasGrid()) {

@@ -3,7 +3,7 @@
 // Garland and Heckbert, "Fast Triangular Approximation of Terrains and Height Fields" (1997), section 3.3, algorithm
 // III: every triangle keeps its worst sample as a candidate, a queue yields the worst candidate of all, and only the
 // triangles that an insertion changed are scanned again. The result depends on the field and the options alone:
-// predicates are exact, and samples with equal errors are ordered row by row.
+// predicates are exact, and samples whose errors round up to the same float are ordered row by row.
 //
 // Not thread-safe; different objects are independent.
 #pragma once

@@ -16,7 +16,8 @@
 namespace terrace::proto {
 
 inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
-// All indices then have 16 bits. The format allows 65536 vertices, but CesiumJS misreads tiles of exactly 65536.
+// Indices then have 16 bits for every client: in the format they have 32 bits from 65537 vertices on, but CesiumJS
+// reads 32 bits at 65536 already. The limit is one less than necessary.
 inline constexpr std::size_t kMaxTileVertices = 65534;
 
 // A quantized tile: integers, and the two heights of the header that scale them.
@@ -42,8 +43,9 @@ std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions&
                                 const std::vector<geo::Vec3>& positions);
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions);
 
-// Decodes the mesh of a tile, without extensions. Nothing: `encoded` is not a complete quantized-mesh tile. Keeps
-// vertices without a triangle, and degenerate triangles of one point.
+// Decodes the mesh of a tile: header, vertices and triangles, without the lists of edges and the extensions. Nothing:
+// one of these is incomplete or invalid, or there are more than kMaxTileVertices vertices. Keeps vertices without a
+// triangle, and degenerate triangles of one point.
 std::optional<QuantizedTile> ReadQuantizedMesh(std::string_view encoded, const geo::TileKey& key);
 
 // Removes the extensions that `extensions` does not name. The result is what EncodeQuantizedMesh returns for these

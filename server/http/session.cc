@@ -115,10 +115,10 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // If its reply is being sent, or its body has no memory, there is nothing to release.
+  // While a reply is being sent, there is nothing to release.
   void DisplaceHere() {
-    if (!has_upload_ && !is_receiving_) return;
-    displaced_ = true;  // set also after the body got memory, until the session's coroutine resumes
+    if (!has_upload_ && !is_receiving_) return;  // is_receiving_: the coroutine may not have seen its memory yet
+    displaced_ = true;
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();
   }
@@ -281,7 +281,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
   phase_.store(Phase::kServes, std::memory_order_relaxed);
-  body->room.Settle();  // from now on, the server determines the duration
+  body->room.Settle();  // the upload is complete
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
 }
@@ -307,9 +307,9 @@ asio::awaitable<std::monostate> Session::Sleep(std::chrono::milliseconds time) {
   co_return std::monostate();
 }
 
-// Returns nothing if the client is gone, or if others get the request's memory. Only for answers that are
-// not ready at once: for most answers neither a timer nor a second coroutine watches the client. `waited` must not
-// throw, so that the race always has a winner.
+// Returns nothing if the client is gone, or if others get the request's memory. For waits of any kind; answers that are
+// ready at once need neither a timer nor a second coroutine that watches the client. `waited` must not throw, so that
+// the race always has a winner.
 template <typename T>
 asio::awaitable<std::optional<T>> Session::WhileConnected(asio::awaitable<T> waited) {
   using asio::experimental::awaitable_operators::operator||;
@@ -443,7 +443,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 // only have buffered them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
-  room.AddTaken(0);  // the client's time begins
+  room.AddTaken(0);  // begins the client's time
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;

@@ -1,10 +1,11 @@
 // One connection: reads requests, passes them to the application one after the other, and writes the replies.
 //
-// A session runs on one thread. The memory that a client can use is bounded: one read buffer of kMaxHeadBytes, one
-// request with a body of at most the size that its admission allows, and one reply. The body and the reply count
-// against a budget that all sessions share. A body or reply without memory in the budget waits until the request's
-// deadline, and is then refused. A request over its client's rate waits for its turn; if the turn would come after its
-// deadline, it is refused after kRefusalDelay (http_error.h).
+// A session runs on one thread. The memory of a connection is bounded: one read buffer of kMaxHeadBytes, one request
+// with a body of at most the size that its admission allows, and one reply. Bodies and replies larger than
+// TransferBudget::kFreeBytes count against a budget that all sessions share. If it has no memory, they wait until the
+// request's deadline, and are then refused; an upload is refused earlier if others get its memory. A request over its
+// client's rate waits for its turn; if the turn would come after its deadline, it is refused after kRefusalDelay
+// (http_error.h).
 #pragma once
 
 #include <atomic>

@@ -14,13 +14,13 @@ namespace {
 
 using Clock = TileService::Clock;
 
-constexpr int kAfterTiles = 40;  // deeper than any
+constexpr int kAfterTiles = 40;  // deeper than any level of tiles
 
 // Kinds of jobs (JobTerms): tiles of a dataset and level, and work for one request.
 std::uint64_t KindOfTile(const tiler::CacheKey& key) {
   return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
 }
-constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // no level
+constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // larger than any level
 
 std::string NameOf(const tiler::TileRequest& request) { return "tile " + geo::ToString(request.key); }
 

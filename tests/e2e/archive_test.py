@@ -193,7 +193,7 @@ class ArchiveTest(unittest.TestCase):
                 without = target.replace("surface=served&", "")
                 if "/heights?" not in target:  # grids and rays have no other surface here
                     self.assertEqual(alone.get(without, {"Accept-Encoding": "identity"})[2], wanted[2], without)
-            for target, reason in ((f"/cell/heights?surface=served&format=glb&locations={points}", "without format"),
+            for target, reason in ((f"/cell/heights?surface=served&format=glb&locations={points}", "leave out the parameter format"),
                                    (f"/cell/heights?surface=served&error=3&locations={points}", "one error"),
                                    (f"/cell/grid?datum=orthometric&{box}", "")):
                 status, _, body = alone.get(target)

@@ -150,6 +150,22 @@ TEST(TilePipeline, GivesTheSameBytesFromScratchFromReplayAndContinued) {
   EXPECT_GT(cached->refinements().entries, 5u);
 }
 
+// As embedders make datasets (examples/embed): the cache of refinements must not take one for the other.
+TEST(TilePipeline, KeepsDatasetsWithoutAGenerationApart) {
+  std::vector<Dataset> datasets;
+  for (const char* const name : {"etopo5", "jacksboro"}) {
+    datasets.push_back(OpenSample(name));
+    datasets.back().generation = 0;
+  }
+  const TilePipeline pipeline(std::move(datasets));
+  TileRequest request;
+  request.key = {3, MiddleTile(1, 3).x, MiddleTile(1, 3).y};
+  for (const std::uint32_t dataset : {0u, 1u}) {
+    request.dataset = dataset;
+    EXPECT_EQ(FetchTile(pipeline, request).encoded.bytes, Fetch(dataset, request.key, 0).encoded.bytes) << dataset;
+  }
+}
+
 // A raster on the lattice of level 5: cliffs in tile 32/16, flat ground east of it.
 std::unique_ptr<dem::ElevationModel> OpenCliffs(const std::filesystem::path& folder) {
   constexpr double kStep = 5.625 / 256;

@@ -86,7 +86,7 @@ double PositionRounding(const proto::TileSamples& samples, tin::Side side) {
 // Rounding changes an edge's heights by up to half of its step. The step is at most the larger of an eighth of the
 // error and the step that the edge needs at any error. The border's weight accounts for the first, its step for the
 // second.
-tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& needed) {
+tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& finest) {
   tin::GreedyOptions options;
   options.curvature = MakeCurvature(samples);
   options.seeds = MakeSeedGrids(samples);
@@ -96,7 +96,7 @@ tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const pr
     border.weight = 16.0 / 15;
     border.padding_m = PositionRounding(samples, side);
     border.rounding = samples.cells() / (2.0 * proto::kQuantizedMax);
-    border.step_m = needed.Coarsest(side) / 2;
+    border.step_m = finest.Coarsest(side) / 2;
     border.sagitta_m = BorderSagitta(samples, side);
   }
   return options;

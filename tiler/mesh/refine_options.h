@@ -11,8 +11,8 @@
 
 namespace terrace::tiler {
 
-// `needed`: height steps of the edges for the smallest error (MakeEdgeSteps).
-tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& needed);
+// `finest`: height steps of the edges for the smallest error (MakeEdgeSteps).
+tin::GreedyOptions BaseRefineOptions(const proto::TileSamples& samples, const proto::EdgeSteps& finest);
 
 // Height steps of a tile's edges for these errors, equal for both tiles that share an edge.
 proto::EdgeSteps EdgeStepsOf(const dem::ElevationModel& model, const geo::TileKey& key,

@@ -84,7 +84,7 @@ Result<tin::TinMesh> Compact(const tin::HeightField& field, const tin::TinMesh& 
 
 }  // namespace
 
-tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "nobody waits for this tile any more"); }
+tl::unexpected<Error> Cancelled() { return MakeError(ErrorCode::kCancelled, "the build of this tile was stopped"); }
 
 tin::HeightField FieldOf(const proto::TileSamples& samples) {
   const int side = samples.cells() + 1;

@@ -39,8 +39,8 @@ class TileTiers {
   // `build` is called if no tier has the tile, and does not throw. Its error is returned and not kept. Blocks.
   Result<TilePtr> FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build);
 
-  // Erases these tiles from all tiers; builds that have begun keep theirs. Blocks. Errors: those of the stores. If one
-  // fails, the others are erased nevertheless.
+  // Erases these tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors: those of
+  // the stores. If one fails, the others are erased nevertheless.
   struct Erased {
     std::size_t memory = 0;
     std::vector<std::pair<const char*, std::size_t>> stores;  // by the store's name

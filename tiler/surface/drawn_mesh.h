@@ -1,5 +1,5 @@
 // The surface that a client draws for one tile: flat triangles in space, and heights and normals of the surface along
-// plumb lines.
+// plumb lines. The plumb line of a position is the ellipsoid's normal there.
 #pragma once
 
 #include <array>

@@ -38,7 +38,7 @@ constexpr bool IsMapLayer(TileFormat format) { return format > TileFormat::kHeig
 inline constexpr std::array<int, 2> kSidesPx = {256, 512};
 
 struct TileRequest {
-  std::uint32_t dataset = 0;  // index into the catalog's datasets
+  std::uint32_t dataset = 0;  // index into TilePipeline::datasets()
   geo::TileKey key;
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;

@@ -12,7 +12,8 @@ struct Candidate {
   double error = 0;                  // metres, weighted; > 0 unless there is none
   std::uint32_t sample = kNoSample;  // its number (SampleNumber)
 
-  // The total order of insertions: larger error first, then smaller number.
+  // The order of the samples of one triangle: larger error first, then smaller number. The order of insertions is that
+  // of CandidateQueue, which rounds errors up to floats.
   friend constexpr bool Precedes(const Candidate& a, const Candidate& b) {
     return a.error > b.error || (a.error == b.error && a.sample < b.sample);
   }

@@ -35,9 +35,9 @@ class HeightField {
   float At(SamplePosition sample) const { return At(sample.x, sample.y); }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
-  // Distance between rows, in samples. Scans load whole vectors: they may read 16 samples, beginning at any sample that
-  // is not in the first or last row. In fields smaller than 16 x 8 they may also read eight rows beyond the field. The
-  // values read there are arbitrary.
+  // Distance between rows, in samples. Rows, and the memory after the last one, are padded so that loads of 16 samples
+  // that begin at a sample of an inner row stay inside, and in fields smaller than 16 x 8 also those of eight rows
+  // beyond the field. The values of the padding are arbitrary.
   int stride() const { return static_cast<int>(stride_); }
 
   // A power of two, in metres; all heights are multiples of it. 0 if none is known. Sums of heights and their products

@@ -53,7 +53,7 @@ std::string NoOverviewsAdvice(const dem::RasterInfo& info) {
 // Advice about this raster; empty: none.
 std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
   std::vector<std::string> advice;
-  if (info.is_large_without_overviews) {
+  if (IsLargeWithoutOverviews(info)) {
     advice.push_back(NoOverviewsAdvice(info));
   } else if (!info.overviews_unused.empty()) {
     advice.push_back("overviews not used: " + info.overviews_unused);
@@ -115,7 +115,7 @@ void PrintText(const dem::DemInfo& dataset) {
        info.void_samples == 0
            ? "none"
            : fmt::format("{} samples, {}; {} of them with data all around", info.void_samples,
-                         Percent(info.void_samples, info.valid_samples + info.void_samples), info.hole_samples));
+                         Percent(info.void_samples, info.valid_samples + info.void_samples), info.enclosed_samples));
   line("overviews",
        info.overview_factors.empty() ? "none" : fmt::format("1/{}", fmt::join(info.overview_factors, ", 1/")));
   line("floor", fmt::format("{} m outside the raster and in voids that touch its rim", PlainNumber(dataset.floor)));
@@ -144,7 +144,7 @@ nlohmann::json ToJson(const dem::DemInfo& dataset) {
           {"heights", {{"min", info.heights.min}, {"max", info.heights.max}}},
           {"valid_samples", info.valid_samples},
           {"void_samples", info.void_samples},
-          {"hole_samples", info.hole_samples},
+          {"hole_samples", info.enclosed_samples},
           {"overviews", info.overview_factors},
           {"floor", dataset.floor},
           {"levels", {0, dataset.max_level}},

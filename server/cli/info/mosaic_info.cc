@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -87,7 +88,7 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
   const auto count = [&](auto is_so) { return std::ranges::count_if(info.sources, is_so); };
   const auto large = count([](const dem::RasterInfo& s) {
     const bool has_averages = s.min_kept_factor > 0 && s.min_kept_factor <= 4;
-    return std::max(s.width, s.height) > 4096 && s.overview_factors.empty() && !has_averages;
+    return IsLargeWithoutOverviews(s) && !has_averages;
   });
   const auto no_datum = count([](const dem::RasterInfo& s) { return s.datum_in_use.empty(); });
   const auto voids = count([](const dem::RasterInfo& s) { return s.void_samples > 0; });
@@ -121,6 +122,11 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
 }
 
 }  // namespace
+
+bool IsLargeWithoutOverviews(const dem::RasterInfo& info) {
+  constexpr std::int64_t kLarge = std::int64_t{4096} * 4096;
+  return info.overview_factors.empty() && std::int64_t{info.width} * info.height > kLarge;
+}
 
 std::string TextOfBounds(const dem::GeoBounds& bounds) {
   return fmt::format("west {}, south {}, east {}, north {}", PlainNumber(bounds.west, 9), PlainNumber(bounds.south, 9),
@@ -161,7 +167,7 @@ std::string MosaicJson(const std::string& name, const dem::DemInfo& info) {
                        {"spacing_m", source.spacing_m},
                        {"bounds", {source.bounds.west, source.bounds.south, source.bounds.east, source.bounds.north}},
                        {"void_samples", source.void_samples},
-                       {"hole_samples", source.hole_samples},
+                       {"hole_samples", source.enclosed_samples},
                        {"overviews", source.overview_factors}});
   }
   const nlohmann::json mosaic = {{"path", name},

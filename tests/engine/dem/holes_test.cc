@@ -76,7 +76,7 @@ TEST(Holes, OfAPlaneGoOnWithThePlane) {
   const auto source =
       OpenOrFail(WriteRaster(dir, Raster(kSide, kSide, Plane, Box(kMargin, kMargin, 300, 300))), {.floor = kFloor});
   ASSERT_NE(source, nullptr);
-  EXPECT_EQ(source->info().sources[0].hole_samples, 300u * 300u);
+  EXPECT_EQ(source->info().sources[0].enclosed_samples, 300u * 300u);
   const double lowest = Plane(kMargin - 1, kMargin - 1), highest = Plane(kMargin + 300, kMargin + 300);
   for (const int level : {kLevel, kLevel + 1, kLevel - 2}) {
     SCOPED_TRACE(level);
@@ -136,7 +136,7 @@ TEST(Holes, AreNoneWhereAVoidTouchesTheRim) {
     const auto source = OpenOrFail(WriteRaster(dir, Raster(400, 400, Plane, is_void), std::to_string(channel) + ".tif"),
                                    {.floor = kFloor});
     ASSERT_NE(source, nullptr);
-    EXPECT_EQ(source->info().sources[0].hole_samples, channel == 0 ? source->info().sources[0].void_samples : 0);
+    EXPECT_EQ(source->info().sources[0].enclosed_samples, channel == 0 ? source->info().sources[0].void_samples : 0);
     int inside = 0;
     ForNodes(*source, kLevel, [&](const TileHeights& tile, int i, int j, const Place& at) {
       if (!at.IsIn(170, 170, 230, 230)) return;
@@ -220,7 +220,7 @@ TEST(Holes, AreTheSameInEveryTile) {
     const auto source = OpenOrFail(WriteRaster(dir, spec), {.floor = kFloor});
     ASSERT_NE(source, nullptr);
     // In the statistics of the raster alone, its first and last column cut the hole on the seam of the globe.
-    EXPECT_GT(source->info().sources[0].hole_samples, finest == 3 ? 900u : 10'000u);
+    EXPECT_GT(source->info().sources[0].enclosed_samples, finest == 3 ? 900u : 10'000u);
     if (finest == 3) {
       const GeoPosition on_seam{-180, 15};
       const auto height = source->ReadPoints({&on_seam, 1});
@@ -248,7 +248,7 @@ TEST(Holes, GoAcrossRastersOfAGrid) {
     const auto both = OpenOrFail(files, {.floor = kFloor});
     const auto alone = OpenOrFail(files[0].path, {.floor = kFloor});
     ASSERT_TRUE(whole && both && alone);
-    EXPECT_EQ(alone->info().sources[0].hole_samples, 0u);
+    EXPECT_EQ(alone->info().sources[0].enclosed_samples, 0u);
     for (const geo::TileKey& key : SomeTiles(*whole, kLevel, 100)) {
       const auto a = whole->Read(key), b = both->Read(key), c = alone->Read(key);
       ASSERT_TRUE(a && b && c);
@@ -392,7 +392,7 @@ TEST(Holes, AreKnownFromTheCache) {
              none = OpenOrFail(path, {.floor = kFloor});
   ASSERT_TRUE(first && second && none);
   for (const ElevationModel* model : {first.get(), second.get(), none.get()}) {
-    EXPECT_EQ(model->info().sources[0].hole_samples, 300u * 90u);
+    EXPECT_EQ(model->info().sources[0].enclosed_samples, 300u * 90u);
     EXPECT_EQ(model->info().sources[0].void_samples, 300u * 90u + 1000u);
   }
   for (const geo::TileKey& key : SomeTiles(*none, kLevel, 20)) {
