@@ -243,6 +243,14 @@ class Config(unittest.TestCase):
         # A created file would belong to the user who checks, who may differ from the server's user.
         self.assertFalse((self.folder / "x").exists() or (self.folder / "access.log").exists())
 
+    def test_an_option_without_effect_is_warned_of(self):
+        file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [str(SOURCE_DIR / "config/samples/jacksboro.tif")]}],
+                                      "request_burst": 5, "access_log_file": "access.log"}))
+        result = run("serve", "--config", file, "--check-config")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("access_log_file: has no effect, because it needs `access_log` to be `combined` or `json`", result.stderr)
+        self.assertIn("request_burst: has no effect, because it needs `requests_per_second`", result.stderr)
+
     def test_equal_tokens_are_refused_with_their_place(self):
         tokens = [{"name": name, "token": "a-token-of-some-length"} for name in ("one", "two")]
         result = run("serve", "--config", self.write(json.dumps({"tokens": tokens})), "--print-config")
