@@ -214,7 +214,7 @@ void Parser::CheckPolygons(std::span<const std::size_t> first_rings) {
     parts.back().push_back(PositionsOf(rings_[r]));
   }
   for (const RingsOfPart& part : parts) {
-    if (const std::string fault = FaultOf(part); !fault.empty()) return Fail("the polygon is not valid: " + fault);
+    if (auto fault = FaultOf(part)) return Fail("the polygon is not valid: " + fault->what, fault->at);
   }
   if (const auto place = FirstOverlap(parts)) {
     Fail("parts of the polygon overlap; merge them, or divide them into features", *place);
