@@ -125,10 +125,11 @@ class Usage(unittest.TestCase):
             self.assertIn(f"terrace: unknown option {message}", run(*arguments).stderr, arguments)
 
     def test_stdout_that_takes_nothing_is_a_failure(self):
-        with open("/dev/full", "w", encoding="utf-8") as full:
-            result = subprocess.run([BINARY, "serve", "--print-config"], stdout=full, stderr=subprocess.PIPE, timeout=60)
-        self.assertEqual(result.returncode, 1)
-        self.assertIn(b"stdout cannot be written", result.stderr)
+        for arguments in (["serve", "--print-config"], ["--help"], ["--version"], ["bake", "--help"], ["help", "mesh"]):
+            with open("/dev/full", "w", encoding="utf-8") as full:
+                result = subprocess.run([BINARY, *arguments], stdout=full, stderr=subprocess.PIPE, timeout=60)
+            self.assertEqual(result.returncode, 1, arguments)
+            self.assertIn(b"stdout cannot be written: No space left on device", result.stderr, arguments)
 
     def test_no_arguments_give_code_2_and_the_help(self):
         result = run()
