@@ -130,6 +130,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 
 void Parser::CheckEditKeys(const json& terrain) {
   for (const auto& [key, value] : terrain.items()) {
+    // ReadDatum checks "vertical": its message says why an op does not take it.
     if (std::ranges::find(kEditKeys, key) == kEditKeys.end()) {
       Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kEditKeys)));
     } else if (key != "vertical" && !HasProperty(edit_.op, key)) {
