@@ -23,12 +23,12 @@ namespace terrace::archive {
 namespace {
 
 dem::GeoBounds HeaderBounds(const Manifest& manifest) {
-  dem::GeoBounds bounds = manifest.dataset.bounds;
+  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
+  dem::GeoBounds bounds = is_mercator ? HeightTileBounds(manifest) : manifest.dataset.bounds;
   if (bounds.west > bounds.east || bounds.east > 180 || bounds.west < -180) {
     bounds.west = -180;
     bounds.east = 180;
   }
-  const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   const double max_latitude = is_mercator ? geo::kMercatorLatitude : 90;
   bounds.south = std::clamp(bounds.south, -max_latitude, max_latitude);
   bounds.north = std::clamp(bounds.north, -max_latitude, max_latitude);

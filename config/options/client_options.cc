@@ -17,6 +17,8 @@ constexpr double kMaxRequests = 1e6;
 
 bool IsAlphanumeric(char c) { return (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9'); }
 
+char ToLower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
 bool ConsistsOf(std::string_view text, std::string_view others) {
   return std::all_of(text.begin(), text.end(),
                      [&](char c) { return IsAlphanumeric(c) || others.find(c) != std::string_view::npos; });
@@ -51,6 +53,14 @@ std::string CheckOrigin(const std::string& text) {
   return "must be \"*\" or what browsers send as Origin, such as \"https://maps.example\" or "
          "\"http://localhost:3000\", "
          "without a path";
+}
+
+// Browsers send origins in lower case and without the default port of the scheme (RFC 6454, section 6.2).
+std::string AsBrowsersSend(std::string origin) {
+  std::ranges::transform(origin, origin.begin(), ToLower);
+  const std::string_view default_port = origin.starts_with("https:") ? ":443" : ":80";
+  if (origin.ends_with(default_port)) origin.resize(origin.size() - default_port.size());
+  return origin;
 }
 
 std::string CheckRange(const std::string& text) {
@@ -120,8 +130,7 @@ Codec<TokenConfig> TokenHashText() {
   Codec<TokenConfig> codec = Text(&TokenConfig::sha256, CheckHash, TextLike("^[0-9a-fA-F]{64}$"));
   codec.read = [read = codec.read](const Json& value, const ConfigLocation& place, TokenConfig& token) {
     read(value, place, token);
-    std::transform(token.sha256.begin(), token.sha256.end(), token.sha256.begin(),
-                   [](char c) { return c >= 'A' && c <= 'F' ? static_cast<char>(c - 'A' + 'a') : c; });
+    std::transform(token.sha256.begin(), token.sha256.end(), token.sha256.begin(), ToLower);
   };
   return codec;
 }
@@ -257,7 +266,13 @@ Codec<Config> TokensCodec() {
 Codec<Config> TlsCodec() { return {ReadTls, WriteTls, TlsToJson, Json::parse(kTlsSchema)}; }
 
 Codec<Config> OriginsCodec() {
-  return List(&Config::cors_origins, CheckOrigin, R"(["https://maps.example"])", Json::parse(kOriginsSchema));
+  Codec<Config> codec =
+      List(&Config::cors_origins, CheckOrigin, R"(["https://maps.example"])", Json::parse(kOriginsSchema));
+  codec.read = [read = codec.read](const Json& value, const ConfigLocation& place, Config& config) {
+    read(value, place, config);
+    std::ranges::transform(config.cors_origins, config.cors_origins.begin(), AsBrowsersSend);
+  };
+  return codec;
 }
 
 Codec<Config> ProxiesCodec() {

@@ -68,6 +68,7 @@ std::string MeaningOf(const Option<Target>& option, bool has_flag) {
   if (!option.unless.empty()) meaning = fmt::format("Required without `{}`. ", option.unless);
   meaning += option.help;
   if (!option.details.empty()) meaning += fmt::format(". {}", option.details);
+  if (!option.needs.empty()) meaning += fmt::format(". Needs {}", option.needs);
   if (option.is_live) meaning += ". A change needs no restart";
   // A vertical bar ends a cell.
   for (std::size_t at = 0; (at = meaning.find('|', at)) != std::string::npos; at += 2) meaning.insert(at, "\\");

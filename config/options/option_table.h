@@ -29,6 +29,10 @@ struct Option {
   std::string_view missing = {};      // for required keys: the text after `"key" is missing` in the error
   std::string_view unless = {};       // the key is required unless this other key is present
   bool is_live = false;               // a change needs no restart; only for options at the top level of the file
+  // What the option depends on, after "needs" in the reference and in a warning. Without it, a value other than the
+  // default has no effect.
+  std::string_view needs = {};
+  bool (*is_used)(const Target&) = nullptr;  // whether what it needs is there; null: it needs nothing
 };
 
 template <typename Target>

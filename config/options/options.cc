@@ -1,5 +1,7 @@
 #include "config/options/options.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "config/options/option_table.h"
@@ -38,6 +40,17 @@ std::vector<std::string> ChangedOptions(const std::vector<Option<Target>>& table
   return keys;
 }
 
+template <typename Target>
+void FindUnused(const std::vector<Option<Target>>& table, const std::string& above, const Target& target,
+                std::vector<ConfigError>& unused) {
+  for (const Option<Target>& option : table) {
+    if (option.is_used == nullptr || option.is_used(target)) continue;
+    if (option.codec.write(target) == option.codec.write(Target{})) continue;
+    unused.push_back({above + std::string(option.key),
+                      fmt::format("has no effect, because it needs {}; set that, or remove this", option.needs)});
+  }
+}
+
 }  // namespace
 
 std::string FlagOf(std::string_view key) {
@@ -63,6 +76,13 @@ std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b) 
 
 std::vector<std::string> ChangedDatasetOptions(const DatasetConfig& a, const DatasetConfig& b) {
   return ChangedOptions(DatasetOptionTable(), a, b);
+}
+
+std::vector<ConfigError> FindUnusedOptions(const Config& config) {
+  std::vector<ConfigError> unused;
+  FindUnused(ServerOptionTable(), "", config, unused);
+  FindUnused(SharedCacheOptionTable(), "shared_cache.", config.shared_cache, unused);
+  return unused;
 }
 
 void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,

@@ -37,6 +37,10 @@ std::vector<std::string> ChangedServerOptions(const Config& a, const Config& b);
 // The same for the options of two datasets.
 std::vector<std::string> ChangedDatasetOptions(const DatasetConfig& a, const DatasetConfig& b);
 
+// Returns the options of the server that have no effect because another option lacks what they need; options with their
+// default value are left out. The path is the key, or that of the object and the key: "shared_cache.ca_file".
+std::vector<ConfigError> FindUnusedOptions(const Config& config);
+
 // Sets the option `key` from the text of its flag. Appends errors to `errors`, with the flag as path. `directory`: as
 // for FromWorkingDirectory; empty: relative paths are errors. Precondition: the option exists and has a flag.
 void SetServerOption(std::string_view key, const std::string& text, const std::filesystem::path& directory,

@@ -149,7 +149,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
            "0600: the user that the server runs as; 0660: also its group; 0666: everybody who may enter the folder",
        .codec = Choice(&Config::admin_socket_mode,
                        std::vector<std::pair<Json, unsigned>>{{"0600", 0600}, {"0660", 0660}, {"0666", 0666}}),
-       .other_words = "socket_mode permissions"},
+       .other_words = "socket_mode permissions",
+       .needs = "`admin_listen` with the path of a Unix socket",
+       .is_used = [](const Config& config) { return config.admin_listen && !config.admin_listen->path.empty(); }},
       {.key = "io_threads",
        .value = "N",
        .section = "load",
@@ -184,7 +186,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
                   "server uses and those that terrace did not write. Data for which the folder has no space is kept in "
                   "memory as far as it fits, and `/readyz` says `degraded`",
        .codec = Bytes(&Config::cache_dir_bytes, kMaxCacheBytes),
-       .other_words = "cache_size"},
+       .other_words = "cache_size",
+       .needs = "a `cache_dir`",
+       .is_used = [](const Config& config) { return !config.cache_dir.empty(); }},
       {.key = "queue_length",
        .value = "N",
        .section = "load",
@@ -280,7 +284,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "load",
        .help = "Requests that one client or token may send at once; 0 is twice requests_per_second",
        .details = "A viewer requests some hundreds of tiles when it starts",
-       .codec = Number(&Config::request_burst, 0, 1'000'000)},
+       .codec = Number(&Config::request_burst, 0, 1'000'000),
+       .needs = "`requests_per_second`",
+       .is_used = [](const Config& config) { return config.requests_per_second > 0; }},
       {.key = "tokens",
        .section = "access",
        .help = "Tokens, and the datasets that each one opens; without tokens, all datasets are open to everybody",
@@ -291,7 +297,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "ORIGIN[,ORIGIN]",
        .section = "access",
        .help = "Origins of web pages that may read replies; * is any, an empty list none",
-       .details = "As browsers send them in `Origin`: `[\"https://maps.example\"]`. As a flag, separated by commas",
+       .details =
+           "As browsers send them in `Origin`: `[\"https://maps.example\"]`. Capital letters and the default port "
+           "(443, or 80 with http) are changed to what browsers send. As a flag, separated by commas",
        .codec = OriginsCodec(),
        .other_words = "allowed_origins"},
       {.key = "trusted_proxies",
@@ -307,7 +315,9 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .help = "Header that trusted proxies set: x-forwarded (-For, -Proto, -Host) or forwarded (RFC 7239)",
        .details = "The other header is ignored, because a proxy passes it on as the client sent it",
        .codec = Choice(&Config::forwarded_header,
-                       {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}})},
+                       {{"x-forwarded", ForwardedHeader::kXForwarded}, {"forwarded", ForwardedHeader::kForwarded}}),
+       .needs = "`trusted_proxies`",
+       .is_used = [](const Config& config) { return !config.trusted_proxies.empty(); }},
       {.key = "tls",
        .value = "CERT,KEY",
        .section = "access",
@@ -441,7 +451,12 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .section = "log",
        .help = "File to which a combined or json access log is appended; by default stderr",
        .details = "Relative to the folder of the configuration file. SIGHUP reopens it",
-       .codec = Path(&Config::access_log_file, "the path of a file")},
+       .codec = Path(&Config::access_log_file, "the path of a file"),
+       .needs = "`access_log` to be `combined` or `json`",
+       .is_used =
+           [](const Config& config) {
+             return config.access_log == AccessLogForm::kCombined || config.access_log == AccessLogForm::kJson;
+           }},
   };
   return table;
 }

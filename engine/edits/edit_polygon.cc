@@ -3,12 +3,16 @@
 #include <algorithm>
 #include <boost/geometry/algorithms/correct.hpp>
 #include <boost/geometry/algorithms/envelope.hpp>
+#include <boost/geometry/algorithms/intersection.hpp>
 #include <boost/geometry/algorithms/intersects.hpp>
 #include <boost/geometry/algorithms/is_valid.hpp>
 #include <boost/geometry/algorithms/relate.hpp>
+#include <boost/geometry/algorithms/unique.hpp>
 #include <boost/geometry/geometries/box.hpp>
+#include <boost/geometry/geometries/multi_point.hpp>
 #include <boost/geometry/geometries/point_xy.hpp>
 #include <boost/geometry/geometries/polygon.hpp>
+#include <boost/geometry/geometries/segment.hpp>
 #include <boost/geometry/strategies/strategies.hpp>
 
 namespace terrace::dem {
@@ -29,6 +33,42 @@ Polygon PolygonOf(const RingsOfPart& part) {
   return polygon;
 }
 
+// A side of a ring. Sides are numbered, ring after ring.
+struct Side {
+  boost::geometry::model::segment<Point> segment;
+  std::size_t number = 0;
+  std::size_t first = 0, last = 0;  // of its ring
+
+  double west() const { return std::min(segment.first.x(), segment.second.x()); }
+  double east() const { return std::max(segment.first.x(), segment.second.x()); }
+  bool IsNextTo(const Side& other) const {
+    const auto [low, high] = std::minmax(number, other.number);
+    return first == other.first && (high - low == 1 || (low == first && high == last));
+  }
+};
+
+// A position that two sides share, other than the corner between two neighbours.
+std::optional<GeoPosition> SharedPosition(Polygon polygon) {
+  boost::geometry::unique(polygon);  // sides on both sides of a repeated corner would share it
+  std::vector<Side> sides;
+  const auto add = [&](const auto& ring) {
+    const std::size_t first = sides.size(), last = first + ring.size() - 2;
+    for (std::size_t i = 0; first + i <= last; ++i) sides.push_back({{ring[i], ring[i + 1]}, first + i, first, last});
+  };
+  add(polygon.outer());
+  for (const auto& inner : polygon.inners()) add(inner);
+  std::ranges::sort(sides, {}, &Side::west);
+  for (std::size_t i = 0; i < sides.size(); ++i) {
+    for (std::size_t k = i + 1; k < sides.size() && sides[k].west() <= sides[i].east(); ++k) {
+      boost::geometry::model::multi_point<Point> shared;
+      boost::geometry::intersection(sides[i].segment, sides[k].segment, shared);
+      const std::size_t allowed = sides[i].IsNextTo(sides[k]) ? 1 : 0;
+      if (shared.size() > allowed) return GeoPosition{shared.front().x(), shared.front().y()};
+    }
+  }
+  return std::nullopt;
+}
+
 struct PartInBox {
   Polygon polygon;
   boost::geometry::model::box<Point> box;
@@ -39,14 +79,16 @@ struct PartInBox {
 
 }  // namespace
 
-std::string FaultOf(const RingsOfPart& part) {
+std::optional<PolygonFault> FaultOf(const RingsOfPart& part) {
   const Polygon polygon = PolygonOf(part);
-  if (boost::geometry::intersects(polygon)) return "its rings intersect themselves or each other";
-  std::string why;
+  if (boost::geometry::intersects(polygon)) {
+    return PolygonFault{"its rings intersect themselves or each other", SharedPosition(polygon)};
+  }
   boost::geometry::validity_failure_type type{};
-  if (boost::geometry::is_valid(polygon, type) || type == boost::geometry::failure_duplicate_points) return why;
-  boost::geometry::is_valid(polygon, why);
-  return why;
+  if (boost::geometry::is_valid(polygon, type) || type == boost::geometry::failure_duplicate_points) return {};
+  PolygonFault fault;
+  boost::geometry::is_valid(polygon, fault.what);
+  return fault;
 }
 
 std::optional<GeoPosition> FirstOverlap(std::span<const RingsOfPart> parts) {

@@ -13,8 +13,13 @@ namespace terrace::dem {
 // The outer ring of a part of a polygon, and its holes: degrees, without the last position, which is the first.
 using RingsOfPart = std::vector<std::vector<GeoPosition>>;
 
-// What is wrong with a part: rings that intersect, spikes, holes outside. Empty: nothing.
-std::string FaultOf(const RingsOfPart& part);
+struct PolygonFault {
+  std::string what;
+  std::optional<GeoPosition> at;  // a position where sides meet that must not; nothing: another fault
+};
+
+// What is wrong with a part: rings that intersect, spikes, holes outside. Nothing: the part is valid.
+std::optional<PolygonFault> FaultOf(const RingsOfPart& part);
 
 // A position of a part that overlaps another one; parts may touch. What two parts cover would count as outside.
 std::optional<GeoPosition> FirstOverlap(std::span<const RingsOfPart> parts);

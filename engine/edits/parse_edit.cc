@@ -130,6 +130,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 
 void Parser::CheckEditKeys(const json& terrain) {
   for (const auto& [key, value] : terrain.items()) {
+    // ReadDatum checks "vertical": its message says why an op does not take it.
     if (std::ranges::find(kEditKeys, key) == kEditKeys.end()) {
       Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kEditKeys)));
     } else if (key != "vertical" && !HasProperty(edit_.op, key)) {
@@ -214,7 +215,7 @@ void Parser::CheckPolygons(std::span<const std::size_t> first_rings) {
     parts.back().push_back(PositionsOf(rings_[r]));
   }
   for (const RingsOfPart& part : parts) {
-    if (const std::string fault = FaultOf(part); !fault.empty()) return Fail("the polygon is not valid: " + fault);
+    if (auto fault = FaultOf(part)) return Fail("the polygon is not valid: " + fault->what, fault->at);
   }
   if (const auto place = FirstOverlap(parts)) {
     Fail("parts of the polygon overlap; merge them, or divide them into features", *place);

@@ -1,6 +1,7 @@
 #include "engine/gdal/file_end.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -166,6 +167,20 @@ bool HasEndOfJpeg(std::istream& file) {
 }  // namespace
 
 std::uint64_t EndOfClassicNetCdf(std::string_view bytes) { return ClassicHeader(bytes).End(); }
+
+// The superblock, in the "HDF5 File Format Specification", section II.A: little-endian.
+std::uint64_t EndOfHdf5(std::string_view bytes) {
+  ByteReader reader(bytes);
+  if (reader.GetBytes(8) != "\x89HDF\r\n\x1a\n") return 0;
+  const auto version = reader.Get<std::uint8_t>();
+  if (version > 3) return 0;
+  reader.GetBytes(version < 2 ? 4 : 0);
+  if (reader.Get<std::uint8_t>() != 8) return 0;  // bytes of an address
+  constexpr std::array<std::size_t, 4> kUpToAddresses = {10, 14, 2, 2};
+  reader.GetBytes(kUpToAddresses.at(version) + 16);  // two addresses precede that of the end
+  const auto end = reader.Get<std::uint64_t>();
+  return reader.ok() ? end : 0;
+}
 
 std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path) {
   if (EQUAL(dataset.GetDriverName(), "ENVI")) return EndOfEnvi(dataset);

@@ -18,4 +18,7 @@ std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path);
 // its header is damaged, or it is not complete in `bytes`.
 std::uint64_t EndOfClassicNetCdf(std::string_view bytes);
 
+// The size in bytes that the first bytes of an HDF5 file state; netCDF-4 is HDF5. 0: they are no such header.
+std::uint64_t EndOfHdf5(std::string_view bytes);
+
 }  // namespace terrace::dem

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 #include <set>
 #include <system_error>
@@ -238,6 +239,38 @@ Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path)
   return {};
 }
 
+Error CutShort(const std::string& path, std::uint64_t size, std::uint64_t end) {
+  return {ErrorCode::kUnavailable,
+          fmt::format("{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
+                      size, end)};
+}
+
+// What GDAL's own message, "not recognized as a supported file format", does not say.
+std::optional<Error> ExplainUnrecognized(const std::string& path) {
+  if (IsRemote(path)) return std::nullopt;
+  std::error_code unknown;
+  std::string start(64, '\0');
+  std::ifstream(path, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
+  const std::uint64_t size = std::filesystem::file_size(path, unknown), end = EndOfHdf5(start);
+  if (!unknown && size < end) return CutShort(path, size, end);
+  const std::string ending = CPLGetExtension(path.c_str());
+  const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other); };
+  if (EQUAL(ending.c_str(), "sgrd")) {
+    const char* const samples = std::filesystem::exists(beside("SDAT"), unknown) ? "SDAT" : "sdat";
+    return Error{ErrorCode::kInvalidArgument,
+                 fmt::format("{}: is the header of a SAGA raster; name the file with its samples, {}", path,
+                             beside(samples).string())};
+  }
+  const std::filesystem::path header = beside(ending == "SDAT" ? "SGRD" : "sgrd");
+  if (EQUAL(ending.c_str(), "sdat") && !std::filesystem::exists(header, unknown)) {
+    return Error{ErrorCode::kInvalidArgument,
+                 fmt::format("{}: its header {} is missing; copy it there, or rename it so that its name has these "
+                             "capital and small letters",
+                             path, header.string())};
+  }
+  return std::nullopt;
+}
+
 Error CannotOpen(const std::string& path, const std::string& problem) {
   const LookUpSidecars looked_up(path);
   const bool is_of_allowed = GDALIdentifyDriverEx(path.c_str(), GDAL_OF_RASTER, nullptr, nullptr) != nullptr;
@@ -247,6 +280,7 @@ Error CannotOpen(const std::string& path, const std::string& problem) {
                         "with `gdal_translate in out.tif`",
                         path, *format, *format)};
   }
+  if (std::optional<Error> known = ExplainUnrecognized(path)) return *std::move(known);
   const std::string ending = CPLGetExtension(path.c_str());
   if (EQUAL(ending.c_str(), "hgt")) {
     return {
@@ -269,9 +303,7 @@ Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) 
   const std::uint64_t end =
       EQUAL(dataset.GetDriverName(), "GTiff") ? EndOfBlocks(dataset, path, bands) : EndOfSamples(dataset, path);
   if (end <= size) return {};
-  return MakeError(ErrorCode::kUnavailable,
-                   "{}: is cut short: it has {} bytes, and its last samples lie up to byte {}; copy it again", path,
-                   size, end);
+  return tl::unexpected(CutShort(path, size, end));
 }
 
 // GDAL opens a part of a VRT when it reads from it. It takes a part that cannot be opened for one without data, returns

@@ -63,7 +63,7 @@ int Run(int argc, char** argv) {
     app.parse(std::move(reversed));
   } catch (const CLI::ParseError& error) {
     const bool is_help = error.get_exit_code() == 0;  // or --version
-    if (is_help && !HasUnknownCommand(app, arguments)) return app.exit(error);
+    if (is_help && !HasUnknownCommand(app, arguments)) return FinishOutput(app.exit(error));
     return ReportUsage(app, error, arguments);
   }
   return exit_code;

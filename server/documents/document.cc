@@ -1,5 +1,7 @@
 #include "server/documents/document.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "proto/compress.h"
@@ -84,17 +86,22 @@ Answer DocumentMaker::Make(DocumentAnswer described, const RequestContext& conte
 
 asio::awaitable<Response> DocumentMaker::MakeOnWorker(DocumentPlan plan, tiler::Coding coding,
                                                       const RequestContext& context) const {
+  using DocumentPtr = std::shared_ptr<const RenderedDocument>;
   // The waiting request may end before the worker does.
-  Work<RenderedDocument> work = [catalog = catalog_, write = plan.write, coding](const std::stop_token& stop) {
-    return MakeDocument(write, coding, stop);
+  Work<DocumentPtr> work = [catalog = catalog_, write = plan.write,
+                            coding](const std::stop_token& stop) -> Result<DocumentPtr> {
+    Result<RenderedDocument> made = MakeDocument(write, coding, stop);
+    if (!made) return tl::unexpected(std::move(made.error()));
+    return std::make_shared<const RenderedDocument>(*std::move(made));
   };
+  // The work holds the catalog, so no other one has its address meanwhile.
+  std::string key = fmt::format("{} {} {}", fmt::ptr(catalog_.get()), tiler::NameOf(coding), plan.key);
   const auto deadline = TileService::Clock::now() + deadline_;
-  Result<RenderedDocument> document =
-      co_await workers_.Run(std::move(work), TileService::Length::kShort, deadline, context.request->client);
-  if (!document) co_return co_await BackendFailure(document.error(), context.request->id);
-  const auto made = std::make_shared<const RenderedDocument>(*std::move(document));
-  if (made->is_final) kept_.Insert(Key{plan.key, coding}, made);
-  co_return Serve(*made, plan, *context.request);
+  Result<DocumentPtr> made =
+      co_await workers_.RunShared(std::move(key), std::move(work), deadline, context.request->client);
+  if (!made) co_return co_await BackendFailure(made.error(), context.request->id);
+  if ((*made)->is_final) kept_.Insert(Key{plan.key, coding}, *made);
+  co_return Serve(**made, plan, *context.request);
 }
 
 }  // namespace terrace::server

@@ -1,6 +1,7 @@
 // Documents in two forms. Prepared ones have both codings and their ETags: layer.json, /datasets, the viewer's files.
 // Documents that depend on a request's parameters are made on a worker, because even short ones may take longer than a
-// cached tile (a subtree needs the heights of hundreds of tiles), and cached for a while.
+// cached tile (a subtree needs the heights of hundreds of tiles), once for all clients that wait for it, and cached for
+// a while.
 #pragma once
 
 #include <chrono>

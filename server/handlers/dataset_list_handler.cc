@@ -16,6 +16,37 @@ namespace {
 using WriteDatasets = std::string (*)(std::span<const DatasetView>, const IsSeen&, const std::stop_token&,
                                       std::span<const PendingDataset>);
 
+struct NamedUrl {
+  std::string_view name;  // in /datasets; a literal
+  std::string url;
+};
+
+// What the dataset serves. An archive alone has the formats that were baked, and heights if these have quantized-mesh.
+std::vector<NamedUrl> UrlsOf(const DatasetView& dataset) {
+  const auto has = [&](tiler::TileFormat format) { return CheckHasFormat(dataset, format).has_value(); };
+  const bool has_terrain = has(tiler::TileFormat::kQuantizedMesh), has_sources = !dataset.only_archive;
+  const std::string base = "/" + PercentEncode(dataset.name), version = "?v=" + dataset.version();
+  std::vector<NamedUrl> urls;
+  const auto add = [&](bool is_served, std::string_view name, const std::string& path) {
+    if (is_served) urls.push_back({name, base + path});
+  };
+  add(has_terrain, "layer", "/layer.json");
+  add(has(tiler::TileFormat::kGlb), "tileset", "/tileset.json");
+  add(has_terrain, "tiles", "/{z}/{x}/{y}.terrain" + version);
+  add(has(tiler::TileFormat::kHeightPng), "tiles_json", "/tiles.json");
+  add(has_terrain, "heights", "/heights");
+  add(has_terrain, "grid", "/grid");
+  add(has_terrain, "sight", "/sight");
+  add(has_sources, "mesh", "/mesh");
+  add(dataset.edits_hash != nullptr, "edits", "/edits.geojson");
+  add(has_sources, "hillshade", "/hillshade/tiles.json");
+  add(has_sources, "slope", "/slope/tiles.json");
+  add(has_sources, "contours", "/contours/tiles.json");
+  add(dataset.imagery.has_value(), "imagery", "/imagery/tiles.json");
+  add(dataset.imagery.has_value(), "imagery_geodetic", "/imagery/geodetic/{z}/{x}/{y}.webp" + version);
+  return urls;
+}
+
 // The pending datasets that the client may see.
 std::vector<PendingDataset> PendingOfSeen(const HandlerState& state, const RequestContext& context) {
   std::vector<PendingDataset> pending = state.process.PendingOf(*state.catalog);
@@ -55,7 +86,6 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
     if (is_seen && !is_seen(dataset)) continue;
-    const std::string base = fmt::format("/{}", PercentEncode(dataset.name));
     Json entry;
     entry["name"] = dataset.name;
     entry["version"] = dataset.version();
@@ -67,23 +97,8 @@ std::string DatasetsJson(std::span<const DatasetView> datasets, const IsSeen& is
     entry["max_level"] = dataset.max_level();
     entry["heights"]["min"] = dataset.heights.min;
     entry["heights"]["max"] = dataset.heights.max;
-    entry["urls"]["layer"] = base + "/layer.json";
-    entry["urls"]["tileset"] = base + "/tileset.json";
-    entry["urls"]["tiles"] = base + "/{z}/{x}/{y}.terrain?v=" + dataset.version();
-    entry["urls"]["tiles_json"] = base + "/tiles.json";
-    entry["urls"]["heights"] = base + "/heights";
-    entry["urls"]["grid"] = base + "/grid";
-    entry["urls"]["sight"] = base + "/sight";
-    entry["urls"]["mesh"] = base + "/mesh";
-    if (dataset.edits_hash) entry["urls"]["edits"] = base + "/edits.geojson";
-    if (!dataset.only_archive) {
-      for (const char* const layer : {"hillshade", "slope", "contours"}) {
-        entry["urls"][layer] = fmt::format("{}/{}/tiles.json", base, layer);
-      }
-    }
+    for (const auto& [name, url] : UrlsOf(dataset)) entry["urls"][std::string(name)] = url;
     if (dataset.imagery) {
-      entry["urls"]["imagery"] = base + "/imagery/tiles.json";
-      entry["urls"]["imagery_geodetic"] = base + "/imagery/geodetic/{z}/{x}/{y}.webp?v=" + dataset.version();
       Json& imagery = entry["imagery"];
       imagery["attribution"] = dataset.imagery_attribution;
       imagery["bounds"] = json_of(dataset.imagery->bounds);
@@ -110,10 +125,12 @@ std::string IndexHtml(std::span<const DatasetView> datasets, const IsSeen& is_se
   for (const DatasetView& dataset : datasets) {
     if (stop.stop_requested()) return {};
     if (is_seen && !is_seen(dataset)) continue;
-    fmt::format_to(std::back_inserter(items),
-                   "<li>{1}: <a href=\"/{0}/layer.json\">layer.json</a>, "
-                   "<a href=\"/{0}/tileset.json\">tileset.json</a>, <a href=\"/{0}/tiles.json\">tiles.json</a></li>\n",
-                   PercentEncode(dataset.name), EscapeHtml(dataset.name));
+    std::string links;
+    for (const auto& [name, url] : UrlsOf(dataset)) {
+      if (name != "layer" && name != "tileset" && name != "tiles_json") continue;
+      links += fmt::format("{}<a href=\"{}\">{}</a>", links.empty() ? "" : ", ", url, url.substr(url.rfind('/') + 1));
+    }
+    items += fmt::format("<li>{}: {}</li>\n", EscapeHtml(dataset.name), links);
   }
   for (const PendingDataset& one : pending) {
     fmt::format_to(std::back_inserter(items), "<li>{}: {}</li>\n", EscapeHtml(one.name),

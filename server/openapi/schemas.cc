@@ -33,7 +33,7 @@ constexpr NamedSchema kSchemas[] = {
              "additionalProperties":false,"properties":{"attribution":{"type":"string"},
                "bounds":{"$ref":"#/components/schemas/Bounds"},"max_level":{"type":"integer","minimum":0},
                "geodetic_max_level":{"type":"integer","minimum":0}}},
-           "urls":{"type":"object","required":["layer","tileset","tiles","tiles_json","heights","mesh"],
+           "urls":{"type":"object","description":"Those of what the dataset serves","minProperties":1,
              "properties":{"layer":{"type":"string"},"tileset":{"type":"string"},"tiles":{"type":"string"},
                "tiles_json":{"type":"string"},"heights":{"type":"string"},"mesh":{"type":"string"}},
              "additionalProperties":{"type":"string"}}}}}}})"},

@@ -321,8 +321,7 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
     tiers.push_back({store.name(), i < state.tile_stores ? "tiles" : "refinements", store.stats()});
   }
   AddCaches(tiers, in_memory, all);
-  add(kCounter, "terrace_flights_joined_total", "Tile requests that waited for a build already under way",
-      tiles.joined);
+  add(kCounter, "terrace_flights_joined_total", "Requests that waited for the build of another request", tiles.joined);
   add(kCounter, "terrace_builds_refused_total", "Tile requests refused as overloaded", tiles.refused);
   all.push_back(StoreTimes(tiles, state));
   add(kGauge, "terrace_flights", "Jobs under way or waiting", tiles.in_flight);

@@ -38,7 +38,8 @@ TileService::TileService(TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
       tiers_(options.cache_bytes, std::move(options.stores), options.write_header_lines),
       pool_(options.worker_threads, options.queue_length),
-      flights_(pool_) {}
+      flights_(pool_),
+      shared_runs_(pool_) {}
 
 TileService::~TileService() { Shutdown(); }
 
@@ -118,11 +119,11 @@ TileService::Stats TileService::stats() const {
   Stats stats;
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
-  stats.joined = flights_.joined_total();
+  stats.joined = flights_.joined_total() + shared_runs_.joined_total();
   stats.refused = refused_.load(std::memory_order_relaxed);
   stats.store_times = tiers_.store_times();
   stats.queued = pool_.queued();
-  stats.in_flight = flights_.in_flight() + pool_.runs();
+  stats.in_flight = flights_.in_flight() + shared_runs_.in_flight() + pool_.runs();
   stats.cache = tiers_.memory().stats();
   stats.cache.hits = stats.hits;
   stats.cache.misses = stats.misses;

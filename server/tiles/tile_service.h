@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <stop_token>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -68,6 +69,19 @@ class TileService {
     return pool_.Run<T>(std::move(work), TermsOf(length, deadline, client));
   }
 
+  // The same for short work of which calls with equal keys share one run and its result, if they wait at the same time.
+  // Such calls have the same T, and work that does the same. The coroutine must run on a single thread.
+  template <typename T>
+  asio::awaitable<Result<std::shared_ptr<const T>>> RunShared(std::string key, Work<std::shared_ptr<const T>> work,
+                                                              Clock::time_point deadline, std::uint64_t client) {
+    Work<std::shared_ptr<const void>> untyped = std::move(work);
+    std::string name = "work for equal requests";
+    auto flight = co_await shared_runs_.Join(std::move(key), std::move(name), std::move(untyped),
+                                             TermsOf(Length::kShort, deadline, client));
+    if (!flight.value) co_return tl::unexpected(std::move(flight.value.error()));
+    co_return std::static_pointer_cast<const T>(*std::move(flight.value));
+  }
+
   // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. From
   // now on tiles of datasets that are not in `catalog` are not inserted; a build that has begun may still insert a tile
   // with the old edits.
@@ -89,7 +103,7 @@ class TileService {
   struct Stats {
     std::uint64_t hits = 0;                              // found in memory
     std::uint64_t misses = 0;                            // calls of Build that started a flight
-    std::uint64_t joined = 0;                            // waited for the same tile as another request
+    std::uint64_t joined = 0;                            // waited for the same work as another request
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
     std::size_t queued = 0, in_flight = 0;
@@ -105,6 +119,7 @@ class TileService {
   std::atomic<bool> had_edits_{false};  // of the last catalog
   WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;
+  SingleFlight<std::string, std::shared_ptr<const void>> shared_runs_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, refused_{0};
 };
 

@@ -14,7 +14,7 @@ import time
 import unittest
 
 from bake_case import BINARY, IS_LONG, BakeCase, files_of, write_hgt
-from pmtiles import archive, tiles_of
+from pmtiles import archive, bounds_of, tiles_of
 from srtm import write_asc
 
 KILLS = 200 if IS_LONG else 20
@@ -225,11 +225,13 @@ class Bake(BakeCase):
         self.assertIn("attribution, error_fraction have no effect; remove them, or add the sources", errors)
 
     def test_tiles_json_promises_the_tiles_that_are_there(self):
-        chunks, folder = self.place("chunks"), self.place("folder")
-        for place, form in ((chunks, "chunks"), (folder, "folder")):
+        chunks, folder, single = self.place("chunks"), self.place("folder"), self.place("heights.pmtiles")
+        for place, form in ((chunks, "chunks"), (folder, "folder"), (single, "single")):
             done = self.run_bake("--out", place, "--form", form, "--format", "png", "--bbox", "6.2,46.2,6.4,46.4", levels="4-9")
             self.assertEqual(done.returncode, 0, done.stderr)
         documents = [json.loads((folder / "tiles.json").read_text())]
+        for of_header, of_document in zip(bounds_of(single), documents[0]["bounds"]):
+            self.assertAlmostEqual(of_header, of_document, places=6)
         with self.server(chunks) as get:
             documents.append(json.loads(get("tiles.json", {"Accept-Encoding": "identity"})[1]))
             for document in documents:

@@ -57,6 +57,11 @@ def _place(tile_id):
     return zoom, x, y
 
 
+def bounds_of(file):
+    """West, south, east, north in degrees, as the header states them."""
+    return [degrees / 1e7 for degrees in struct.unpack_from("<4i", pathlib.Path(file).read_bytes(), 102)]
+
+
 def tiles_of(file):
     """{(zoom, x, y): bytes} of one file."""
     data = pathlib.Path(file).read_bytes()

@@ -58,6 +58,16 @@ TEST(SetServerOption, TakesListsWithCommas) {
   EXPECT_THAT(Set("tls", "/a.pem", config), ElementsAre(IsError("--tls", "two PEM files")));
 }
 
+TEST(SetServerOption, WritesOriginsAsBrowsersSendThem) {
+  Config config;
+  EXPECT_THAT(Set("cors_origins",
+                  "https://Maps.EXAMPLE:443,http://B.example:80,https://c.example:80,http://[::AB]:443,http://d:8080,*",
+                  config),
+              IsEmpty());
+  EXPECT_THAT(config.cors_origins, ElementsAre("https://maps.example", "http://b.example", "https://c.example:80",
+                                               "http://[::ab]:443", "http://d:8080", "*"));
+}
+
 TEST(SetServerOption, ReportsTheFlag) {
   Config config;
   EXPECT_THAT(Set("cache_bytes", "lots", config), ElementsAre(IsError("--cache-bytes", "such as \"512MB\"")));
@@ -227,6 +237,37 @@ TEST(ChangedServerOptions, NamesWhatDiffers) {
   b.cache_bytes = 7;
   b.datasets.emplace_back().name = "new";
   EXPECT_EQ(ChangedServerOptions(a, b), (std::vector<std::string>{"datasets", "cache_bytes"}));
+}
+
+// Options that need another one: with it, without it, and with their default.
+TEST(FindUnusedOptions, NamesWhatAnotherOptionLacks) {
+  struct Case {
+    const char *key, *value, *other, *enough, *too_little;
+  };
+  for (const auto& [key, value, other, enough, too_little] :
+       {Case{"admin_socket_mode", "0660", "admin_listen", "unix:/run/admin.sock", "127.0.0.1:9090"},
+        Case{"cache_dir_bytes", "5MB", "cache_dir", "/cache", "none"},
+        Case{"request_burst", "3", "requests_per_second", "1.5", "0"},
+        Case{"forwarded_header", "forwarded", "trusted_proxies", "127.0.0.1", ""},
+        Case{"access_log_file", "/a.log", "access_log", "json", "log"},
+        Case{"access_log_file", "/a.log", "access_log", "combined", "off"}}) {
+    Config config;
+    EXPECT_THAT(Set(other, too_little, config), IsEmpty());
+    EXPECT_THAT(FindUnusedOptions(config), IsEmpty()) << key << " has its default";
+    EXPECT_THAT(Set(key, value, config), IsEmpty());
+    EXPECT_THAT(FindUnusedOptions(config), ElementsAre(IsError(key, other)));
+    EXPECT_THAT(Set(other, enough, config), IsEmpty());
+    EXPECT_THAT(FindUnusedOptions(config), IsEmpty()) << key;
+  }
+  EXPECT_THAT(FindUnusedOptions({}), IsEmpty());
+}
+
+TEST(FindUnusedOptions, KnowsTheKeysOfASharedCache) {
+  Config config;
+  config.shared_cache = {.url = "redis://cache:6379/0", .ca_file = "/ca.pem"};
+  EXPECT_THAT(FindUnusedOptions(config), ElementsAre(IsError("shared_cache.ca_file", "rediss://")));
+  config.shared_cache.url = "rediss://cache:6379/0";
+  EXPECT_THAT(FindUnusedOptions(config), IsEmpty());
 }
 
 TEST(NeedsRestart, KnowsWhatIsTakenOverWhileServing) {

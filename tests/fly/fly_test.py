@@ -53,7 +53,9 @@ class SoundServer(unittest.TestCase):
     def test_loads_the_view_in_both_formats(self):
         for tiles in ("terrain", "3dtiles"):
             with self.subTest(format=tiles), tempfile.TemporaryDirectory() as folder:
-                urls, page = pathlib.Path(folder, "urls"), pathlib.Path(folder, "page.html")
+                urls, page, earlier = pathlib.Path(folder, "urls"), pathlib.Path(folder, "page.html"), pathlib.Path(folder, "earlier")
+                page.write_text("an earlier report")
+                earlier.hardlink_to(page)
                 status, report = fly(UPSTREAM, "--format", tiles, "--forbid-holes", "--urls", urls, "--report", page,
                                      "--require", "full-view=60s,errors=0,refusals=0,holes=0,screen-error=1000px")
                 summary = report["summary"]
@@ -74,6 +76,8 @@ class SoundServer(unittest.TestCase):
                 text = page.read_text()
                 self.assertTrue(text.startswith("<!doctype html>") and text.endswith("</html>\n"))
                 self.assertNotRegex(text, r"<script|src=|@import|url\(")
+                self.assertEqual(earlier.read_text(), "an earlier report", "the new one replaces it, and does not overwrite it")
+                self.assertEqual({file.name for file in page.parent.iterdir()}, {"urls", "page.html", "earlier"})
 
     def test_flies_with_several_clients(self):
         status, report = fly(UPSTREAM, "--clients", "3", way=["--circle", "-84.25,36.3,3000,5000"])
@@ -95,13 +99,13 @@ class SoundServer(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "path.csv"
             path.write_text("-84.3,36.3,3000\n-84.2,36.35,3000\n")
-            for option, file, code, part in (("--report", f"{folder}/no/a.html", 1, "cannot be written: No such file or directory"),
-                                             ("--urls", f"{folder}/no/a.txt", 1, "cannot be written: No such file or directory"),
-                                             ("--report", path, 2, "is the file of --path")):
+            for option, file, code, part in (("--report", f"{folder}/no/a.html", 1, "cannot write {}: No such file or directory"),
+                                             ("--urls", f"{folder}/no/a.txt", 1, "cannot write {}: No such file or directory"),
+                                             ("--report", path, 2, "{} is the file of --path")):
                 done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", "--path", path, option, file], capture_output=True,
                                       text=True, timeout=60, check=False)
                 self.assertEqual((done.returncode, done.stdout), (code, ""))
-                self.assertIn(f"terrace: {file} {part}", done.stderr)
+                self.assertIn(f"terrace: {part.format(file)}", done.stderr)
             self.assertTrue(path.read_text().startswith("-84.3"))
 
     def test_says_that_there_is_no_dataset(self):

@@ -3,7 +3,11 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <memory>
 #include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "config/common/token_hash.h"
 #include "proto/compress.h"
@@ -126,6 +130,43 @@ TEST_F(DocumentsTest, SubtreesAreMadeOnWorkersAndKept) {
   EXPECT_EQ(Fetch(port(), target + "?compression=none&v=3").body, made.body);
   EXPECT_EQ(asked, at_start + 5461) << "kept";
   EXPECT_NE(Fetch(port(), target + "?fraction=0.1").body, made.body) << "shorter skirts";
+}
+
+TEST_F(DocumentsTest, AreMadeOnceForAllWhoWait) {
+  DatasetView tall;
+  tall.name = "tall";
+  for (int level = 0; level <= 3; ++level) tall.available.push_back({{0, 0, (2 << level) - 1, (1 << level) - 1}});
+  std::atomic<int> asked = 0;
+  tall.range_bound = [&](const geo::TileKey&) -> Result<dem::HeightRange> {
+    ++asked;
+    return dem::HeightRange{-100, 100};
+  };
+  more_datasets_ = {tall};
+  ServerOptions options;
+  options.config.worker_threads = 1;
+  Start(std::move(options));
+  const int at_start = asked;
+  RawClient holder(port());
+  ASSERT_TRUE(holder.Send(Get("/tall/2/0/0.terrain")));
+  ASSERT_TRUE(Eventually([this] { return builds_ > 0; }));
+  constexpr int kClients = 10;
+  std::vector<std::unique_ptr<RawClient>> clients;
+  for (int i = 0; i < kClients; ++i) {
+    clients.push_back(std::make_unique<RawClient>(port()));
+    ASSERT_TRUE(clients.back()->Send(Get("/tall/3dtiles/1-0-0/0/0/0.3.subtree")));
+  }
+  const std::string waiting = "terrace_flights_joined_total " + std::to_string(kClients - 1) + "\n";
+  EXPECT_TRUE(Eventually([&] { return Fetch(port(), "/metrics").body.find(waiting) != std::string::npos; }));
+  Open(true);
+  std::optional<std::string> first;
+  for (auto& client : clients) {
+    const std::optional<Reply> reply = client->Read();
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status, 200);
+    if (!first) first = reply->body;
+    EXPECT_EQ(reply->body, *first);
+  }
+  EXPECT_EQ(asked, at_start + 21) << "the tiles of three levels, once";
 }
 
 TEST_F(DocumentsTest, AreTheSameWhereverTheyAreMade) {

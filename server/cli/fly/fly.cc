@@ -20,6 +20,7 @@
 #include "fly/report/requirement.h"
 #include "fly/report/summary.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/replaced_file.h"
 #include "server/cli/fly/fly_arguments.h"
 
 namespace terrace::cli {
@@ -29,28 +30,40 @@ std::atomic<bool> stop_requested = false;
 
 extern "C" void RequestStop(int /*signal*/) { stop_requested = true; }
 
-bool WriteFile(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  file << text;
-  file.close();
-  if (file) return true;
-  std::fprintf(stderr, "terrace: %s cannot be written: %s\n", path.c_str(), ErrorText().c_str());
-  return false;
+bool IsPipeOrDevice(const std::string& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored) &&
+         !std::filesystem::is_directory(path, ignored);
 }
 
-// Called before a flight, which may take hours. Creates a missing file, which the report replaces after the flight.
+// Replaces a file; pipes and devices get the text.
+Result<void> WriteFile(const std::string& path, const std::string& text) {
+  if (IsPipeOrDevice(path)) {
+    std::ofstream pipe(path, std::ios::binary);
+    pipe << text << std::flush;
+    return pipe ? Result<void>() : MakeError(ErrorCode::kUnavailable, "cannot write {}: {}", path, ErrorText());
+  }
+  Result<ReplacedFile> file = ReplacedFile::Open(path);
+  if (!file) return tl::unexpected(file.error());
+  file->stream() << text;
+  return file->Commit();
+}
+
+// Called before a flight, which may take hours.
 Result<void> CheckWritable(const std::string& path, const std::string& read) {
+  if (path.empty()) return {};
   std::error_code ignored;
   if (std::filesystem::equivalent(path, read, ignored)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} is the file of --path; give another name", path);
   }
   // A pipe would take the end of a try for the end of the report.
-  const bool is_pipe = std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored) &&
-                       !std::filesystem::is_directory(path, ignored);
-  const bool is_writable = is_pipe ? ::access(path.c_str(), W_OK) == 0 : bool(std::ofstream(path, std::ios::app));
-  if (path.empty() || is_writable) return {};
-  return MakeError(ErrorCode::kUnavailable, "{} cannot be written: {}; name a file in a folder that is writable", path,
-                   ErrorText());
+  if (IsPipeOrDevice(path)) {
+    if (::access(path.c_str(), W_OK) == 0) return {};
+    return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; name a file in a folder that is writable", path,
+                     ErrorText());
+  }
+  const Result<ReplacedFile> tried = ReplacedFile::Open(path);
+  return tried ? Result<void>() : tl::unexpected(tried.error());
 }
 
 int RunFly(const FlyArguments& arguments) {
@@ -87,13 +100,17 @@ int RunFly(const FlyArguments& arguments) {
   const fly::Summary summary = fly::Summarize(*options, record);
   const fly::Judgements judgements = fly::Judge(*requirements, summary);
   bool written = true;
-  if (!arguments.report.empty()) {
-    written &= WriteFile(arguments.report, fly::HtmlOf(*options, summary, judgements, record));
-  }
+  const auto write = [&](const std::string& path, const std::string& text) {
+    const Result<void> done = WriteFile(path, text);
+    if (done) return;
+    Fail(done.error());
+    written = false;
+  };
+  if (!arguments.report.empty()) write(arguments.report, fly::HtmlOf(*options, summary, judgements, record));
   if (!arguments.urls.empty()) {
     std::string lines;
     for (const std::string& url : record.urls) lines += url + "\n";
-    written &= WriteFile(arguments.urls, lines);
+    write(arguments.urls, lines);
   }
   if (arguments.json) {
     fmt::print("{}", fly::JsonOf(*options, summary, judgements, record.seconds));

@@ -72,7 +72,13 @@ void WarnAboutTokens(const config::Config& config) {
   }
 }
 
+// No error, because a flag may switch off what an option of the file needs.
+void WarnAboutUnusedOptions(const config::Config& config) {
+  for (const config::ConfigError& unused : config::FindUnusedOptions(config)) spdlog::warn("{}", unused.Text());
+}
+
 int CheckConfig(const ServeArguments& arguments, const config::Config& config) {
+  WarnAboutUnusedOptions(config);
   WarnAboutTokens(config);
   if (const int exit_code = CheckStart(config, WithViewer(config), PlanDescriptors(config), /*tries_address=*/false);
       exit_code != kExitOk)
@@ -114,6 +120,7 @@ int Serve(const ServeArguments& arguments) {
     spdlog::warn("viewer: {} is not there: / lists the datasets; set `viewer` to a folder with its files, or to false",
                  options.config.viewer.directory.string());
   }
+  WarnAboutUnusedOptions(config);
   WarnAboutTokens(config);
   options.config.max_connections = budget->connections;
   dem::SetGdalCache(config.gdal_cache_bytes);

@@ -6,12 +6,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <set>
 #include <utility>
 #include <vector>
 
 #include "engine/common/box_index.h"
+#include "engine/edits/edit_polygon.h"
 #include "engine/edits/edit_shape.h"
 
 namespace terrace::dem {
@@ -30,6 +32,38 @@ Edit Star(int vertices, double blend_m) {
   }
   Complete(edit);
   return edit;
+}
+
+TEST(EditPolygon, SaysWhereSidesMeet) {
+  std::vector<GeoPosition> star;
+  const Edit edit = Star(2'000, 0);
+  for (const PlanPoint& at : edit.rings.front()) star.push_back({10 + at.x / 71'696, 50 + at.y / 111'229});
+  EXPECT_FALSE(FaultOf({star}));
+  const std::vector<GeoPosition> square = {{0, 0}, {4, 0}, {4, 4}, {0, 4}};
+  std::vector<GeoPosition> crossed = star;
+  crossed[500] = star[504];
+  struct Case {
+    RingsOfPart part;
+    GeoPosition low, high;  // a box around the meeting
+  };
+  const std::vector<Case> cases = {
+      {{crossed}, {star[504].longitude, 50.088}, {star[499].longitude, 50.09}},
+      {{{{0, 0}, {4, 0}, {4, 4}, {2, -2}, {0, 4}}}, {1, 0}, {3, 0}},
+      {{{{0, 0}, {4, 0}, {4, 4}, {4, 6}, {4, 4}, {0, 4}}}, {4, 4}, {4, 6}},
+      {{square, {{1, 1}, {1, 1}, {5, 1}, {2, 3}}}, {4, 1}, {4, 2}},
+      {{square, {{1, 1}, {2, 1}, {2, 3}}, {{1.5, 1.2}, {1.5, 0.5}, {1.9, 0.5}}}, {1.5, 1}, {2, 1}}};
+  for (const auto& [part, low, high] : cases) {
+    const std::optional<PolygonFault> fault = FaultOf(part);
+    ASSERT_TRUE(fault && fault->at);
+    EXPECT_TRUE(low.longitude <= fault->at->longitude && fault->at->longitude <= high.longitude &&
+                low.latitude <= fault->at->latitude && fault->at->latitude <= high.latitude)
+        << fault->at->longitude << ' ' << fault->at->latitude;
+  }
+  const std::optional<PolygonFault> outside = FaultOf({square, {{5, 5}, {6, 5}, {6, 6}}});
+  ASSERT_TRUE(outside);
+  EXPECT_EQ(outside->what, "Geometry has interior rings defined outside the outer boundary");
+  EXPECT_FALSE(outside->at);
+  EXPECT_FALSE(FaultOf({{{0, 0}, {4, 0}, {4, 0}, {4, 4}, {0, 4}}})) << "a repeated corner";
 }
 
 TEST(EditRow, HasThePlacesOfAllEdges) {

@@ -218,20 +218,33 @@ TEST_F(TerrainEdits, CollectWhatIsWrong) {
       geometry(R"({"op":"slope"})", R"({"type":"MultiPolygon","coordinates":[)"
                                     R"([[[10.1,50.1,1],[10.2,50.1,2],[10.2,50.2,3],[10.1,50.1,1]]],)"
                                     R"([[[10.3,50.1,7],[10.4,50.1,8],[10.4,50.2,9],[10.3,50.1,7]]]]})"));
-  for (const char* part : {"feature 1 at",  "did you mean \"flatten\"?",
-                           "feature 2 at",  "flatten needs a \"height\"",
-                           "feature 3 at",  "are the axes swapped?",
-                           "feature 4 at",  "rings intersect themselves",
-                           "feature 5 at",  "the ring is open",
-                           "feature 6 at",  "crosses the antimeridian; divide it into two parts of one MultiPolygon",
-                           "feature 7 at",  "latitude 100.1 is beyond 90",
-                           "feature 8 at",  "heights are missing",
-                           "feature 9 at",  "needs its \"width_m\"",
-                           "feature 10 at", "outside of the data",
-                           "feature 11 at", "did you mean \"metres\"?",
-                           "feature 12 at", "reaches a pole",
-                           "feature 13 at", "slope takes one polygon; divide the parts into features",
-                           "edits.geojson"}) {
+  for (const char* part :
+       {"feature 1 at",
+        "did you mean \"flatten\"?",
+        "feature 2 at",
+        "flatten needs a \"height\"",
+        "feature 3 at",
+        "are the axes swapped?",
+        "feature 4 at 50.150000, 10.150000 (lat, lon): the polygon is not valid: its rings intersect",
+        "feature 5 at",
+        "the ring is open",
+        "feature 6 at",
+        "crosses the antimeridian; divide it into two parts of one MultiPolygon",
+        "feature 7 at",
+        "latitude 100.1 is beyond 90",
+        "feature 8 at",
+        "heights are missing",
+        "feature 9 at",
+        "needs its \"width_m\"",
+        "feature 10 at",
+        "outside of the data",
+        "feature 11 at",
+        "did you mean \"metres\"?",
+        "feature 12 at",
+        "reaches a pole",
+        "feature 13 at",
+        "slope takes one polygon; divide the parts into features",
+        "edits.geojson"}) {
     EXPECT_NE(message.find(part), std::string::npos) << part << " in:\n" << message;
   }
   EXPECT_EQ(message.find("feature 0 "), std::string::npos);

@@ -3,6 +3,7 @@
 
 #include <gdal_priv.h>
 
+#include <array>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -110,11 +111,30 @@ TEST(FileEnd, TruncatedClassicNetCdfIsRefused) {
   }
 }
 
-TEST(FileEnd, OtherFormatsOfNetCdfAreNotExamined) {
+TEST(FileEnd, TruncatedNetCdf4IsRefused) {
   const TempDir dir;
-  const std::string path = Written(dir, Slope(), "netCDF", "dem.nc", "FORMAT=NC4");
-  EXPECT_EQ(EndOfClassicNetCdf(AllBytes(path)), 0);
-  EXPECT_TRUE(ElevationModel::Open(path));
+  const std::string path = Written(dir, Slope(), "netCDF", "dem.nc", "FORMAT=NC4"), bytes = AllBytes(path);
+  EXPECT_EQ(EndOfClassicNetCdf(bytes), 0);
+  EXPECT_EQ(EndOfHdf5(bytes), bytes.size());
+  ExpectRefusedWhenCut(path);
+}
+
+// The versions of the superblock, with the size 0x0123456789 and other bytes.
+TEST(FileEnd, OfHdf5IsInItsSuperblock) {
+  for (const auto& [version, size_at, end_at] : {std::array{0, 13, 40}, {1, 13, 44}, {2, 9, 28}, {3, 9, 28}}) {
+    std::string bytes = "\x89HDF\r\n\x1a\n" + std::string(56, '\x55');
+    const auto at = [&](int place) -> char& { return bytes[static_cast<std::size_t>(place)]; };
+    at(8) = static_cast<char>(version);
+    at(size_at) = 8;
+    bytes.replace(static_cast<std::size_t>(end_at), 8, std::string("\x89\x67\x45\x23\x01\0\0\0", 8));
+    EXPECT_EQ(EndOfHdf5(bytes), 0x0123456789u) << version;
+    for (int size = 0; size < end_at + 8; ++size)
+      EXPECT_EQ(EndOfHdf5(bytes.substr(0, static_cast<std::size_t>(size))), 0u);
+    at(size_at) = 4;
+    EXPECT_EQ(EndOfHdf5(bytes), 0u) << "other addresses";
+    at(0) = 'H';
+    EXPECT_EQ(EndOfHdf5(bytes), 0u);
+  }
 }
 
 TEST(FileEnd, OfAJpegIsItsMarker) {

@@ -1,6 +1,7 @@
 // Every bad input is rejected with a message that names the file and the remedy.
 #include <gdal_priv.h>
 
+#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <string>
@@ -36,6 +37,19 @@ TEST(OpenErrors, NameWhatIsNoRaster) {
   ExpectRefused(dir.File("text.tif"), {"cannot be opened as a raster", "gdalinfo"});
   std::ofstream(dir.File("empty.tif")).flush();
   ExpectRefused(dir.File("empty.tif"), {"cannot be opened as a raster"});
+}
+
+TEST(OpenErrors, NameTheHeaderOfASagaRaster) {
+  const TempDir dir;
+  const GDALDatasetUniquePtr plain(GDALDataset::Open(WriteRaster(dir, {}).c_str()));
+  GDALDriver* const driver = GetGDALDriverManager()->GetDriverByName("SAGA");
+  const std::string samples = dir.File("dem.sdat"), header = dir.File("dem.sgrd"), renamed = dir.File("dem.SGRD");
+  driver->CreateCopy(samples.c_str(), plain.get(), FALSE, nullptr, nullptr, nullptr)->ReleaseRef();
+  EXPECT_TRUE(ElevationModel::Open(samples));
+  ExpectRefused(header, {"is the header of a SAGA raster", "name the file with its samples, " + samples});
+  std::filesystem::rename(header, renamed);
+  ExpectRefused(samples, {"its header " + header + " is missing; copy it there, or rename it"});
+  ExpectRefused(renamed, {"is the header of a SAGA raster"});
 }
 
 TEST(OpenErrors, OfferGeoreferencing) {

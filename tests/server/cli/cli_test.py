@@ -125,10 +125,11 @@ class Usage(unittest.TestCase):
             self.assertIn(f"terrace: unknown option {message}", run(*arguments).stderr, arguments)
 
     def test_stdout_that_takes_nothing_is_a_failure(self):
-        with open("/dev/full", "w", encoding="utf-8") as full:
-            result = subprocess.run([BINARY, "serve", "--print-config"], stdout=full, stderr=subprocess.PIPE, timeout=60)
-        self.assertEqual(result.returncode, 1)
-        self.assertIn(b"stdout cannot be written", result.stderr)
+        for arguments in (["serve", "--print-config"], ["--help"], ["--version"], ["bake", "--help"], ["help", "mesh"]):
+            with open("/dev/full", "w", encoding="utf-8") as full:
+                result = subprocess.run([BINARY, *arguments], stdout=full, stderr=subprocess.PIPE, timeout=60)
+            self.assertEqual(result.returncode, 1, arguments)
+            self.assertIn(b"stdout cannot be written: No space left on device", result.stderr, arguments)
 
     def test_no_arguments_give_code_2_and_the_help(self):
         result = run()
@@ -242,6 +243,14 @@ class Config(unittest.TestCase):
         self.assertEqual(run("serve", "--config", fine, "--check-config").returncode, 0)
         # A created file would belong to the user who checks, who may differ from the server's user.
         self.assertFalse((self.folder / "x").exists() or (self.folder / "access.log").exists())
+
+    def test_an_option_without_effect_is_warned_of(self):
+        file = self.write(json.dumps({"datasets": [{"name": "a", "sources": [str(SOURCE_DIR / "config/samples/jacksboro.tif")]}],
+                                      "request_burst": 5, "access_log_file": "access.log"}))
+        result = run("serve", "--config", file, "--check-config")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("access_log_file: has no effect, because it needs `access_log` to be `combined` or `json`", result.stderr)
+        self.assertIn("request_burst: has no effect, because it needs `requests_per_second`", result.stderr)
 
     def test_equal_tokens_are_refused_with_their_place(self):
         tokens = [{"name": name, "token": "a-token-of-some-length"} for name in ("one", "two")]

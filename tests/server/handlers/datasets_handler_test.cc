@@ -1,9 +1,15 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "server/handlers/handlers.h"
+#include "tiler/store/baked_tiles.h"
 
 namespace terrace::server {
 namespace {
@@ -43,6 +49,48 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"slope", base + "/slope/tiles.json"},
                                              {"contours", base + "/contours/tiles.json"},
                                              {"mesh", base + "/mesh"}}));
+}
+
+// An archive that only has formats.
+class BakedFormats final : public tiler::BakedTiles {
+ public:
+  explicit BakedFormats(std::vector<tiler::TileFormat> formats) { extent_.formats = std::move(formats); }
+
+  tiler::Coding coding() const override { return tiler::Coding::kGzip; }
+  const tiler::BakedExtent& extent() const override { return extent_; }
+  Result<std::optional<tiler::EncodedTile>> Find(const tiler::TileRequest&) const override { return std::nullopt; }
+  Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange{}; }
+  bool is_outdated() const override { return false; }
+  Error WhyAbsent(const tiler::TileRequest&) const override { return {}; }
+
+ private:
+  tiler::BakedExtent extent_;
+};
+
+TEST(DatasetsHandler, ListsWhatAnArchiveAloneServes) {
+  using tiler::TileFormat;
+  using Names = std::vector<std::string>;
+  struct Case {
+    std::vector<TileFormat> formats;
+    Names names, links;
+  };
+  const std::vector<Case> cases = {
+      {{TileFormat::kQuantizedMesh}, {"grid", "heights", "layer", "sight", "tiles"}, {"layer.json"}},
+      {{TileFormat::kGlb}, {"tileset"}, {"tileset.json"}},
+      {{TileFormat::kHeightPng, TileFormat::kGlb}, {"tiles_json", "tileset"}, {"tileset.json", "tiles.json"}}};
+  for (const Case& one : cases) {
+    std::array<DatasetView, 1> datasets = Datasets();
+    datasets[0].only_archive = std::make_shared<const BakedFormats>(one.formats);
+    const auto list = nlohmann::json::parse(DatasetsJson(datasets));
+    Names names;
+    for (const auto& [name, url] : list["datasets"][0]["urls"].items()) names.push_back(name);
+    EXPECT_EQ(names, one.names);
+    const std::string page = IndexHtml(datasets);
+    for (const std::string file : {"layer.json", "tileset.json", "tiles.json"}) {
+      const bool is_linked = page.find(">" + file + "</a>") != std::string::npos;
+      EXPECT_EQ(is_linked, std::ranges::count(one.links, file) == 1) << file;
+    }
+  }
 }
 
 TEST(DatasetsHandler, TellsWhereTheDeepestTilesLie) {
