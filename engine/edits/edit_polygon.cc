@@ -47,7 +47,8 @@ struct Side {
   }
 };
 
-// A position that two sides share, other than the corner between two neighbours.
+// A position that two sides share, other than the corner between two neighbours. Nothing if none is found among the
+// first pairs of sides: an invalid polygon must not take longer than a valid one.
 std::optional<GeoPosition> SharedPosition(Polygon polygon) {
   boost::geometry::unique(polygon);  // sides on both sides of a repeated corner would share it
   std::vector<Side> sides;
@@ -58,8 +59,11 @@ std::optional<GeoPosition> SharedPosition(Polygon polygon) {
   add(polygon.outer());
   for (const auto& inner : polygon.inners()) add(inner);
   std::ranges::sort(sides, {}, &Side::west);
+  constexpr std::size_t kMaxPairs = 1'000'000;
+  std::size_t pairs = 0;
   for (std::size_t i = 0; i < sides.size(); ++i) {
     for (std::size_t k = i + 1; k < sides.size() && sides[k].west() <= sides[i].east(); ++k) {
+      if (++pairs > kMaxPairs) return std::nullopt;
       boost::geometry::model::multi_point<Point> shared;
       boost::geometry::intersection(sides[i].segment, sides[k].segment, shared);
       const std::size_t allowed = sides[i].IsNextTo(sides[k]) ? 1 : 0;

@@ -254,6 +254,13 @@ std::optional<Error> ExplainUnrecognized(const std::string& path) {
   const std::uint64_t size = std::filesystem::file_size(path, unknown), end = EndOfHdf5(start);
   if (!unknown && size < end) return CutShort(path, size, end);
   const std::string ending = CPLGetExtension(path.c_str());
+  if (EQUAL(ending.c_str(), "hgt")) {
+    return Error{
+        ErrorCode::kInvalidArgument,
+        fmt::format("{}: its name or size is not that of an SRTM cell; name it by its south-western corner, as "
+                    "N46E008.hgt, and check its size: 1201 x 1201 or 3601 x 3601 samples of two bytes",
+                    path)};
+  }
   const auto beside = [&](const char* other) { return std::filesystem::path(path).replace_extension(other); };
   if (EQUAL(ending.c_str(), "sgrd")) {
     const char* const samples = std::filesystem::exists(beside("SDAT"), unknown) ? "SDAT" : "sdat";
@@ -282,13 +289,6 @@ Error CannotOpen(const std::string& path, const std::string& problem) {
   }
   if (std::optional<Error> known = ExplainUnrecognized(path)) return *std::move(known);
   const std::string ending = CPLGetExtension(path.c_str());
-  if (EQUAL(ending.c_str(), "hgt")) {
-    return {
-        ErrorCode::kInvalidArgument,
-        fmt::format("{}: cannot be opened as a raster ({}); name it by the corner of its cell, such as N46E008.hgt, "
-                    "and check its size: 1201 x 1201 or 3601 x 3601 samples of two bytes",
-                    path, problem)};
-  }
   const bool is_packed = EQUAL(ending.c_str(), "zip") || EQUAL(ending.c_str(), "gz") || EQUAL(ending.c_str(), "tar");
   return {ErrorCode::kInvalidArgument,
           fmt::format("{}: cannot be opened as a raster ({}); {}", path, problem,
