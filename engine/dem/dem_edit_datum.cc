@@ -5,6 +5,7 @@
 
 #include "engine/crs/geoid.h"
 #include "engine/dem/dem_impl.h"
+#include "engine/geo/mercator_grid.h"
 
 namespace terrace::dem {
 namespace {
@@ -55,8 +56,55 @@ Result<std::string> ElevationModel::Impl::AddUndulations(Edit& edit) const {
     }
   }
   edit.undulations = std::move(patch);
+  edit.is_in_source_datum = CountsFrom((*geoid)->pipeline(), HeightDatum::kSource, edit.reach);
+  edit.is_in_orthometric = CountsFrom((*geoid)->pipeline(), HeightDatum::kOrthometric, edit.reach);
   Complete(edit);
   return std::string();
 }
+
+std::string GeoidIn(HeightDatum datum, const VerticalDatum& source) {
+  if (source.geoid != nullptr) return source.geoid->pipeline();
+  if (datum != HeightDatum::kOrthometric || !source.is_known()) return "";
+  static const std::string egm96 = [] {
+    const auto geoid = Geoid::OfCrs("EPSG:5773", {0, 0});
+    return geoid ? (*geoid)->pipeline() : "";
+  }();
+  return egm96;
+}
+
+bool ElevationModel::Impl::CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const {
+  // The floor shows where no source has a height.
+  if (datum == HeightDatum::kSource && floor_undulations != nullptr && floor_undulations->geoid().pipeline() != geoid) {
+    return false;
+  }
+  return std::ranges::all_of(GridsAt(reach),
+                             [&](std::size_t i) { return GeoidIn(datum, grids[i].vertical()) == geoid; });
+}
+
+template <typename NodeGrid>
+Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const NodeGrid& node_grid, const NodeWindow& window,
+                                                          std::span<const std::size_t> which, HeightDatum datum,
+                                                          std::span<const float> unedited, const std::string& what,
+                                                          const std::stop_token& stop) const {
+  const bool are_stated = std::ranges::all_of(which, [&](std::size_t number) {
+    const Edit& edit = edits->edits()[number];
+    return !edit.changes_heights() || edit.IsStatedIn(datum);
+  });
+  if (are_stated) return std::vector<double>();
+  const auto above = ReadUnedited(node_grid, window, HeightDatum::kEllipsoid, what, stop);
+  if (!above) return tl::unexpected(above.error());
+  std::vector<double> zeros(above->begin(), above->end());
+  for (std::size_t k = 0; k < zeros.size(); ++k) zeros[k] -= static_cast<double>(unedited[k]);
+  return zeros;
+}
+
+template Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const geo::Lattice&, const NodeWindow&,
+                                                                   std::span<const std::size_t>, HeightDatum,
+                                                                   std::span<const float>, const std::string&,
+                                                                   const std::stop_token&) const;
+template Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const geo::MercatorGrid&, const NodeWindow&,
+                                                                   std::span<const std::size_t>, HeightDatum,
+                                                                   std::span<const float>, const std::string&,
+                                                                   const std::stop_token&) const;
 
 }  // namespace terrace::dem

@@ -162,9 +162,16 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
   const ElevationModel& model = *replacements[edit.replacement];
   edit.low_m = model.info().heights.min;
   edit.high_m = model.info().heights.max;
+  const auto is_in = [&](HeightDatum datum) {
+    const std::string geoid = GeoidIn(datum, model.impl_->grids.front().vertical());
+    return model.impl_->CountsFrom(geoid, datum, edit.reach) && CountsFrom(geoid, datum, edit.reach);
+  };
+  edit.is_in_source_datum = is_in(HeightDatum::kSource);
+  edit.is_in_orthometric = is_in(HeightDatum::kOrthometric);
   ContentHasher hasher;
   hasher.Add(edit.hash);
   hasher.Add(model.fingerprint());
+  hasher.Add(edit.is_in_source_datum);
   edit.hash = hasher.Hash();
   return std::string();
 }
@@ -214,17 +221,19 @@ std::vector<std::size_t> ElevationModel::Impl::EditsAt(const NodeGrid& node_grid
 
 template <typename NodeGrid>
 Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window,
-                                              std::span<const std::size_t> which, std::span<float> heights,
-                                              const std::stop_token& stop, double* error_m) const {
+                                              std::span<const std::size_t> which, const EditedDatum& datum,
+                                              std::span<float> heights, const std::stop_token& stop,
+                                              double* error_m) const {
   // Heights of a replacement, without its floor, so that its voids show what is below. Features with the same source
-  // share them.
-  std::map<std::size_t, ReplacedHeights> known;
+  // and datum share them.
+  std::map<std::pair<std::size_t, HeightDatum>, ReplacedHeights> known;
   const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
-    if (const auto found = known.find(edit.replacement); found != known.end()) return &found->second;
+    const std::pair wanted(edit.replacement, edit.IsStatedIn(datum.datum) ? datum.datum : HeightDatum::kEllipsoid);
+    if (const auto found = known.find(wanted); found != known.end()) return &found->second;
     const Impl& other = *replacements[edit.replacement]->impl_;
     std::vector<PartReading> readings;
-    auto read = other.ReadGrids(node_grid, window, HeightDatum::kEllipsoid, edit.source, stop,
-                                error_m != nullptr ? &readings : nullptr);
+    auto read =
+        other.ReadGrids(node_grid, window, wanted.second, edit.source, stop, error_m != nullptr ? &readings : nullptr);
     if (!read) return tl::unexpected(std::move(read).error());
     ReplacedHeights result{*std::move(read), 0};
     if constexpr (std::is_same_v<NodeGrid, geo::Lattice>) {
@@ -240,19 +249,19 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
         result.error_m = *bound;
       }
     }
-    return &known.emplace(edit.replacement, std::move(result)).first->second;
+    return &known.emplace(wanted, std::move(result)).first->second;
   };
-  return edits->Apply(node_grid, window, which, heights, replaced, stop, error_m);
+  return edits->Apply(node_grid, window, which, datum, heights, replaced, stop, error_m);
 }
 
 template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;
 template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::MercatorGrid&, const NodeWindow&) const;
 template Result<void> ElevationModel::Impl::ApplyEdits(const geo::Lattice&, const NodeWindow&,
-                                                       std::span<const std::size_t>, std::span<float>,
-                                                       const std::stop_token&, double*) const;
+                                                       std::span<const std::size_t>, const EditedDatum&,
+                                                       std::span<float>, const std::stop_token&, double*) const;
 template Result<void> ElevationModel::Impl::ApplyEdits(const geo::MercatorGrid&, const NodeWindow&,
-                                                       std::span<const std::size_t>, std::span<float>,
-                                                       const std::stop_token&, double*) const;
+                                                       std::span<const std::size_t>, const EditedDatum&,
+                                                       std::span<float>, const std::stop_token&, double*) const;
 
 // Where there is no height, an edit whose weight is 1 makes one if `datum` is kEllipsoid; in other datums it stays
 // void.
@@ -278,29 +287,28 @@ Result<void> ElevationModel::Impl::EditPoints(std::span<const GeoPosition> point
     if (!read) return tl::unexpected(std::move(read).error());
     above = *std::move(read);
   }
-  std::vector<std::optional<std::vector<float>>> others(replacements.size());
+  std::map<std::pair<std::size_t, HeightDatum>, std::vector<float>> others;  // by replacement and datum
+  const auto of = [&](const Edit& edit) {
+    return std::pair(edit.replacement, edit.IsStatedIn(datum) ? datum : HeightDatum::kEllipsoid);
+  };
   for (std::size_t k = 0; k < at.size(); ++k) {
     for (const std::size_t number : which[k]) {
       const Edit& edit = edits->edits()[number];
-      if (edit.op != EditOp::kReplace || others[edit.replacement]) continue;
-      auto read = replacements[edit.replacement]->ReadPoints(at, HeightDatum::kEllipsoid, stop);
+      if (edit.op != EditOp::kReplace || others.contains(of(edit))) continue;
+      auto read = replacements[edit.replacement]->ReadPoints(at, of(edit).second, stop);
       if (!read) return tl::unexpected(std::move(read).error());
-      others[edit.replacement] = *std::move(read);
+      others[of(edit)] = *std::move(read);
     }
   }
   EditRows rows;
   for (std::size_t k = 0; k < at.size(); ++k) {
     if (is_stopped(k)) return MakeError(ErrorCode::kCancelled, "stopped");
-    float& height = heights[edited[k]];
-    const double before = static_cast<double>(above.empty() ? height : above[k]);
-    const double after = edits->ApplyAt(
-        at[k], which[k], before, [&](const Edit& edit) { return static_cast<double>((*others[edit.replacement])[k]); },
-        rows);
-    if (above.empty()) {
-      height = static_cast<float>(after);
-    } else if (!(after == before)) {
-      height = RoundHeight(static_cast<double>(height) + after - before);
-    }
+    const auto height = static_cast<double>(heights[edited[k]]);
+    if (!above.empty() && std::isnan(height)) continue;
+    const double zero = above.empty() ? 0 : static_cast<double>(above[k]) - height;
+    heights[edited[k]] = static_cast<float>(edits->ApplyAt(
+        at[k], which[k], {datum, std::span(&zero, 1)}, height,
+        [&](const Edit& edit) { return static_cast<double>(others.at(of(edit))[k]); }, rows));
   }
   return {};
 }

@@ -34,14 +34,20 @@ struct GridContent {
 
 class ElevationModel::Impl {
  public:
-  // `what`: names the request in messages.
-  Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, HeightDatum datum, const std::string& what,
-                                       const std::stop_token& stop) const;
+  // `what`: names the request in messages. `NodeGrid`: geo::Lattice or geo::MercatorGrid.
+  template <typename NodeGrid>
+  Result<std::vector<float>> ReadNodes(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                                       const std::string& what, const std::stop_token& stop) const;
   // The same before the edits. `readings`: unless null, receives the readings of the raster grids that were read, in
   // order.
-  Result<std::vector<float>> ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
+  template <typename NodeGrid>
+  Result<std::vector<float>> ReadUnedited(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
                                           const std::string& what, const std::stop_token& stop,
                                           std::vector<PartReading>* readings = nullptr) const;
+  // Replaces NaN by the floor, in the datum of the last raster grid that refers to a geoid, or above the ellipsoid.
+  template <typename NodeGrid>
+  Result<void> FillWithFloor(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                             std::span<float> heights) const;
   Result<TileHeights> Read(const geo::TileKey& key, HeightDatum datum, const std::stop_token& stop) const;
 
   const geo::Lattice& LatticeOf(int level) const;  // 0 .. geo::kMaxLevel, also beyond the deepest level served
@@ -65,15 +71,25 @@ class ElevationModel::Impl {
   Result<std::string> ResolveEdit(Edit& edit, const DemOptions& options, std::map<std::string, std::size_t>& opened);
   // Of an edit with orthometric heights. dem_edit_datum.cc.
   Result<std::string> AddUndulations(Edit& edit) const;
+  // Whether all heights in a datum that an edit may reach count from a geoid (GeoidIn). dem_edit_datum.cc.
+  bool CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const;
+  // The zeros of EditedDatum at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
+  // dem_edit_datum.cc.
+  template <typename NodeGrid>
+  Result<std::vector<double>> ZerosOf(const NodeGrid& node_grid, const NodeWindow& window,
+                                      std::span<const std::size_t> which, HeightDatum datum,
+                                      std::span<const float> unedited, const std::string& what,
+                                      const std::stop_token& stop) const;
   // Of a flatten without a height.
   Result<std::string> AddFlatHeight(Edit& edit, const std::stop_token& stop) const;
   // Of a replace.
   Result<std::string> OpenReplacement(Edit& edit, const DemOptions& options,
                                       std::map<std::string, std::size_t>& opened);
-  // `heights`: above the ellipsoid. `error_m`: as for EditSet::Apply.
+  // `error_m`: as for EditSet::Apply.
   template <typename NodeGrid>
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
-                          std::span<float> heights, const std::stop_token& stop, double* error_m = nullptr) const;
+                          const EditedDatum& datum, std::span<float> heights, const std::stop_token& stop,
+                          double* error_m = nullptr) const;
   // ReplacedHeights::void_cells. `readings`: of this model, for the window. void_cells.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
                                       std::span<const PartReading> readings) const;
@@ -127,6 +143,9 @@ class ElevationModel::Impl {
   std::optional<std::uint64_t> KnownHash(const HashKey& key) const;
   void KeepHash(const HashKey& key, std::uint64_t hash) const;
 };
+
+// The geoid that a source's heights count from in a datum, by its PROJ operation; empty: none.
+std::string GeoidIn(HeightDatum datum, const VerticalDatum& source);
 
 // A box around the nodes of a window. Its longitudes begin between -180 and 180 and continue eastwards.
 template <typename NodeGrid>

@@ -235,49 +235,57 @@ const geo::Lattice& ElevationModel::Impl::LatticeOf(int level) const {
   return lattices[static_cast<std::size_t>(level)];
 }
 
-Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(int level, const NodeWindow& window, HeightDatum datum,
-                                                              const std::string& what, const std::stop_token& stop,
-                                                              std::vector<PartReading>* readings) const {
-  const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadGrids(lattice, window, datum, what, stop, readings);
-  if (!heights || !HasVoids(*heights)) return heights;
-  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
-    ReplaceVoids(*heights, floor);
-    return heights;
+template <typename NodeGrid>
+Result<void> ElevationModel::Impl::FillWithFloor(const NodeGrid& node_grid, const NodeWindow& window, HeightDatum datum,
+                                                 std::span<float> heights) const {
+  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr || !HasVoids(heights)) {
+    ReplaceVoids(heights, floor);
+    return {};
   }
-  const auto undulations = floor_undulations->At(lattice, window);
+  const auto undulations = floor_undulations->At(node_grid, window);
   if (!undulations) return tl::unexpected(undulations.error());
-  for (std::size_t i = 0; i < heights->size(); ++i) {
-    if (!IsVoid((*heights)[i])) continue;
-    (*heights)[i] = std::isnan((*undulations)[i]) ? floor : RoundHeight(floor - (*undulations)[i]);
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    if (!IsVoid(heights[i])) continue;
+    heights[i] = std::isnan((*undulations)[i]) ? floor : RoundHeight(floor - (*undulations)[i]);
+  }
+  return {};
+}
+
+template <typename NodeGrid>
+Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const NodeGrid& node_grid, const NodeWindow& window,
+                                                              HeightDatum datum, const std::string& what,
+                                                              const std::stop_token& stop,
+                                                              std::vector<PartReading>* readings) const {
+  auto heights = ReadGrids(node_grid, window, datum, what, stop, readings);
+  if (!heights) return heights;
+  if (const auto filled = FillWithFloor(node_grid, window, datum, *heights); !filled) {
+    return tl::unexpected(filled.error());
   }
   return heights;
 }
 
-// Edits have heights above the ellipsoid. Heights in another datum change by the same differences.
-Result<std::vector<float>> ElevationModel::Impl::ReadNodes(int level, const NodeWindow& window, HeightDatum datum,
-                                                           const std::string& what, const std::stop_token& stop) const {
-  const geo::Lattice& lattice = LatticeOf(level);
-  auto heights = ReadUnedited(level, window, datum, what, stop);
+template Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const geo::Lattice&, const NodeWindow&,
+                                                                       HeightDatum, const std::string&,
+                                                                       const std::stop_token&,
+                                                                       std::vector<PartReading>*) const;
+template Result<std::vector<float>> ElevationModel::Impl::ReadUnedited(const geo::MercatorGrid&, const NodeWindow&,
+                                                                       HeightDatum, const std::string&,
+                                                                       const std::stop_token&,
+                                                                       std::vector<PartReading>*) const;
+
+template <typename NodeGrid>
+Result<std::vector<float>> ElevationModel::Impl::ReadNodes(const NodeGrid& node_grid, const NodeWindow& window,
+                                                           HeightDatum datum, const std::string& what,
+                                                           const std::stop_token& stop) const {
+  if (floor_undulations == nullptr) datum = HeightDatum::kEllipsoid;  // the same heights
+  auto heights = ReadUnedited(node_grid, window, datum, what, stop);
   if (!heights) return heights;
-  const std::vector<std::size_t> which = EditsAt(lattice, window);
+  const std::vector<std::size_t> which = EditsAt(node_grid, window);
   if (which.empty()) return heights;
-  if (datum == HeightDatum::kEllipsoid || floor_undulations == nullptr) {
-    if (auto edited = ApplyEdits(lattice, window, which, *heights, stop); !edited) {
-      return tl::unexpected(std::move(edited).error());
-    }
-    return heights;
-  }
-  const auto before = ReadUnedited(level, window, HeightDatum::kEllipsoid, what, stop);
-  if (!before) return before;
-  std::vector<float> after = *before;
-  if (auto edited = ApplyEdits(lattice, window, which, after, stop); !edited) {
+  const auto zeros = ZerosOf(node_grid, window, which, datum, *heights, what, stop);
+  if (!zeros) return tl::unexpected(zeros.error());
+  if (auto edited = ApplyEdits(node_grid, window, which, {datum, *zeros}, *heights, stop); !edited) {
     return tl::unexpected(std::move(edited).error());
-  }
-  for (std::size_t k = 0; k < after.size(); ++k) {
-    if (after[k] == (*before)[k]) continue;
-    (*heights)[k] = RoundHeight(static_cast<double>((*heights)[k]) + static_cast<double>(after[k]) -
-                                static_cast<double>((*before)[k]));
   }
   return heights;
 }
@@ -290,18 +298,18 @@ Result<TileHeights> ElevationModel::Impl::Read(const geo::TileKey& key, HeightDa
   const bool is_certified = datum == HeightDatum::kEllipsoid;
   std::vector<PartReading> readings;
   if (!is_certified) {
-    auto read = ReadNodes(key.level, window, datum, what, stop);
+    auto read = ReadNodes(lattice, window, datum, what, stop);
     if (!read) return tl::unexpected(std::move(read).error());
     return TileHeights{lattice, lattice.cells + 3, *std::move(read)};
   }
-  auto heights = ReadUnedited(key.level, window, datum, what, stop, &readings);
+  auto heights = ReadUnedited(lattice, window, datum, what, stop, &readings);
   if (!heights) return tl::unexpected(std::move(heights).error());
   TileHeights tile{lattice, lattice.cells + 3, *std::move(heights)};
   const auto bound = BoundError(tile, window, std::move(readings), stop);
   if (!bound) return MakeError(bound.error().code, "{}: {}", what, bound.error().message);
   tile.source_error_m = *bound;
   if (const auto which = EditsAt(lattice, window); !which.empty()) {
-    const auto edited = ApplyEdits(lattice, window, which, tile.heights, stop, &tile.source_error_m);
+    const auto edited = ApplyEdits(lattice, window, which, {}, tile.heights, stop, &tile.source_error_m);
     if (!edited) return MakeError(edited.error().code, "{}: {}", what, edited.error().message);
   }
   return tile;
@@ -333,65 +341,50 @@ Result<double> ElevationModel::Impl::BoundError(const TileHeights& tile, const N
   return bound.bound();
 }
 
+Result<std::vector<float>> ElevationModel::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
+  TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
+  TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
+  return impl_->ReadNodes(LatticeOf(level), window, HeightDatum::kEllipsoid, fmt::format("an area of level {}", level),
+                          stop);
+}
+
 Result<std::vector<float>> ElevationModel::ReadMercator(int depth, const NodeWindow& window,
                                                         std::stop_token stop) const {
   TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
-  auto heights = impl_->ReadGrids(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
-                                  fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
-  if (!heights) return heights;
-  ReplaceVoids(*heights, impl_->floor);
-  if (const auto which = impl_->EditsAt(geo::MercatorGrid{depth}, window); !which.empty()) {
-    const auto edited = impl_->ApplyEdits(geo::MercatorGrid{depth}, window, which, *heights, stop);
-    if (!edited) return tl::unexpected(edited.error());
-  }
-  return heights;
+  return impl_->ReadNodes(geo::MercatorGrid{depth}, window, HeightDatum::kEllipsoid,
+                          fmt::format("Mercator pixels of depth {}", depth), stop);
 }
 
 Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                              std::stop_token stop) const {
   TERRACE_CHECK(depth >= 0 && depth <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
   TERRACE_CHECK(window.row >= 0 && window.row + window.rows <= geo::MercatorGrid{depth}.rows());
+  if (!has_geoid()) datum = HeightDatum::kEllipsoid;  // the same heights
   const geo::MercatorGrid grid{depth};
-  const auto read = [&](HeightDatum of) {
-    return impl_->ReadGrids(grid, window, of, fmt::format("Mercator pixels of depth {}", depth), stop, nullptr);
-  };
-  auto known = read(datum);
+  const std::string what = fmt::format("Mercator pixels of depth {}", depth);
+  auto known = impl_->ReadGrids(grid, window, datum, what, stop, nullptr);
   if (!known) return known;
   const auto which = impl_->EditsAt(grid, window);
   if (which.empty()) return known;
   std::vector<float> unedited = *known;
-  if (datum != HeightDatum::kEllipsoid) {
-    auto ellipsoidal = read(HeightDatum::kEllipsoid);
-    if (!ellipsoidal) return ellipsoidal;
-    unedited = *std::move(ellipsoidal);
+  if (const auto filled = impl_->FillWithFloor(grid, window, datum, unedited); !filled) {
+    return tl::unexpected(filled.error());
   }
-  std::vector<float> edited = unedited;
-  ReplaceVoids(edited, impl_->floor);
-  if (const auto done = impl_->ApplyEdits(grid, window, which, edited, stop); !done) {
+  const auto zeros = impl_->ZerosOf(grid, window, which, datum, unedited, what, stop);
+  if (!zeros) return tl::unexpected(zeros.error());
+  const bool has_voids = HasVoids(*known);
+  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *zeros}, *known, stop); !done) {
     return tl::unexpected(done.error());
   }
-  // A height that is not NaN here was set by an edit, even if it equals the floor.
-  std::vector<float> without_floor = unedited;
-  if (HasVoids(unedited)) {
-    if (const auto done = impl_->ApplyEdits(grid, window, which, without_floor, stop); !done) {
-      return tl::unexpected(done.error());
-    }
+  if (!has_voids) return known;
+  std::vector<float> edited = unedited;
+  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *zeros}, edited, stop); !done) {
+    return tl::unexpected(done.error());
   }
-  std::vector<double> undulations;  // empty: the datums are one
-  if (datum != HeightDatum::kEllipsoid && impl_->floor_undulations != nullptr && HasVoids(unedited)) {
-    auto read_undulations = impl_->floor_undulations->At(grid, window);
-    if (!read_undulations) return tl::unexpected(std::move(read_undulations).error());
-    undulations = *std::move(read_undulations);
-  }
+  // A void that is left in `known` was not set by an edit. One that fades into the floor shows there as well.
   for (std::size_t i = 0; i < edited.size(); ++i) {
-    if (IsVoid(unedited[i])) {
-      if (edited[i] == static_cast<float>(impl_->floor) && IsVoid(without_floor[i])) continue;
-      const bool converts = !undulations.empty() && !std::isnan(undulations[i]);
-      (*known)[i] = converts ? RoundHeight(static_cast<double>(edited[i]) - undulations[i]) : edited[i];
-    } else if (edited[i] != unedited[i]) {
-      (*known)[i] = datum == HeightDatum::kEllipsoid ? edited[i] : (*known)[i] + (edited[i] - unedited[i]);
-    }
+    if (IsVoid((*known)[i]) && edited[i] != unedited[i]) (*known)[i] = edited[i];
   }
   return known;
 }

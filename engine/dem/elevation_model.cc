@@ -340,10 +340,4 @@ bool ElevationModel::has_datum() const {
 
 bool ElevationModel::has_geoid() const { return impl_->floor_undulations != nullptr; }
 
-Result<std::vector<float>> ElevationModel::ReadNodes(int level, const NodeWindow& window, std::stop_token stop) const {
-  TERRACE_CHECK(level >= 0 && level <= geo::kMaxLevel && window.columns > 0 && window.rows > 0);
-  TERRACE_CHECK(window.row >= 0 && window.row + window.rows - 1 <= LatticeOf(level).rows());
-  return impl_->ReadNodes(level, window, HeightDatum::kEllipsoid, fmt::format("an area of level {}", level), stop);
-}
-
 }  // namespace terrace::dem

@@ -63,7 +63,8 @@ class ElevationModel {
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid.
+  // floor is converted to the datum of the last source that refers to a geoid. Heights that edits state in the datum of
+  // all sources that they may reach are not converted, here and in ReadKnownMercator and ReadPoints.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
@@ -78,8 +79,7 @@ class ElevationModel {
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
-  // kEllipsoid, or kSource for what a map calls elevation. An edit changes a height by as many metres in kSource as in
-  // kEllipsoid.
+  // kEllipsoid, or kSource for what a map calls elevation.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 

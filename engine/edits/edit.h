@@ -12,6 +12,7 @@
 
 #include "engine/common/box_index.h"
 #include "engine/common/content_hash.h"
+#include "engine/common/dem_types.h"
 
 namespace terrace::dem {
 
@@ -87,6 +88,9 @@ struct Edit {
   EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
   // Added to orthometric heights. Null until the sources are known, and for heights above the ellipsoid.
   std::shared_ptr<const EditUndulations> undulations;
+  // Whether the edit's heights, or those of its source, count from the same geoid as heights in kSource or in
+  // kOrthometric do wherever the edit may reach. ElevationModel sets it.
+  bool is_in_source_datum = false, is_in_orthometric = false;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision
   double factor = 1;                                         // of precision: share of the tile's error, 0 .. 1
@@ -116,6 +120,12 @@ struct Edit {
     return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
+  // Whether the edit applies to heights in a datum without a conversion of its own heights.
+  bool IsStatedIn(HeightDatum heights) const {
+    if (op == EditOp::kOffset) return true;
+    if (heights == HeightDatum::kEllipsoid) return undulations == nullptr;
+    return heights == HeightDatum::kSource ? is_in_source_datum : is_in_orthometric;
+  }
   // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double WeightAt(double distance_m) const {
     const double beyond = distance_m - half_width_m;

@@ -39,6 +39,11 @@ struct EmptyBox {
 };
 thread_local EmptyBox last_empty;
 
+// Whether an edit's target above the ellipsoid has to be converted to the heights' datum.
+bool IsConverted(const Edit& edit, const EditedDatum& datum) {
+  return datum.datum != HeightDatum::kEllipsoid && !edit.IsStatedIn(datum.datum);
+}
+
 // The edited height. `target`: NaN where a replacement has none.
 double Edited(EditOp op, double height, double target, double weight) {
   switch (op) {
@@ -76,8 +81,8 @@ bool EditSet::Any(const Box& degrees) const {
 
 template <typename NodeGrid>
 Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                            std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
-                            double* error_m) const {
+                            const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replaced,
+                            const std::stop_token& stop, double* error_m) const {
   if (which.empty()) return {};
   const WindowAxes axes(grid, window);
   const auto stride = static_cast<std::size_t>(window.columns);
@@ -93,6 +98,7 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
       if (!read) return tl::unexpected(std::move(read).error());
       other = *read;
     }
+    const bool converts = IsConverted(edit, datum);
     const double diagonal_m = std::hypot(axes.step() * edit.plane.east_m, axes.step() * edit.plane.north_m);
     for (const auto& part : axes.PartsOf(edit.reach)) {
       const int columns = part.last_column - part.first_column + 1;
@@ -113,8 +119,9 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
           } else if (edit.op == EditOp::kReplace) {
             target = static_cast<double>(other->heights[at]);
           } else if (weight > 0) {
-            target = row.TargetAt(x, place);
+            target = row.TargetAt(x, place, datum.datum);
           }
+          if (converts) target -= datum.undulations[at];
           if (errors) nodes[IndexAt(i - part.first_column, j - part.first_row, columns)] = {place, values[at], target};
           if (weight > 0 && !std::isnan(target)) values[at] = Edited(edit.op, values[at], target, weight);
         }
@@ -131,12 +138,14 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
 }
 
 template Result<void> EditSet::Apply(const geo::Lattice&, const NodeWindow&, std::span<const std::size_t>,
-                                     std::span<float>, const ReadReplacement&, const std::stop_token&, double*) const;
+                                     const EditedDatum&, std::span<float>, const ReadReplacement&,
+                                     const std::stop_token&, double*) const;
 template Result<void> EditSet::Apply(const geo::MercatorGrid&, const NodeWindow&, std::span<const std::size_t>,
-                                     std::span<float>, const ReadReplacement&, const std::stop_token&, double*) const;
+                                     const EditedDatum&, std::span<float>, const ReadReplacement&,
+                                     const std::stop_token&, double*) const;
 
-double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
-                        const std::function<double(const Edit&)>& replaced, EditRows& rows) const {
+double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, const EditedDatum& datum,
+                        double height, const std::function<double(const Edit&)>& replaced, EditRows& rows) const {
   bool is_in_hole = false;  // as of tiles, whatever other edits say
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
@@ -155,9 +164,10 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
       is_in_hole = true;
       continue;
     }
-    const double target = edit.op == EditOp::kOffset    ? edit.offset_m
-                          : edit.op == EditOp::kReplace ? replaced(edit)
-                                                        : row->second.TargetAt(point.x, place);
+    double target = edit.op == EditOp::kOffset    ? edit.offset_m
+                    : edit.op == EditOp::kReplace ? replaced(edit)
+                                                  : row->second.TargetAt(point.x, place, datum.datum);
+    if (IsConverted(edit, datum)) target -= datum.undulations.front();
     if (!std::isnan(target)) height = Edited(edit.op, height, target, weight);
   }
   if (is_in_hole) return std::numeric_limits<double>::quiet_NaN();

@@ -30,6 +30,14 @@ using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&
 // The row that each edit computed last, by the edit's number. Points on one parallel share it.
 using EditRows = std::unordered_map<std::size_t, EditRow>;
 
+// The datum of heights that are edited.
+struct EditedDatum {
+  HeightDatum datum = HeightDatum::kEllipsoid;
+  // Of its zero above the ellipsoid, metres, by node. Not used for edits that are stated in the datum
+  // (Edit::IsStatedIn), so empty if all are.
+  std::span<const double> undulations = {};
+};
+
 class EditSet {
  public:
   // `edits`: ResolveEdit has completed them (engine/dem/dem_impl.h).
@@ -43,19 +51,22 @@ class EditSet {
   // Whether Find would find any; faster if it would find many.
   bool Any(const Box& degrees) const;
 
-  // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. `NodeGrid`:
-  // geo::Lattice or geo::MercatorGrid. `error_m`, unless null: an upper bound of the distance between the surface
-  // through the tile's nodes, all finite, and the samples of the sources. It is replaced by the bound for the edited
-  // surface and the edited samples. The window then has a halo of one, which does not count. Errors: kCancelled.
+  // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. There an
+  // edit that is stated in the heights' datum leaves the stated height. `NodeGrid`: geo::Lattice or geo::MercatorGrid.
+  // `replaced`: heights in the datum if the edit is stated in it, else above the ellipsoid. `error_m`, unless null: of
+  // heights above the ellipsoid, an upper bound of the distance between the surface through the tile's nodes, all
+  // finite, and the samples of the sources. It is replaced by the bound for the edited surface and the edited samples.
+  // The window then has a halo of one, which does not count. Errors: kCancelled.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                     std::span<float> heights, const ReadReplacement& replaced, const std::stop_token& stop,
-                     double* error_m = nullptr) const;
+                     const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replaced,
+                     const std::stop_token& stop, double* error_m = nullptr) const;
 
-  // The same for one position. `height` and the result: NaN if there is none, as in holes. `replaced`: the height of a
-  // replacement at this position. `rows`: kept from one position to the next, empty at first.
-  double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, double height,
-                 const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
+  // The same for one position; `datum` has one undulation or none. `height` and the result: NaN if there is none, as in
+  // holes. `replaced`: the height of a replacement at this position. `rows`: kept from one position to the next, empty
+  // at first.
+  double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, const EditedDatum& datum,
+                 double height, const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
 
   // A range of heights after the edits. `replaced`: the range of a replacement.
   HeightRange Extended(HeightRange range, std::span<const std::size_t> which,

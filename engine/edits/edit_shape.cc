@@ -169,16 +169,22 @@ double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place, s
   return slope[0] * point.x + slope[1] * point.y + slope[2];
 }
 
-double Target(const Edit& edit, PlanPoint point, const EditPlace& place, std::span<const std::uint32_t> near) {
+double Target(const Edit& edit, PlanPoint point, const EditPlace& place, std::span<const std::uint32_t> near,
+              HeightDatum datum) {
   const double stated = StatedTarget(edit, point, place, near);
-  return edit.undulations == nullptr ? stated : stated + edit.undulations->At(point);
+  if (edit.undulations == nullptr || edit.IsStatedIn(datum)) return stated;
+  return stated + edit.undulations->At(point);
 }
 
 }  // namespace
 
-double EditRow::TargetAt(double x, const EditPlace& place) const { return Target(edit_, {x, y_}, place, triangles_); }
+double EditRow::TargetAt(double x, const EditPlace& place, HeightDatum datum) const {
+  return Target(edit_, {x, y_}, place, triangles_, datum);
+}
 
-double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) { return Target(edit, point, place, {}); }
+double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place) {
+  return Target(edit, point, place, {}, HeightDatum::kEllipsoid);
+}
 
 // The ear with the lowest number is cut off next. For every other convex corner one point is known that lies in its
 // triangle. The corner is tested again only if this point goes, then from the next point on, or if a neighbour goes. So
@@ -337,6 +343,7 @@ void HashContent(Edit& edit) {
   }
   if (edit.undulations != nullptr) {
     for (const double value : edit.undulations->values) hasher.Add(value);
+    hasher.Add(edit.is_in_source_datum);
   }
   edit.hash = hasher.Hash();
 }

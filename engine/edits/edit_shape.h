@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "engine/common/dem_types.h"
 #include "engine/edits/edit.h"
 
 namespace terrace::dem {
@@ -24,8 +25,9 @@ class EditRow {
   EditRow(const Edit& edit, double y, double margin_m = 0);
   EditPlace At(double x) const;
   double y() const { return y_; }
-  // The height that the edit aims at, at a point of the row and its At. Precondition: flatten, slope, carve or raise.
-  double TargetAt(double x, const EditPlace& place) const;
+  // The height that the edit aims at, at a point of the row and its At: as stated if the edit is stated in `datum`,
+  // else above the ellipsoid. Precondition: flatten, slope, carve or raise.
+  double TargetAt(double x, const EditPlace& place, HeightDatum datum = HeightDatum::kEllipsoid) const;
   // Where the row enters and leaves polygons, in turns, ascending.
   const std::vector<double>& crossings() const { return crossings_; }
 
@@ -42,7 +44,7 @@ class EditRow {
   std::vector<std::uint32_t> triangles_;  // of a slope, that the row meets
 };
 
-// EditRow::TargetAt of any point.
+// EditRow::TargetAt of any point, above the ellipsoid.
 double TargetAt(const Edit& edit, PlanPoint point, const EditPlace& place);
 
 // Divides a simple polygon into triangles by cutting off ears. Empty if it is not simple.

@@ -121,10 +121,10 @@ TEST(EditSet, StopsBetweenRows) {
   const ReadReplacement none = [](const Edit&) -> Result<const ReplacedHeights*> { return nullptr; };
   std::vector<float> heights(25, 0);
   std::stop_source stop;
-  ASSERT_TRUE(edits.Apply(lattice, window, which, heights, none, stop.get_token()).has_value());
+  ASSERT_TRUE(edits.Apply(lattice, window, which, {}, heights, none, stop.get_token()).has_value());
   EXPECT_EQ(heights[12], 100);
   stop.request_stop();
-  const auto stopped = edits.Apply(lattice, window, which, heights, none, stop.get_token());
+  const auto stopped = edits.Apply(lattice, window, which, {}, heights, none, stop.get_token());
   ASSERT_FALSE(stopped.has_value());
   EXPECT_EQ(stopped.error().code, ErrorCode::kCancelled);
 }
@@ -141,7 +141,7 @@ TEST(EditSet, HasTheSameHeightAtAPointInAnyOrder) {
     for (int i = -20; i <= 20; ++i) {
       const GeoPosition at{10 + i * 0.01, latitude};
       EditRows fresh;
-      EXPECT_EQ(edits.ApplyAt(at, which, 7, none, kept), edits.ApplyAt(at, which, 7, none, fresh));
+      EXPECT_EQ(edits.ApplyAt(at, which, {}, 7, none, kept), edits.ApplyAt(at, which, {}, 7, none, fresh));
     }
   }
   EXPECT_EQ(kept.size(), 1u);
