@@ -49,9 +49,11 @@ Result<Manifest> ReadManifest(const std::string& place) {
       return MakeError(ErrorCode::kNotFound, "there is no {}; give the folder or file that 'terrace bake' wrote",
                        place);
     }
-    return MakeError(ErrorCode::kNotFound,
-                     "{} has no {}: it is no archive, or one whose bake has not finished; run the bake again to go on",
-                     place, kManifestFile);
+    return MakeError(
+        ErrorCode::kNotFound,
+        "{} has no {}: it is no archive, or its bake has not finished, or the file was removed; run the same "
+        "bake again: it keeps the files that are there, and writes it",
+        place, kManifestFile);
   }
   if (!json) return tl::unexpected(json.error());
   return WithPlace(path, ParseManifest(*json));

@@ -263,8 +263,8 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   }
   if (!is_known && !content.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
-                     place, content);
+                     "{}: holds {}, but neither {} nor {} says of which bake; give an empty or a new folder with --out",
+                     place, content, kIdentityFile, archive::kManifestFile);
   }
   const Result<bool> created = CreateFile(file.string(), ToJson(identity));
   if (!created) {
@@ -318,7 +318,6 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
   std::error_code ignored;
   fs::remove_all(fs::path(place) / kExportFolder, ignored);  // a bucket has none
   Remove(fs::path(place) / kPlaceIdFile);
-  Remove(fs::path(place) / kIdentityFile);
 }
 
 Result<std::string> PlaceId(const std::string& place) {
@@ -332,7 +331,7 @@ Result<std::string> PlaceId(const std::string& place) {
                    created ? ErrorText(EIO) : created.error().message);
 }
 
-bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
+bool TidyIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
@@ -340,7 +339,6 @@ bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::
   }
   RemoveLeftovers(place, folders);
   Remove(fs::path(place) / kPlaceIdFile);
-  Remove(fs::path(place) / kIdentityFile);
   return true;
 }
 

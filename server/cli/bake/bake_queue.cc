@@ -156,7 +156,7 @@ std::string WorkerName() {
 bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets) {
   std::vector<archive::Manifest> manifests;
   std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
-  if (!bake::RemoveNotesIfFinished(place, manifests)) return false;
+  if (!bake::TidyIfFinished(place, manifests)) return false;
   PrintMessage(fmt::format("{}: is complete already; --finish instead of --queue checks every file", place));
   return true;
 }
