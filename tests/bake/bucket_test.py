@@ -203,7 +203,7 @@ class Bucket(BakeCase):
         self.store.objects[f"{BELOW}/{UNIT}"] = bytes(changed)
         self.store.objects[BELOW + "/top.pmtiles"] = self.expected["top.pmtiles"][:-1]
         _, errors = self.bake("--finish", code=1)
-        self.assertIn("unit 7-132-96 of terrain is missing", errors)
+        self.assertIn("unit 7-132-96 of terrain cannot be used", errors)
         out, _ = self.bake("--json")
         self.assertEqual(self.outcomes(out), ["baked"] * 2 + ["kept"] * 7)
         self.expect_all()

@@ -44,6 +44,33 @@ class Finish(BakeCase):
             self.assertEqual((done.returncode, set(self.units(done).values())), (0, {"kept"}), done.stderr)
             self.expect_equal(place)
 
+    def test_finish_says_which_units_are_missing_or_cannot_be_used(self):
+        place, newer = self.place("damaged"), self.place("newer")
+        shutil.copytree(self.reference, place)
+        self.assertEqual(self.run_bake("--out", newer, "--no-gzip").returncode, 0)
+        missing, damaged, cut, foreign = sorted((place / "units").glob("*.pmtiles"))[:4]
+        missing.unlink()
+        data = bytearray(damaged.read_bytes())
+        data[-1] ^= 1
+        damaged.write_bytes(data)
+        cut.write_bytes(cut.read_bytes()[:-1])
+        shutil.copy(newer / "units" / foreign.name, foreign)
+        done = self.run_bake("--out", place, "--finish", "--json")
+        self.assertEqual(done.returncode, 1)
+        self.assertEqual({unit: outcome for unit, outcome in self.units(done).items() if outcome != "kept"},
+                         {missing.stem: "missing", damaged.stem: "unusable", cut.stem: "unusable", foreign.stem: "unusable"})
+        for said in (f"unit {missing.stem} of terrain is missing\n",
+                     f"unit {damaged.stem} of terrain cannot be used: {damaged} is damaged: the checksum of tile",
+                     f"unit {cut.stem} of terrain cannot be used: {cut} is damaged",
+                     f"unit {foreign.stem} of terrain cannot be used: {foreign} was baked from other sources or with other options",
+                     "4 of 17 files are not done, and no manifest was written; run the same command without --finish, or the shards"):
+            self.assertIn(said, done.stderr)
+        done = self.run_bake("--out", place, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual({unit for unit, outcome in self.units(done).items() if outcome == "baked"},
+                         {missing.stem, damaged.stem, cut.stem, foreign.stem})
+        self.expect_equal(place)
+
     def test_a_place_that_does_not_name_its_bake_is_refused(self):
         place = self.place("nameless")
         shutil.copytree(self.reference, place, ignore=shutil.ignore_patterns("*.json"))
