@@ -10,7 +10,7 @@
 namespace terrace::archive {
 namespace {
 
-constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{64} << 20;
 
 Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) {
   if (manifest) return manifest;

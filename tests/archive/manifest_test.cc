@@ -95,6 +95,21 @@ TEST(ManifestTest, AnotherContentThanTheChecksumsIsRefused) {
   EXPECT_GT(digits, 100);
 }
 
+// A value of two bytes takes fifty in memory.
+TEST(ManifestTest, TooManyValuesAreRefused) {
+  const std::string json = WithoutChecksum(ToJson(FullManifest()));
+  const auto with = [&](std::size_t values) {
+    std::string all = "{\"unknown\": [0";
+    for (std::size_t i = 0; i < values / 2; ++i) all += ",[0]";
+    return all + "]," + json.substr(json.find('{') + 1);
+  };
+  EXPECT_TRUE(ParseManifest(with(1'900'000)));
+  for (const Result<Manifest>& read : {ParseManifest(with(2'000'000)), ManifestOf("a.pmtiles", with(2'000'000))}) {
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().message.find("it has more than 2000000 values"), std::string::npos) << read.error().message;
+  }
+}
+
 TEST(ManifestTest, NonsenseIsRefused) {
   const std::string json = WithoutChecksum(ToJson(FullManifest()));
   ASSERT_TRUE(ParseManifest(json));
