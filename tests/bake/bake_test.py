@@ -178,6 +178,23 @@ class Bake(BakeCase):
         self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
         self.expect_equal(updated, fresh)
 
+    def test_update_takes_the_formats_that_a_changed_option_does_not_concern(self):
+        formats = ("--format", "terrain,glb,png")
+        older, newer = self.place("older"), self.place("newer")
+        self.assertEqual(self.run_bake("--out", older, *formats, levels="0-8").returncode, 0)
+        config = self.make_sources("thanked")
+        options = json.loads(config.read_text())
+        options["datasets"][0]["attribution"] = "swisstopo"
+        config.write_text(json.dumps(options))
+        done = self.run_bake("--out", newer, "--update", older, *formats, "--json", config=config, levels="0-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        self.assertEqual({(line["format"], line["outcome"]) for line in lines if "unit" in line},
+                         {("terrain", "copied"), ("glb", "baked"), ("png", "copied")})
+        fresh = self.place("fresh")
+        self.assertEqual(self.run_bake("--out", fresh, *formats, config=config, levels="0-8").returncode, 0)
+        self.expect_equal(newer, fresh)
+
     def test_update_takes_the_formats_of_a_bake_killed_between_their_manifests(self):
         killed, updated = self.place("killed"), self.place("updated")
         formats = ("--format", "terrain,glb")
