@@ -46,18 +46,20 @@ struct ProcessState {
   }
 };
 
+constexpr const char* kUnknown = "unknown";
+
 // Identifies the namespace of process numbers: a container has its own.
 std::string NumberSpace() {
   std::error_code error;
   const std::string space = fs::read_symlink("/proc/self/ns/pid", error).string();
-  return error ? "unknown" : space;
+  return error ? kUnknown : space;
 }
 
-// Identifies the boot of the kernel.
+// Identifies the machine, and a boot of it. Names of hosts do not: those of containers are often equal.
 std::string BootOf() {
   std::string boot;
   std::istringstream(ReadText("/proc/sys/kernel/random/boot_id")) >> boot;
-  return boot.empty() ? "unknown" : boot;
+  return boot.empty() ? kUnknown : boot;
 }
 
 // The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers.
@@ -69,11 +71,9 @@ struct Owner {
     std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space;
     return owner;
   }
-  // Whether the process has certainly ended. Nothing is known about processes of other hosts and containers.
+  // Whether the process has certainly ended. Nothing is known about processes of other machines, boots and containers.
   bool HasEnded() const {
-    if (host != HostName()) return false;
-    if (boot != BootOf()) return true;
-    if (space != NumberSpace()) return false;
+    if (boot == kUnknown || boot != BootOf() || space != NumberSpace()) return false;
     const long number = ParseNumber<long>(pid).value_or(0);
     if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
@@ -278,7 +278,7 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 namespace {
 
 // Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock
-// of another host stays, because it is not known here whether its owner still runs.
+// of another machine stays, because it is not known here whether its owner still runs.
 void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
   std::vector<fs::path> leftovers;
   for (const fs::path& folder : folders) {

@@ -18,8 +18,9 @@ std::string ArchivePlace(const std::string& place, const archive::Manifest& mani
 class PlaceLock {
  public:
   // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. Takes over the lock of a
-  // process of this host that has ended. kUnavailable: the folder cannot be created or written. kOverloaded: another
-  // bake works there; the message says which one and what to do.
+  // process that has ended, if it ran on this machine since its last boot, and in the same container. kUnavailable: the
+  // folder cannot be created or written. kOverloaded: another bake works there; the message says which one and what to
+  // do.
   static Result<PlaceLock> Take(const std::string& place, const std::string& shard);
   PlaceLock(PlaceLock&& other) noexcept;
   PlaceLock& operator=(PlaceLock&&) = delete;
@@ -51,8 +52,8 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 inline constexpr const char* kExportFolder = "export";
 
 // Removes what only an unfinished bake needs: the number of the place (PlaceId), unfinished files and exports of killed
-// processes, and locks of processes of this host that have ended. The identity stays: with it, a bake that loses its
-// manifest is an unfinished one, whose files are checked and kept.
+// processes, and locks of processes of which it is known that they have ended. The identity stays: with it, a bake that
+// loses its manifest is an unfinished one, whose files are checked and kept.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.

@@ -1,5 +1,9 @@
 """What `terrace bake` does with files that are there: finish_test.py BINARY."""
+import os
+import pathlib
 import shutil
+import socket
+import subprocess
 import unittest
 
 from bake_case import BakeCase, files_of
@@ -80,6 +84,25 @@ class Finish(BakeCase):
             self.assertEqual(done.returncode, 2, done.stderr)
             self.assertIn("neither bake.json nor manifest.json says of which bake; give an empty or a new folder", done.stderr)
         self.assertEqual(files_of(place), files)
+
+    def test_the_lock_of_another_machine_with_the_same_name_stays(self):
+        place, host = self.place("locked"), socket.gethostname()
+        place.mkdir()
+        boot = pathlib.Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        space = os.readlink("/proc/self/ns/pid")
+        ended = subprocess.Popen("true")
+        ended.wait()
+        lock = place / "bake.lock"
+        for other in (f"{boot[::-1]} {space}", f"{boot} pid:[1]", f"unknown {space}"):
+            lock.write_text(f"{host} {ended.pid} 1 {other}\n")
+            done = self.run_bake("--out", place)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn(f"process {ended.pid} on host {host} is baking there; wait for it, or remove {lock}", done.stderr)
+            self.assertEqual(files_of(place), ["bake.lock"])
+        lock.write_text(f"other-name {ended.pid} 1 {boot} {space}\n")
+        done = self.run_bake("--out", place)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.expect_equal(place)
 
     def test_files_that_are_not_of_a_bake_stay(self):
         place = self.place("foreign")
