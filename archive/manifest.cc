@@ -10,7 +10,7 @@
 namespace terrace::archive {
 namespace {
 
-constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{64} << 20;
 
 Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) {
   if (manifest) return manifest;
@@ -49,9 +49,11 @@ Result<Manifest> ReadManifest(const std::string& place) {
       return MakeError(ErrorCode::kNotFound, "there is no {}; give the folder or file that 'terrace bake' wrote",
                        place);
     }
-    return MakeError(ErrorCode::kNotFound,
-                     "{} has no {}: it is no archive, or one whose bake has not finished; run the bake again to go on",
-                     place, kManifestFile);
+    return MakeError(
+        ErrorCode::kNotFound,
+        "{} has no {}: it is no archive, or its bake has not finished, or the file was removed; run the same "
+        "bake again: it keeps the files that are there, and writes it",
+        place, kManifestFile);
   }
   if (!json) return tl::unexpected(json.error());
   return WithPlace(path, ParseManifest(*json));

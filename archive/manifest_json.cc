@@ -22,6 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormatMember = "terrace_archive";
+constexpr const char* kChecksumMember = "checksum";
 
 // Archives have no tiles in other codings.
 constexpr Names<tiler::Coding, 2> kCodingNames = {
@@ -69,6 +70,26 @@ T WholeOf(const Json& json, T min, T max) {
   return json.get<T>();
 }
 constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
+
+// Parses JSON that may be made to harm: a value of two bytes takes fifty in memory. Throws Wrong, and what Json::parse
+// throws.
+Json ParseBounded(std::string_view text) {
+  // Ten times as many as the manifest of all land of the Earth at 30 m has.
+  constexpr std::ptrdiff_t kMaxValues = 2'000'000;
+  // One of these comes before each value but the first.
+  const auto comes_before_value = [](char c) { return c == ',' || c == '[' || c == '{'; };
+  if (std::ranges::count_if(text, comes_before_value) >= kMaxValues) {
+    throw Wrong(fmt::format("it has more than {} values, which no bake writes; copy it again", kMaxValues));
+  }
+  return Json::parse(text);
+}
+
+// Of all members but the checksum, without whitespace: the manifest in the metadata of a single file has other
+// whitespace than a file of its own.
+std::string ChecksumOf(const Json& others) {
+  const std::string text = others.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return fmt::format("{:016x}", XXH3_64bits(text.data(), text.size()));
+}
 
 Json DatasetJson(const BakedDataset& dataset) {
   const auto& [name, attribution, generation, error_fraction, glb_compression, bounds, heights, floor_m, has_datum,
@@ -204,11 +225,21 @@ UnitEntry ReadUnit(const Json& json) {
   return unit;
 }
 
-Manifest Read(const Json& json) {
+Manifest Read(Json json) {
   const int format = WholeOf<int>(json.at(kFormatMember), 1, 1 << 30);
   if (format > kFormatVersion) {
     throw Wrong(fmt::format("it has format {}, and this program reads formats up to {}; serve it with a newer terrace",
                             format, kFormatVersion));
+  }
+  if (json.contains(kChecksumMember)) {  // manifests of earlier builds have none
+    const std::string stated = json.at(kChecksumMember).get<std::string>();
+    json.erase(kChecksumMember);
+    if (stated != ChecksumOf(json)) {
+      throw Wrong(
+          fmt::format("its content does not have the {} that it states, so that it was changed or damaged; copy "
+                      "it again, or remove it and run the bake again",
+                      kChecksumMember));
+    }
   }
   Manifest manifest;
   manifest.product = json.at("product").get<std::string>();
@@ -261,27 +292,31 @@ std::string ToJson(const Manifest& manifest) {
                      {"bytes", unit.bytes},
                      {"xxh3", unit.xxh3}});
   }
+  json[kChecksumMember] = ChecksumOf(json);
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 Result<Manifest> ParseManifest(std::string_view text) {
   try {
-    return Read(Json::parse(text));
+    return Read(ParseBounded(text));
   } catch (const Wrong& wrong) {
     return MakeError(ErrorCode::kInvalidArgument, "the manifest is wrong: {}", wrong.what());
   } catch (const nlohmann::json::exception& exception) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "this is no manifest of an archive ({}); copy it again, or remove it and bake again",
+                     "this is no manifest of an archive ({}); copy it again, or remove it and run the bake again",
                      exception.what());
   }
 }
 
 Result<std::string> ManifestIn(std::string_view metadata) {
-  const Json json = Json::parse(metadata, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains(kManifestMember)) {
-    return MakeError(ErrorCode::kInvalidArgument, "it holds no manifest, so that another program wrote it");
+  try {
+    const Json json = ParseBounded(metadata);
+    if (json.is_object() && json.contains(kManifestMember)) return json.at(kManifestMember).dump();
+  } catch (const Wrong& wrong) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}", wrong.what());
+  } catch (const nlohmann::json::exception&) {  // it is no JSON
   }
-  return json.at(kManifestMember).dump();
+  return MakeError(ErrorCode::kInvalidArgument, "it holds no manifest, so that another program wrote it");
 }
 
 }  // namespace terrace::archive

@@ -13,7 +13,7 @@ namespace terrace::archive {
 
 // JSON with the manifest as its member kManifestMember: metadata of an archive in one file.
 inline constexpr const char* kManifestMember = "terrace";
-// kInvalidArgument: the text is not a JSON object or has no such member.
+// kInvalidArgument: the text is not a JSON object, has no such member, or has too many values.
 Result<std::string> ManifestIn(std::string_view metadata);
 
 // The number that 16 hexadecimal digits state; nothing for any other text.

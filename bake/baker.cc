@@ -187,15 +187,23 @@ class Run {
     return unit;
   }
 
-  // Creates the file of a target. False: it is there already, or is reported as missing.
+  // Creates the file of a target. False: it is there already, or is reported as missing or unusable.
   Result<bool> OpenOutput(std::size_t index, OpenUnit::Output& output) {
     const Unit& unit = plan_.units[index].unit;
     const Target& to = targets_[output.target];
     output.key = UnitKey(dataset_, to.manifest, unit);
-    if (!to.create && TakeFinished(index, output.target, output.key)) return false;
-    if (options_.only_verify) {
-      Report(index, {output.target, {unit.name, output.key, 0, 0, {}}, UnitOutcome::kMissing, 0, {}});
-      return false;
+    if (!to.create) {
+      const Result<void> taken = TakeFinished(index, output.target, output.key);
+      if (taken) return false;
+      if (options_.only_verify) {
+        const bool is_missing = taken.error().code == ErrorCode::kNotFound;
+        Report(index, {output.target,
+                       {unit.name, output.key, 0, 0, {}},
+                       is_missing ? UnitOutcome::kMissing : UnitOutcome::kUnusable,
+                       0,
+                       is_missing ? std::string() : taken.error().message});
+        return false;
+      }
     }
     auto writer = to.create ? to.create() : archive::CreateUnit(to.place, unit.name, {to.manifest.kind, output.key});
     if (!writer) return tl::unexpected(writer.error());
@@ -212,27 +220,28 @@ class Run {
     std::condition_variable_any().wait_for(lock, options_.stop, kPause * attempt, [] { return false; });
   }
 
-  // Takes a file that exists with this key, or copies one from the old archive. False: there is none.
-  bool TakeFinished(std::size_t index, std::size_t target, std::uint64_t key) {
+  // Takes a file that exists with this key, or copies one from the old archive. kNotFound: there is no file. Other
+  // errors: it is not the unit's.
+  Result<void> TakeFinished(std::size_t index, std::size_t target, std::uint64_t key) {
     const Clock::time_point start = Clock::now();
     const Target& to = targets_[target];
     const std::string& name = plan_.units[index].unit.name;
     UnitOutcome outcome = UnitOutcome::kKept;
     auto unit_file = archive::VerifyUnit(to.place, name, {to.manifest.kind, key});
     if (unit_file && unit_file->tiles != CountTiles(plan_.units[index].unit.tiles)) {
-      unit_file = MakeError(ErrorCode::kInvalidArgument, "the file lacks tiles");
+      unit_file = MakeError(ErrorCode::kInvalidArgument, "{}/{} lacks tiles", to.place, archive::UnitPath(name));
     }
     const auto old = to.old_units.find(name);
     if (!unit_file && old != to.old_units.end() && old->second.key == key && !options_.only_verify) {
       outcome = UnitOutcome::kCopied;
       unit_file = CopyUnit(to.old_place, to.place, old->second);
     }
-    if (!unit_file) return false;
+    if (!unit_file) return tl::unexpected(std::move(unit_file.error()));
     counters_.skipped += unit_file->tiles;
     Report(
         index,
         {target, {name, key, unit_file->tiles, unit_file->bytes, unit_file->xxh3}, outcome, SecondsSince(start), {}});
-    return true;
+    return {};
   }
 
   Result<void> BakePart(OpenUnit& unit, const Part& part) {

@@ -47,7 +47,9 @@ enum class UnitOutcome : std::uint8_t {
   kKept,    // its file was there already
   kCopied,  // taken from the old archive
   kFailed,
-  kMissing,  // not there (only_verify)
+  // With only_verify:
+  kMissing,   // there is no file
+  kUnusable,  // its file is damaged, or of other sources or options
 };
 
 // A unit of one archive, done or given up.
@@ -56,7 +58,7 @@ struct UnitReport {
   archive::UnitEntry entry;  // of a failed unit only name and key
   UnitOutcome outcome = UnitOutcome::kBaked;
   double seconds = 0;
-  std::string message;  // of a failed unit: why
+  std::string message;  // of a failed or unusable unit: why
 };
 
 // The progress over all archives, for displays.
@@ -71,7 +73,7 @@ struct Counters {
 
 struct BakeOptions {
   unsigned threads = 1;
-  bool only_verify = false;  // bake nothing: units that are not there are kMissing
+  bool only_verify = false;  // bake nothing: units without a right file are kMissing or kUnusable
   // Called for each unit, one call at a time. May be empty.
   std::function<void(const UnitReport&)> on_unit = {};
   std::stop_token stop = {};

@@ -46,18 +46,20 @@ struct ProcessState {
   }
 };
 
+constexpr const char* kUnknown = "unknown";
+
 // Identifies the namespace of process numbers: a container has its own.
 std::string NumberSpace() {
   std::error_code error;
   const std::string space = fs::read_symlink("/proc/self/ns/pid", error).string();
-  return error ? "unknown" : space;
+  return error ? kUnknown : space;
 }
 
-// Identifies the boot of the kernel.
+// Identifies the machine, and a boot of it. Names of hosts do not: those of containers are often equal.
 std::string BootOf() {
   std::string boot;
   std::istringstream(ReadText("/proc/sys/kernel/random/boot_id")) >> boot;
-  return boot.empty() ? "unknown" : boot;
+  return boot.empty() ? kUnknown : boot;
 }
 
 // The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers.
@@ -69,11 +71,9 @@ struct Owner {
     std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space;
     return owner;
   }
-  // Whether the process has certainly ended. Nothing is known about processes of other hosts and containers.
+  // Whether the process has certainly ended. Nothing is known about processes of other machines, boots and containers.
   bool HasEnded() const {
-    if (host != HostName()) return false;
-    if (boot != BootOf()) return true;
-    if (space != NumberSpace()) return false;
+    if (boot == kUnknown || boot != BootOf() || space != NumberSpace()) return false;
     const long number = ParseNumber<long>(pid).value_or(0);
     if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
@@ -263,8 +263,8 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
   }
   if (!is_known && !content.empty()) {
     return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: holds {}, but nothing says that it is of a bake; give an empty or a new folder with --out",
-                     place, content);
+                     "{}: holds {}, but neither {} nor {} says of which bake; give an empty or a new folder with --out",
+                     place, content, kIdentityFile, archive::kManifestFile);
   }
   const Result<bool> created = CreateFile(file.string(), ToJson(identity));
   if (!created) {
@@ -278,7 +278,7 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 namespace {
 
 // Removes what killed processes have left: unfinished files, and the locks of those that have certainly ended. A lock
-// of another host stays, because it is not known here whether its owner still runs.
+// of another machine stays, because it is not known here whether its owner still runs.
 void RemoveLeftovers(const std::string& place, const std::vector<fs::path>& folders) {
   std::vector<fs::path> leftovers;
   for (const fs::path& folder : folders) {
@@ -318,7 +318,6 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
   std::error_code ignored;
   fs::remove_all(fs::path(place) / kExportFolder, ignored);  // a bucket has none
   Remove(fs::path(place) / kPlaceIdFile);
-  Remove(fs::path(place) / kIdentityFile);
 }
 
 Result<std::string> PlaceId(const std::string& place) {
@@ -332,7 +331,7 @@ Result<std::string> PlaceId(const std::string& place) {
                    created ? ErrorText(EIO) : created.error().message);
 }
 
-bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
+bool TidyIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests) {
   std::vector<fs::path> folders = {place};
   for (const archive::Manifest& manifest : manifests) {
     folders.emplace_back(ArchivePlace(place, manifest, manifests.size() == 1));
@@ -340,7 +339,6 @@ bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::
   }
   RemoveLeftovers(place, folders);
   Remove(fs::path(place) / kPlaceIdFile);
-  Remove(fs::path(place) / kIdentityFile);
   return true;
 }
 

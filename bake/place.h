@@ -18,8 +18,9 @@ std::string ArchivePlace(const std::string& place, const archive::Manifest& mani
 class PlaceLock {
  public:
   // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. Takes over the lock of a
-  // process of this host that has ended. kUnavailable: the folder cannot be created or written. kOverloaded: another
-  // bake works there; the message says which one and what to do.
+  // process that has ended, if it ran on this machine since its last boot, and in the same container. kUnavailable: the
+  // folder cannot be created or written. kOverloaded: another bake works there; the message says which one and what to
+  // do.
   static Result<PlaceLock> Take(const std::string& place, const std::string& shard);
   PlaceLock(PlaceLock&& other) noexcept;
   PlaceLock& operator=(PlaceLock&&) = delete;
@@ -50,8 +51,9 @@ Result<void> ClaimPlace(const std::string& place, const BakeIdentity& identity, 
 // The folder in a place where another form of the finished bake is written before it is renamed to its own place.
 inline constexpr const char* kExportFolder = "export";
 
-// Removes what only an unfinished bake needs: the identity, unfinished files and exports of killed processes, and locks
-// of processes of this host that have ended.
+// Removes what only an unfinished bake needs: the number of the place (PlaceId), unfinished files and exports of killed
+// processes, and locks of processes of which it is known that they have ended. The identity stays: with it, a bake that
+// loses its manifest is an unfinished one, whose files are checked and kept.
 void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& manifests);
 
 // Workers of a job share a place.
@@ -59,9 +61,9 @@ void TidyPlace(const std::string& place, const std::vector<archive::Manifest>& m
 // A random number that is kept in the place until the bake is finished: workers that have the same one write into the
 // same place, wherever it is mounted. kUnavailable: the place cannot be written.
 Result<std::string> PlaceId(const std::string& place);
-// Returns whether the archives there are finished. If so, removes the identity (ClaimPlace), the number (PlaceId), and
-// what killed processes have left, as TidyPlace does.
-bool RemoveNotesIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
+// Returns whether the archives there are finished. If so, removes the number (PlaceId) and what killed processes have
+// left, as TidyPlace does.
+bool TidyIfFinished(const std::string& place, const std::vector<archive::Manifest>& manifests);
 // Removes the identity and the number if the place holds nothing else but the lock `own_lock`: the bake was
 // refused.
 void RemoveNotesIfEmpty(const std::string& place, const std::string& own_lock);

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <chrono>
 #include <fstream>
+#include <random>
 #include <sstream>
 #include <system_error>
 #include <thread>
@@ -26,7 +27,8 @@ std::string HostName() {
 }
 
 std::string OwnPartial(const std::string& file) {
-  return fmt::format("{}.{}.{}.partial", file, HostName(), ::getpid());
+  static const unsigned random = std::random_device()();  // processes of containers may have the same host and number
+  return fmt::format("{}.{}.{}.{:08x}.partial", file, HostName(), ::getpid(), random);
 }
 
 bool Exists(const fs::path& file) {

@@ -12,7 +12,7 @@ namespace terrace::bake {
 namespace {
 
 // Raise it with every change of the layout of the units' files or of this key.
-constexpr int kKeyVersion = 1;
+constexpr int kKeyVersion = 2;
 
 void AddRanges(dem::ContentHasher& hasher, const std::vector<geo::TileRange>& ranges) {
   hasher.Add(std::uint64_t{ranges.size()});
@@ -29,6 +29,38 @@ void AddKind(dem::ContentHasher& hasher, const tiler::TileRequest& kind) {
   }
   const auto& [normals, water_mask, metadata] = kind.extensions;
   for (const bool value : {normals, water_mask, metadata}) hasher.Add(value);
+}
+
+// The options of the dataset that tiles of this kind depend on.
+void AddOptions(dem::ContentHasher& hasher, const tiler::Dataset& dataset, const tiler::TileRequest& kind) {
+  // All members are named, so that a new one fails to compile until it is considered here.
+  const auto& [name, attribution, error_fraction, mesh_options, glb, model, baked, baked_files, water, imagery,
+               metadata_availability, generation, unedited_generation, options_hash] = dataset;
+  hasher.Add(error_fraction);
+  if (kind.format == tiler::TileFormat::kHeightPng) return;
+  hasher.Add(static_cast<int>(mesh_options.criterion));
+  hasher.Add(mesh_options.compact);
+  if (kind.format == tiler::TileFormat::kGlb) {
+    hasher.AddText(glb.generator);
+    hasher.AddText(attribution);
+    if (kind.compression == proto::GlbCompression::kDraco) {
+      hasher.Add(glb.draco.speed);
+      hasher.Add(glb.draco.normal_bits);
+    }
+    if (imagery.image) {
+      hasher.Add(imagery.image->fingerprint());
+      hasher.Add(imagery.side);
+      hasher.Add(imagery.quality);
+      hasher.AddText(imagery.attribution);
+    }
+    return;
+  }
+  if (kind.extensions.water_mask) {
+    hasher.Add(water.mask ? water.mask->fingerprint() : 0);
+    hasher.Add(water.sea_level_m.has_value());
+    hasher.Add(water.sea_level_m.value_or(0));
+  }
+  if (kind.extensions.metadata) hasher.Add(metadata_availability);
 }
 
 // The sources of height tiles. A geodetic tile of the level above the unit's is as wide as the unit, and is read at
@@ -57,9 +89,10 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
   dem::ContentHasher hasher;
   hasher.Add(kKeyVersion);
   hasher.Add(archive::kFormatVersion);
+  hasher.AddText(manifest.product);
   hasher.AddText(manifest.encoder);
-  hasher.Add(dataset.options_hash);
   AddKind(hasher, manifest.kind);
+  AddOptions(hasher, dataset, manifest.kind);
   // Without the levels that edits added elsewhere.
   int last = static_cast<int>(unit.tiles.size()) - 1;
   while (last > model.max_source_level() && unit.tiles[static_cast<std::size_t>(last)].empty()) --last;

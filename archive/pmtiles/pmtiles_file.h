@@ -21,7 +21,7 @@ class PmtilesFile {
  public:
   // Errors of InputFile::Open. kUnavailable: the file is damaged. Messages name it.
   static Result<std::unique_ptr<const PmtilesFile>> Open(const std::string& path,
-                                                         std::size_t max_metadata_bytes = std::size_t{256} << 20);
+                                                         std::size_t max_metadata_bytes = std::size_t{64} << 20);
 
   const PmtilesHeader& header() const { return header_; }
   std::uint64_t bytes() const { return file_->size(); }

@@ -155,11 +155,7 @@ TEST_F(HostileArchiveTest, ManifestCutShortOrFlipped) {
     WriteText(path, bad);
     const auto archive = Archive::Open(place_);
     if (!archive) continue;
-    for (const geo::TileKey& key : keys_) {
-      const Result<std::optional<ArchivedTile>> found = (*archive)->Find(key);
-      if (!found || !*found) continue;
-      ASSERT_EQ((*found)->tile.bytes, InventedTile(key).bytes);
-    }
+    ASSERT_EQ(ToJson((*archive)->manifest()), good) << at;  // the name of the checksum was changed, nothing else
   }
 }
 

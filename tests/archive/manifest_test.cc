@@ -73,8 +73,46 @@ TEST(ManifestTest, NewerFormatIsNamed) {
   EXPECT_NE(read.error().message.find("format 2"), std::string::npos) << read.error().message;
 }
 
-TEST(ManifestTest, NonsenseIsRefused) {
+// As earlier builds wrote it.
+std::string WithoutChecksum(std::string json) {
+  const std::size_t at = json.find(",\n \"checksum\"");
+  EXPECT_NE(at, std::string::npos);
+  return json.substr(0, at) + "\n}\n";
+}
+
+TEST(ManifestTest, AnotherContentThanTheChecksumsIsRefused) {
   const std::string json = ToJson(FullManifest());
+  EXPECT_TRUE(ParseManifest(WithoutChecksum(json)));
+  int digits = 0;
+  for (std::size_t at = 0; at < json.size(); ++at) {
+    if (json[at] < '0' || json[at] > '9') continue;
+    std::string changed = json;
+    changed[at] = json[at] == '1' ? '2' : '1';
+    const Result<Manifest> read = ParseManifest(changed);
+    ASSERT_FALSE(read) << changed.substr(at > 30 ? at - 30 : 0, 60);
+    digits += read.error().message.find("remove it and run the bake again") != std::string::npos;
+  }
+  EXPECT_GT(digits, 100);
+}
+
+// A value of two bytes takes fifty in memory.
+TEST(ManifestTest, TooManyValuesAreRefused) {
+  const std::string json = WithoutChecksum(ToJson(FullManifest()));
+  const auto with = [&](std::size_t values) {
+    std::string all = "{\"unknown\": [0";
+    for (std::size_t i = 0; i < values / 2; ++i) all += ",[0]";
+    return all + "]," + json.substr(json.find('{') + 1);
+  };
+  EXPECT_TRUE(ParseManifest(with(1'900'000)));
+  for (const Result<Manifest>& read : {ParseManifest(with(2'000'000)), ManifestOf("a.pmtiles", with(2'000'000))}) {
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().message.find("it has more than 2000000 values"), std::string::npos) << read.error().message;
+  }
+}
+
+TEST(ManifestTest, NonsenseIsRefused) {
+  const std::string json = WithoutChecksum(ToJson(FullManifest()));
+  ASSERT_TRUE(ParseManifest(json));
   const auto with = [&](std::string_view from, std::string_view to) {
     std::string changed = json;
     const std::size_t at = changed.find(from);

@@ -52,6 +52,20 @@ class BakeCase(unittest.TestCase):
         config.write_text(json.dumps({"datasets": [{"name": "cells", "sources": ["*.hgt"], "floor": 0, "vertical": "ellipsoid"}]}))
         return config
 
+    @classmethod
+    def command(cls, *arguments, config=None, levels="0-11"):
+        return [str(part) for part in (BINARY, "bake", "--config", config or cls.config, "--levels", levels, *arguments)]
+
+    @classmethod
+    def run_bake(cls, *arguments, config=None, levels="0-11", **options):
+        return subprocess.run(cls.command(*arguments, config=config, levels=levels), env=cls.environment, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, **options)
+
+    def units(self, done):
+        """{unit: outcome} of the lines of --json."""
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        return {line["unit"]: line["outcome"] for line in lines if "unit" in line}
+
     def begin(self, command, environment=None, **options):
         process = subprocess.Popen(command, env={**self.environment, **(environment or {})}, text=True, stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, **options)

@@ -23,22 +23,8 @@ KILLS = 200 if IS_LONG else 20
 class Bake(BakeCase):
     THREADS = 2
 
-    @classmethod
-    def command(cls, *arguments, config=None, levels="0-11"):
-        return [str(part) for part in (BINARY, "bake", "--config", config or cls.config, "--levels", levels, *arguments)]
-
-    @classmethod
-    def run_bake(cls, *arguments, config=None, levels="0-11", **options):
-        return subprocess.run(cls.command(*arguments, config=config, levels=levels), env=cls.environment, text=True,
-                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, timeout=300, **options)
-
     def start(self, *arguments, config=None):
         return self.begin(self.command(*arguments, config=config))
-
-    def units(self, done):
-        """{unit: outcome} of the lines of --json."""
-        lines = [json.loads(line) for line in done.stdout.splitlines()]
-        return {line["unit"]: line["outcome"] for line in lines if "unit" in line}
 
     @contextlib.contextmanager
     def server(self, *what):
@@ -192,6 +178,23 @@ class Bake(BakeCase):
         self.assertEqual({outcome for unit, outcome in self.units(done).items() if unit not in baked}, {"copied"})
         self.expect_equal(updated, fresh)
 
+    def test_update_takes_the_formats_that_a_changed_option_does_not_concern(self):
+        formats = ("--format", "terrain,glb,png")
+        older, newer = self.place("older"), self.place("newer")
+        self.assertEqual(self.run_bake("--out", older, *formats, levels="0-8").returncode, 0)
+        config = self.make_sources("thanked")
+        options = json.loads(config.read_text())
+        options["datasets"][0]["attribution"] = "swisstopo"
+        config.write_text(json.dumps(options))
+        done = self.run_bake("--out", newer, "--update", older, *formats, "--json", config=config, levels="0-8")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        lines = [json.loads(line) for line in done.stdout.splitlines()]
+        self.assertEqual({(line["format"], line["outcome"]) for line in lines if "unit" in line},
+                         {("terrain", "copied"), ("glb", "baked"), ("png", "copied")})
+        fresh = self.place("fresh")
+        self.assertEqual(self.run_bake("--out", fresh, *formats, config=config, levels="0-8").returncode, 0)
+        self.expect_equal(newer, fresh)
+
     def test_update_takes_the_formats_of_a_bake_killed_between_their_manifests(self):
         killed, updated = self.place("killed"), self.place("updated")
         formats = ("--format", "terrain,glb")
@@ -254,20 +257,6 @@ class Bake(BakeCase):
             self.assertIn("Web Mercator ends at 85.05 degrees", done.stderr)
             self.assertFalse(out.exists())
 
-    def test_shards_and_finish_make_the_same_files(self):
-        place = self.place("shards")
-        for shard in range(3):
-            done = self.run_bake("--out", place, "--shard", f"{shard}/3")
-            self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertFalse((place / "manifest.json").exists())
-            if shard == 1:
-                early = self.run_bake("--out", place, "--finish")
-                self.assertEqual(early.returncode, 1)
-                self.assertIn("is missing", early.stderr)
-                self.assertFalse((place / "manifest.json").exists())
-        self.assertEqual(self.run_bake("--out", place, "--finish").returncode, 0)
-        self.expect_equal(place)
-
     def test_sources_that_change_meanwhile_are_listed(self):
         config = self.make_sources("moving", (0, 0, 0, 0))
         place, fresh = self.place("moving"), self.place("fresh")
@@ -319,27 +308,6 @@ class Bake(BakeCase):
             self.assertEqual((done.returncode, f"process {held.pid}" in done.stderr), (1, True), done.stderr)
         held.kill()
         held.communicate()
-
-    def test_files_that_are_not_of_a_bake_stay(self):
-        place = self.place("foreign")
-        (place / "units").mkdir(parents=True)
-        (place / "units/mine.pmtiles").touch()
-        done = self.run_bake("--out", place)
-        self.assertEqual((done.returncode, "holds units" in done.stderr), (2, True), done.stderr)
-        self.assertTrue((place / "units/mine.pmtiles").exists())
-
-    def test_a_finished_bake_is_kept(self):
-        place = self.place("finished")
-        shutil.copytree(self.reference, place)
-        done = self.run_bake("--out", place, "--json")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.assertEqual(set(self.units(done).values()), {"kept"})
-        self.expect_equal(place)
-        config = self.make_sources("newer", (3, 0, 0, 0))
-        newer = self.run_bake("--out", place, config=config)
-        self.assertEqual(newer.returncode, 2)
-        self.assertIn("--update", newer.stderr)
-        self.expect_equal(place)
 
     def test_what_makes_no_sense_is_refused(self):
         broken = self.scratch / "broken.json"

@@ -23,7 +23,7 @@ using Json = nlohmann::ordered_json;
 std::string Print(const Json& json) { return json.dump(-1, ' ', false, Json::error_handler_t::replace); }
 
 const char* OutcomeName(bake::UnitOutcome outcome) {
-  constexpr const char* kNames[] = {"baked", "kept", "copied", "failed", "missing"};  // by value
+  constexpr const char* kNames[] = {"baked", "kept", "copied", "failed", "missing", "unusable"};  // by value
   return kNames[static_cast<std::size_t>(outcome)];
 }
 
@@ -107,11 +107,8 @@ std::string SummaryJson(const BakeSummary& summary, const bake::Counters& counte
   json["complete"] = summary.is_complete;
   json["tiles"] = summary.tiles;
   json["bytes"] = summary.bytes;
-  json["units"] = {{"baked", summary.baked},
-                   {"kept", summary.kept},
-                   {"copied", summary.copied},
-                   {"failed", summary.failed},
-                   {"missing", summary.missing}};
+  json["units"] = {{"baked", summary.baked},   {"kept", summary.kept},       {"copied", summary.copied},
+                   {"failed", summary.failed}, {"missing", summary.missing}, {"unusable", summary.unusable}};
   json["built_tiles"] = summary.built_tiles;
   json["seconds"] = std::round(summary.seconds * 1000) / 1000;
   json["tiles_per_second"] = std::round(static_cast<double>(summary.built_tiles) / std::max(summary.seconds, 1e-3));
@@ -127,7 +124,8 @@ std::string SummaryText(const BakeSummary& summary) {
       fmt::format("{}: {} tiles, {}, {} files", summary.place, Grouped(summary.tiles),
                   Bytes(static_cast<double>(summary.bytes)), summary.baked + summary.kept + summary.copied);
   for (const auto& [count, what] : {std::pair(summary.kept, "were there"), std::pair(summary.copied, "copied"),
-                                    std::pair(summary.missing, "missing"), std::pair(summary.failed, "failed")}) {
+                                    std::pair(summary.missing, "missing"), std::pair(summary.unusable, "unusable"),
+                                    std::pair(summary.failed, "failed")}) {
     if (count > 0) text += fmt::format(", {} {}", count, what);
   }
   if (summary.built_tiles > 0) {

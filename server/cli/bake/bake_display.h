@@ -50,9 +50,9 @@ std::string UnitJson(const bake::UnitReport& report, const std::vector<bake::Tar
 // What a bake did, as text or JSON.
 struct BakeSummary {
   std::string place;
-  std::uint64_t tiles = 0, bytes = 0;                                      // of all files that are there
-  std::uint64_t baked = 0, kept = 0, copied = 0, failed = 0, missing = 0;  // files
-  std::uint64_t built_tiles = 0;                                           // by this process
+  std::uint64_t tiles = 0, bytes = 0;                                                    // of all files that are there
+  std::uint64_t baked = 0, kept = 0, copied = 0, failed = 0, missing = 0, unusable = 0;  // files
+  std::uint64_t built_tiles = 0;                                                         // by this process
   double seconds = 0;
   bool is_complete = false;  // the manifest is written
 };

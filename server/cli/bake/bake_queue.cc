@@ -10,6 +10,8 @@
 #include <iterator>
 #include <memory>
 #include <random>
+#include <set>
+#include <string>
 #include <utility>
 
 #include "archive/files/input_file.h"
@@ -88,16 +90,15 @@ std::optional<int> FinishJob(const QueuedBake& bake, bake::RedisQueue& queue) {
   bake::Counters counters;
   const std::vector<bake::UnitReport> all = bake::Bake(bake.pipeline, bake.targets, bake.plan, options, counters);
   if (bake.options.stop.stop_requested()) return kExitFailure;
+  std::set<std::pair<std::size_t, std::string>> kept;  // target and name
+  for (const bake::UnitReport& report : all) {
+    if (report.outcome == bake::UnitOutcome::kKept) kept.emplace(report.target, report.entry.name);
+  }
   std::vector<std::size_t> missing;
   for (std::size_t i = 0; i < bake.plan.units.size(); ++i) {
     const bake::UnitPlan::Entry& entry = bake.plan.units[i];
-    const bool is_there = std::ranges::all_of(entry.targets, [&](std::size_t target) {
-      return std::ranges::any_of(all, [&](const bake::UnitReport& report) {
-        return report.target == target && report.entry.name == entry.unit.name &&
-               report.outcome == bake::UnitOutcome::kKept;
-      });
-    });
-    if (!is_there) missing.push_back(i);
+    const auto is_kept = [&](std::size_t target) { return kept.contains({target, entry.unit.name}); };
+    if (!std::ranges::all_of(entry.targets, is_kept)) missing.push_back(i);
   }
   if (!missing.empty()) {
     PrintMessage(
@@ -156,7 +157,7 @@ std::string WorkerName() {
 bool IsFinished(const std::string& place, const std::vector<bake::Target>& targets) {
   std::vector<archive::Manifest> manifests;
   std::ranges::transform(targets, std::back_inserter(manifests), &bake::Target::manifest);
-  if (!bake::RemoveNotesIfFinished(place, manifests)) return false;
+  if (!bake::TidyIfFinished(place, manifests)) return false;
   PrintMessage(fmt::format("{}: is complete already; --finish instead of --queue checks every file", place));
   return true;
 }

@@ -172,17 +172,20 @@ BakeSummary Summarize(const std::vector<bake::UnitReport>& reports, const bake::
     summary.copied += report.outcome == bake::UnitOutcome::kCopied;
     summary.failed += report.outcome == bake::UnitOutcome::kFailed;
     summary.missing += report.outcome == bake::UnitOutcome::kMissing;
+    summary.unusable += report.outcome == bake::UnitOutcome::kUnusable;
   }
   return summary;
 }
 
 void ListFailures(const std::vector<bake::UnitReport>& reports, const std::vector<bake::Target>& targets) {
   for (const bake::UnitReport& report : reports) {
-    const bool is_missing = report.outcome == bake::UnitOutcome::kMissing;
-    if (!is_missing && report.outcome != bake::UnitOutcome::kFailed) continue;
+    const char* const what = report.outcome == bake::UnitOutcome::kMissing    ? "is missing"
+                             : report.outcome == bake::UnitOutcome::kUnusable ? "cannot be used: "
+                             : report.outcome == bake::UnitOutcome::kFailed   ? "failed: "
+                                                                              : nullptr;
+    if (what == nullptr) continue;
     std::fprintf(stderr, "terrace: unit %s of %s %s%s\n", report.entry.name.c_str(),
-                 archive::FolderOf(targets[report.target].manifest.kind.format).c_str(),
-                 is_missing ? "is missing" : "failed: ", report.message.c_str());
+                 archive::FolderOf(targets[report.target].manifest.kind.format).c_str(), what, report.message.c_str());
   }
 }
 
@@ -258,11 +261,10 @@ int BakeAlone(const PlacedBake& bake) {
   fmt::print("{}\n", bake.arguments.json ? SummaryJson(summary, counters) : SummaryText(summary));
   if (!is_whole) {
     std::fprintf(
-        stderr,
-        "terrace: the bake is not complete: %s of %s files are missing, and there is no manifest; run %s to go "
-        "on\n",
+        stderr, "terrace: the bake is not complete: %s of %s files are not done, and no manifest was written; run %s\n",
         Grouped(bake.plan.files - done).c_str(), Grouped(bake.plan.files).c_str(),
-        bake.arguments.finish ? "the shards that they belong to again" : "the same command again");
+        bake.arguments.finish ? "the same command without --finish, or the shards that they belong to, to bake them"
+                              : "the same command again to go on");
     return kExitFailure;
   }
   if (bake.arguments.form == kFolder && bake.targets.front().manifest.kind.coding == tiler::Coding::kGzip) {
