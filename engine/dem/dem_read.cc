@@ -91,16 +91,16 @@ Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, cons
   const auto copy_back = [&](const std::vector<float>& some, std::span<float> all) {
     if (!some.empty()) ForPart(part, window, [&](std::size_t from, std::size_t to) { all[to] = some[from]; });
   };
-  std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), smooth;
-  if (nodes.smooth != nullptr) smooth = copy(*nodes.smooth);
-  const auto done =
-      grid.FillNodes(node_grid, part, datum,
-                     {heights, weights, nodes.smooth != nullptr ? &smooth : nullptr, nodes.are_void}, stop, reading);
+  std::vector<float> heights = copy(nodes.heights), weights = copy(nodes.weights), hole_heights;
+  if (nodes.hole_heights != nullptr) hole_heights = copy(*nodes.hole_heights);
+  const auto done = grid.FillNodes(
+      node_grid, part, datum,
+      {heights, weights, nodes.hole_heights != nullptr ? &hole_heights : nullptr, nodes.are_void}, stop, reading);
   if (!done) return done;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
-  if (!smooth.empty() && nodes.smooth->empty()) *nodes.smooth = VoidHeights(nodes.heights.size());
-  if (!smooth.empty()) copy_back(smooth, *nodes.smooth);
+  if (!hole_heights.empty() && nodes.hole_heights->empty()) *nodes.hole_heights = VoidHeights(nodes.heights.size());
+  if (!hole_heights.empty()) copy_back(hole_heights, *nodes.hole_heights);
   if (reading_of_part != nullptr) {
     reading_of_part->part = part;
     reading->cells = {};  // can be located again
@@ -188,7 +188,7 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
                                                            const std::stop_token& stop,
                                                            std::vector<PartReading>* readings) const {
   const std::size_t nodes = Area(window.columns, window.rows);
-  std::vector<float> heights = VoidHeights(nodes), smooth;
+  std::vector<float> heights = VoidHeights(nodes), hole_heights;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);
@@ -201,7 +201,7 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
     }
     PartReading* const reading = readings != nullptr ? &readings->emplace_back() : nullptr;
     const auto done = FillNodesOf(grids[i], node_grid, window, order.size(), datum,
-                                  {heights, weights, &smooth, are_void}, stop, reading);
+                                  {heights, weights, &hole_heights, are_void}, stop, reading);
     if (!done) {
       return MakeError(done.error().code, "{}: {}", what, done.error().message);
     }
@@ -212,9 +212,9 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
   }
   if (feathers) heights = blend.Heights();
   // A coarse measurement in a hole is better than a surface between the heights around it.
-  if (smooth.empty() || !has_voids) return heights;
+  if (hole_heights.empty() || !has_voids) return heights;
   for (std::size_t i = 0; i < nodes; ++i) {
-    if (IsVoid(heights[i])) heights[i] = smooth[i];
+    if (IsVoid(heights[i])) heights[i] = hole_heights[i];
   }
   return heights;
 }
@@ -403,11 +403,11 @@ Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const 
                                                                 const std::stop_token& stop,
                                                                 std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
-  std::vector<float> heights(points.size(), SampleRules::kVoid), smooth = heights;
-  const auto take_smooth = [&] {
+  std::vector<float> heights(points.size(), SampleRules::kVoid), hole_heights = heights;
+  const auto take_from_holes = [&] {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (!std::isnan(heights[i]) || std::isnan(smooth[i])) continue;
-      heights[i] = smooth[i];
+      if (!std::isnan(heights[i]) || std::isnan(hole_heights[i])) continue;
+      heights[i] = hole_heights[i];
       if (!filled.empty()) filled[i] = 1;
     }
   };
@@ -415,9 +415,9 @@ Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const 
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
     std::ranges::fill(marks, std::uint8_t{0});
-    const auto read = grids.front().FillPoints(points, datum, {heights, {}, &smooth}, marks, stop);
+    const auto read = grids.front().FillPoints(points, datum, {heights, {}, &hole_heights}, marks, stop);
     if (!read) return tl::unexpected(read.error());
-    take_smooth();
+    take_from_holes();
     return heights;
   }
   std::map<std::size_t, std::vector<std::size_t>> wanted;  // points by the raster grids that may have heights for them
@@ -426,24 +426,24 @@ Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const 
     for (const std::size_t grid : GridsAt({x, y, x, y})) wanted[grid].push_back(i);
   }
   std::vector<GeoPosition> missing;
-  std::vector<float> found, found_smooth;
+  std::vector<float> found, found_in_holes;
   std::vector<std::uint8_t> found_filled;
   for (auto& [grid, those] : wanted) {
     std::erase_if(those, [&](std::size_t i) { return !std::isnan(heights[i]); });
     missing.clear();
     for (const std::size_t i : those) missing.push_back(points[i]);
     found.assign(those.size(), SampleRules::kVoid);
-    found_smooth = found;
+    found_in_holes = found;
     found_filled.assign(those.size(), 0);
-    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, &found_smooth}, found_filled, stop);
+    const auto read = grids[grid].FillPoints(missing, datum, {found, {}, &found_in_holes}, found_filled, stop);
     if (!read) return tl::unexpected(read.error());
     for (std::size_t k = 0; k < those.size(); ++k) {
       heights[those[k]] = found[k];
       if (!filled.empty()) filled[those[k]] = found_filled[k];
-      if (std::isnan(smooth[those[k]])) smooth[those[k]] = found_smooth[k];
+      if (std::isnan(hole_heights[those[k]])) hole_heights[those[k]] = found_in_holes[k];
     }
   }
-  take_smooth();
+  take_from_holes();
   return heights;
 }
 

@@ -185,7 +185,7 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
       if (!height) continue;
       const float rounded = RoundHeight(converted->Of(*height, points[point]));
       const bool is_in_hole = block.has_voids() && !HasSample(block.bridged, block.window, cell);
-      (is_in_hole ? (*nodes.smooth)[point] : heights[point]) = rounded;
+      (is_in_hole ? (*nodes.hole_heights)[point] : heights[point]) = rounded;
       const bool is_filled = block.has_voids() && (is_in_hole || !IsNearestValid(block.measured, block.window, cell));
       filled[point] = is_filled ? 1 : 0;
     }

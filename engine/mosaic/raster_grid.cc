@@ -373,9 +373,9 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
     if (!height || (!undulations.empty() && std::isnan(undulations[node]))) return;
     const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
     if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may have a height
-      if (nodes.smooth == nullptr) return;
-      if (nodes.smooth->empty()) *nodes.smooth = VoidHeights(heights.size());
-      if (float& smooth = (*nodes.smooth)[node]; std::isnan(smooth)) smooth = rounded;
+      if (nodes.hole_heights == nullptr) return;
+      if (nodes.hole_heights->empty()) *nodes.hole_heights = VoidHeights(heights.size());
+      if (float& height_there = (*nodes.hole_heights)[node]; std::isnan(height_there)) height_there = rounded;
       return;
     }
     heights[node] = rounded;

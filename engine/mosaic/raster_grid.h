@@ -70,7 +70,7 @@ struct NodeHeights {
   std::span<float> weights = {};
   // Smooth surface for holes where no raster grid has a height. NaN: none yet. Null: not wanted. Empty: no node has one
   // yet.
-  std::vector<float>* smooth = nullptr;
+  std::vector<float>* hole_heights = nullptr;
   bool are_void = false;  // all heights are NaN
 };
 
@@ -120,7 +120,7 @@ class RasterGrid {
   NodeCells CellsOf(const geo::Lattice& lattice, const NodeWindow& window, int factor, const GridWindow& samples) const;
 
   // FillNodes for single points, at full resolution. `filled`, one per point, becomes 1 where the point's pixel is
-  // void, for points that get a height. Precondition: `nodes.smooth` has one entry per point. Errors: those of
+  // void, for points that get a height. Precondition: `nodes.hole_heights` has one entry per point. Errors: those of
   // FillNodes and of the geoid for `datum`.
   Result<void> FillPoints(std::span<const GeoPosition> points, HeightDatum datum, const NodeHeights& nodes,
                           std::span<std::uint8_t> filled, const std::stop_token& stop) const;

@@ -70,28 +70,28 @@ TEST(OneSource, VoidsThatTheStatisticsKnowAreNotRead) {
     return geo::TileKey{lattice.level, static_cast<std::int64_t>((longitude + 180) / tile),
                         static_cast<std::int64_t>((latitude + 90) / tile)};
   };
-  const auto read = [&](const geo::TileKey& key, std::vector<float>& smooth) {
+  const auto read = [&](const geo::TileKey& key, std::vector<float>& hole_heights) {
     const NodeWindow window = WindowOfTile(lattice, key);
     std::vector<float> heights(static_cast<std::size_t>(window.columns) * static_cast<std::size_t>(window.rows),
                                SampleRules::kVoid);
     GridReading reading;
     auto filled = grid->FillNodes(lattice, window, HeightDatum::kEllipsoid,
-                                  {.heights = heights, .smooth = &smooth, .are_void = true}, {}, &reading);
+                                  {.heights = heights, .hole_heights = &hole_heights, .are_void = true}, {}, &reading);
     EXPECT_TRUE(std::ranges::all_of(heights, [](float height) { return std::isnan(height); }));
     return filled ? Result<GridReading>(std::move(reading)) : tl::unexpected(filled.error());
   };
-  std::vector<float> smooth;
-  const auto collar = read(key_at(11, 19.7), smooth);
+  std::vector<float> hole_heights;
+  const auto collar = read(key_at(11, 19.7), hole_heights);
   ASSERT_TRUE(collar) << collar.error().message;
   EXPECT_TRUE(collar->samples.empty());
-  EXPECT_TRUE(smooth.empty());
-  const auto hole = read(key_at(10.25, 19.75), smooth);
+  EXPECT_TRUE(hole_heights.empty());
+  const auto hole = read(key_at(10.25, 19.75), hole_heights);
   ASSERT_TRUE(hole) << hole.error().message;
   EXPECT_FALSE(hole->samples.empty());
-  EXPECT_FALSE(smooth.empty());
+  EXPECT_FALSE(hole_heights.empty());
   // What was not read may not outlive its file either.
   std::filesystem::remove(path);
-  EXPECT_FALSE(read(key_at(11, 19.7), smooth));
+  EXPECT_FALSE(read(key_at(11, 19.7), hole_heights));
 }
 
 // A mask of one band, as GDAL also stores it in separate files and in VRTs.
