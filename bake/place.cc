@@ -55,25 +55,33 @@ std::string NumberSpace() {
   return error ? kUnknown : space;
 }
 
-// Identifies the machine, and a boot of it. Names of hosts do not: those of containers are often equal.
-std::string BootOf() {
-  std::string boot;
-  std::istringstream(ReadText("/proc/sys/kernel/random/boot_id")) >> boot;
-  return boot.empty() ? kUnknown : boot;
+std::string FirstWord(const char* path) {
+  std::string word;
+  std::istringstream(ReadText(path)) >> word;
+  return word.empty() ? kUnknown : word;
 }
 
-// The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers.
+// Identifies a boot of a machine.
+std::string BootOf() { return FirstWord("/proc/sys/kernel/random/boot_id"); }
+
+// Stays the same after a restart. Names of hosts do not identify a machine: those of containers are often equal.
+std::string MachineOf() { return FirstWord("/etc/machine-id"); }
+
+// The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers, machine.
 struct Owner {
-  std::string host, pid, start, boot, space;
+  std::string host, pid, start, boot, space, machine;
 
   static Owner Parse(const std::string& text) {
     Owner owner;
-    std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space;
+    std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space >> owner.machine;
     return owner;
   }
-  // Whether the process has certainly ended. Nothing is known about processes of other machines, boots and containers.
+  bool IsOfThisMachine() const { return machine != kUnknown && machine == MachineOf() && host == HostName(); }
+  // Whether the process has certainly ended. Nothing is known about processes of other machines and containers.
   bool HasEnded() const {
-    if (boot == kUnknown || boot != BootOf() || space != NumberSpace()) return false;
+    if (boot == kUnknown) return false;
+    if (boot != BootOf()) return IsOfThisMachine();
+    if (space != NumberSpace()) return false;
     const long number = ParseNumber<long>(pid).value_or(0);
     if (number <= 0) return false;
     if (::kill(static_cast<pid_t>(number), 0) != 0 && errno == ESRCH) return true;
@@ -105,8 +113,8 @@ Result<void> MakeFolder(const std::string& place) {
 
 // What the lock files of this process contain.
 std::string OwnLock() {
-  return fmt::format("{} {} {} {} {}", HostName(), ::getpid(), ProcessState::Of(::getpid()).start, BootOf(),
-                     NumberSpace());
+  return fmt::format("{} {} {} {} {} {}", HostName(), ::getpid(), ProcessState::Of(::getpid()).start, BootOf(),
+                     NumberSpace(), MachineOf());
 }
 
 bool IsLock(const std::string& name) { return name.starts_with("bake") && name.ends_with(".lock"); }

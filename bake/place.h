@@ -18,7 +18,7 @@ std::string ArchivePlace(const std::string& place, const archive::Manifest& mani
 class PlaceLock {
  public:
   // `shard`: names the lock of one shard; empty: of the whole place. Creates the folder. Takes over the lock of a
-  // process that has ended, if it ran on this machine since its last boot, and in the same container. kUnavailable: the
+  // process that has ended, if it ran on this machine, and since the last boot in the same container. kUnavailable: the
   // folder cannot be created or written. kOverloaded: another bake works there; the message says which one and what to
   // do.
   static Result<PlaceLock> Take(const std::string& place, const std::string& shard);

@@ -93,16 +93,20 @@ class Finish(BakeCase):
         ended = subprocess.Popen("true")
         ended.wait()
         lock = place / "bake.lock"
-        for other in (f"{boot[::-1]} {space}", f"{boot} pid:[1]", f"unknown {space}"):
+        machine = pathlib.Path("/etc/machine-id").read_text().strip() if pathlib.Path("/etc/machine-id").is_file() else ""
+        for other in (f"{boot[::-1]} {space}", f"{boot[::-1]} {space} {'0' * 32}", f"{boot[::-1]} {space} unknown", f"{boot} pid:[1]", f"unknown {space} {machine}"):
             lock.write_text(f"{host} {ended.pid} 1 {other}\n")
             done = self.run_bake("--out", place)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertIn(f"process {ended.pid} on host {host} is baking there; wait for it, or remove {lock}", done.stderr)
             self.assertEqual(files_of(place), ["bake.lock"])
-        lock.write_text(f"other-name {ended.pid} 1 {boot} {space}\n")
-        done = self.run_bake("--out", place)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        self.expect_equal(place)
+        # Before the machine was started again, and under another name.
+        restarted = [f"{host} {ended.pid} 1 {boot[::-1]} {space} {machine}"] if machine else []
+        for own in (*restarted, f"other-name {ended.pid} 1 {boot} {space}"):
+            lock.write_text(own + "\n")
+            done = self.run_bake("--out", place)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.expect_equal(place)
 
     def test_files_that_are_not_of_a_bake_stay(self):
         place = self.place("foreign")
