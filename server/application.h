@@ -49,7 +49,7 @@ class TerrainApplication final : public Application, public ProcessState {
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;
   std::string ClientOf(const asio::ip::address& peer) const override;
 
-  // New requests are answered from `catalog`. Returns true for the first one.
+  // New requests are answered from `catalog`. Returns true if it is the first catalog.
   bool Replace(CatalogPtr catalog, const config::Config& config);
 
   // Problems by dataset; "" is the configuration.

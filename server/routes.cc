@@ -387,7 +387,7 @@ bool RouteTable::Fits(const Entry& entry, const Segments& segments) {
   const std::size_t size = entry.pattern.size();
   if (segments.size() != size && (segments.size() < size || !entry.has_rest)) return false;
   for (std::size_t i = 0; i < size; ++i) {
-    // The one URL with an empty segment is "/".
+    // An empty segment of a pattern stands for any, except the one of the pattern "/".
     const bool is_any = entry.pattern[i].empty() && size > 1;
     if (!is_any && entry.pattern[i] != segments[i]) return false;
   }

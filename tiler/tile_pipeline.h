@@ -44,13 +44,14 @@ class TilePipeline {
 
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; the reasons of the other encoders
-  // (encoders.h); in a dataset without sources, a tile that its archive lacks. kUnavailable: a source cannot be read
-  // now. kChanged: a file of a source was replaced, so the dataset has to be opened again. kInternal: an encoder
-  // failed. kCancelled: `stop` was requested.
+  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; a tile for maps deeper than
+  // max_mercator_depth; imagery of a dataset without an image; in a dataset without sources, a tile that its archive
+  // lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced, so the dataset has to
+  // be opened again. kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals: the dataset has no sources.
+  // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals, PlanArea and BuildArea: the dataset has no
+  // sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 

@@ -48,8 +48,9 @@ class CacheFolder;
 
 // The storage of statistics and averages of rasters, so that no raster is read completely twice.
 struct RasterCache {
-  std::shared_ptr<CacheFolder> folder = {};     // the statistics cache (statistics/cache_folder.h); null: none
-  std::shared_ptr<AveragesBudget> memory = {};  // for averages that the folder does not keep; null: none
+  std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
+  // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
+  std::shared_ptr<AveragesBudget> memory = {};
 };
 
 struct DemOptions {
@@ -76,7 +77,8 @@ struct DemOptions {
 // One raster of a dataset.
 struct DemFile {
   std::string path;
-  // Where several sources have a height, the lowest rank wins, then the finer source, then the first path in order.
+  // Where several sources have a height, the lowest rank wins, then the finer source, in steps of a sixteenth of an
+  // octave, then the path that sorts first. The order of the files has no effect.
   int rank = 0;
   bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
@@ -185,7 +187,7 @@ struct TileHeights {
   std::vector<float> heights;  // stride * stride
   // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
   // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
-  // also of the blended heights.
+  // it bounds the distance from the blended heights as well.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

@@ -18,9 +18,9 @@ enum class ErrorCode {
   kNotFound,         // it does not exist
   kUnavailable,      // a source or a resource does not respond now; a retry may succeed
   kChanged,          // a source file has changed since it was opened; reopening it may succeed
-  kOverloaded,       // refused for now: a queue or store is full, memory is short, another process uses the place
-  kCancelled,        // nobody waits for the result any more, or the deadline has passed
-  kInternal,         // a library failed unexpectedly
+  kOverloaded,  // refused for now: a queue or store is full, memory is short, another process writes to the same folder
+  kCancelled,   // nobody waits for the result any more, or the deadline has passed
+  kInternal,    // a library failed unexpectedly
 };
 
 // A stable lower-case name for logs: "invalid_argument", "not_found", ...

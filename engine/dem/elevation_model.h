@@ -63,8 +63,9 @@ class ElevationModel {
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid. Heights that edits state in the datum of
-  // all sources that they may reach are not converted, here and in ReadKnownMercator and ReadPoints.
+  // floor is converted to the datum of the last source that refers to a geoid. If all sources within an edit's reach
+  // have the datum in which the edit states its heights, these are not converted; the same holds for ReadKnownMercator
+  // and ReadPoints.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
@@ -124,6 +125,7 @@ class ElevationModel {
 
   // Samples read since Open, by all threads. For metrics.
   SampleCounts CountSamples() const;
+  // Blocks that the process keeps now, of all models. For metrics.
   static KeptBlocks CountKeptBlocks();
 
   // A hash of everything that heights depend on: samples, positions and vertical datums of all sources in order of
@@ -142,7 +144,7 @@ class ElevationModel {
   // Whether a source's data in the cache folder can no longer be read. Its tiles then take longer until it is reopened.
   bool has_lost_cache() const;
 
-  // The files of all sources with their stamps at Open.
+  // All files that heights depend on, with their stamps at Open: of sources, geoid grids and edits.
   StampedFiles files() const;
 
  private:

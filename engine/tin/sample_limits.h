@@ -61,7 +61,7 @@ struct BoundingBox {
   }
 };
 
-// The samples that have a limit.
+// The samples that have a limit (HasLimit) or are forced.
 BoundingBox BoxOfLimits(const SampleLimits& limits, int width, int height);
 
 // The worst sample of a closed triangle, by SampleLimits::WeightedError, without its corners and without the field's

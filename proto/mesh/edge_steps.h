@@ -8,7 +8,8 @@
 //
 //   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
-//   corner step   = the same over the four tiles that meet; on a pole, over the whole dataset
+//   corner step   = the same over the four tiles that meet
+//   on a pole     : the NeededStep of the whole dataset, for the edge and its corners
 //
 // Proof that a tile's own step divides: it is a power of two, so it only has to be at most every edge's step. Let w be
 // the step requested for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the

@@ -1,4 +1,4 @@
-// One HTTP request. ParseHead is the only way to obtain its head from the network.
+// One HTTP request. Heads from the network come from ParseHead, or from TakeRepeated, which repeats one of ParseHead.
 //
 // Parsing is stricter than RFC 9112 wherever two readers could disagree about the end of a message: only a POST may
 // announce a body, by a single Content-Length in plain decimals. Any other message that announces a body is refused
@@ -24,7 +24,8 @@ enum class Method { kGet, kHead, kOptions, kPost, kOther };
 
 // The header fields of a request, without those of its framing.
 struct RequestFields {
-  std::string accept;  // several fields are joined with ", ", here and below
+  // Several fields of one name are joined with ", ", except Host, Referer, User-Agent and Content-Type.
+  std::string accept;
   std::string accept_encoding;
   std::string if_none_match;
   std::string host;  // host and port: letters, digits and "-._~%!$&'()*+,;=:[]"; may be empty

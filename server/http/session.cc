@@ -117,7 +117,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   // While a reply is being sent, there is nothing to release.
   void DisplaceHere() {
-    if (!has_upload_ && !is_receiving_) return;  // is_receiving_: the coroutine may not have seen its memory yet
+    if (!has_upload_ && !is_receiving_) return;  // is_receiving_: the upload may have memory already
     displaced_ = true;
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();

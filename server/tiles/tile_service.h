@@ -69,8 +69,8 @@ class TileService {
     return pool_.Run<T>(std::move(work), TermsOf(length, deadline, client));
   }
 
-  // The same for short work of which calls with equal keys share one run and its result, if they wait at the same time.
-  // Such calls have the same T, and work that does the same. The coroutine must run on a single thread.
+  // Like Run with kShort, but calls with equal keys that wait at the same time share one run and its result.
+  // Precondition: calls with equal keys have the same T and equivalent work. The coroutine must run on a single thread.
   template <typename T>
   asio::awaitable<Result<std::shared_ptr<const T>>> RunShared(std::string key, Work<std::shared_ptr<const T>> work,
                                                               Clock::time_point deadline, std::uint64_t client) {

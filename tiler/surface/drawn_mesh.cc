@@ -50,7 +50,7 @@ DrawnMesh::DrawnMesh(const geo::TileKey& key, DrawnTriangles triangles)
       positions_(std::move(triangles.positions)),
       triangles_(std::move(triangles.triangles)),
       in_hole_(std::move(triangles.in_hole)),
-      lacks_holes_(triangles.lacks_holes) {
+      holes_are_left_out_(triangles.holes_are_left_out) {
   if (!positions_.empty()) origin_ = positions_.front();
   for (geo::Vec3& position : positions_) position = position - origin_;
   FillBuckets(triangles.places);
@@ -283,7 +283,7 @@ DrawnPoint DrawnMesh::Nearest(const dem::GeoPosition& point) const {
   const bool is_far_from_parallels = IsFarFromParallels(point);
   // What is farther than this from all triangles is a hole.
   double reach_m = std::numeric_limits<double>::infinity();
-  if (lacks_holes_) {
+  if (holes_are_left_out_) {
     const double side_m = geo::ToRadians(SideDegrees(key_)) * geo::kSemiMajorAxis;
     reach_m = is_far_from_parallels ? 0 : ChordAt(key_, point.latitude) * side_m;
   }

@@ -20,14 +20,14 @@ struct DrawnTriangles {
   std::vector<geo::Vec3> positions;           // ECEF metres
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
-  std::vector<std::uint8_t> in_hole;  // whether clients do not draw a triangle, for each triangle; empty: they draw all
-  bool lacks_holes = false;  // triangles in holes were left out: a place in the tile without a triangle is a hole
+  std::vector<std::uint8_t> in_hole;                    // by triangle, 1: clients do not draw it; empty: they draw all
+  bool holes_are_left_out = false;                      // a place in the tile without a triangle is a hole
 };
 
 struct DrawnPoint {
   double height_m = 0;     // above the ellipsoid, along the plumb line; NaN in a hole
   geo::Vec3 normal;        // of the triangle: unit, ECEF, upwards; NaN in a hole
-  bool is_beside = false;  // the plumb line meets no triangle
+  bool is_beside = false;  // the plumb line meets no triangle, and the place is not known to be in a hole
 };
 
 // Immutable and thread-safe.
@@ -83,7 +83,7 @@ class DrawnMesh {
   std::vector<geo::Vec3> positions_;  // from the origin
   std::vector<std::array<std::uint32_t, 3>> triangles_;
   std::vector<std::uint8_t> in_hole_;  // as in DrawnTriangles
-  bool lacks_holes_ = false;
+  bool holes_are_left_out_ = false;
   int side_ = 1;                              // buckets along an edge
   std::vector<std::uint32_t> bucket_starts_;  // side * side + 1
   std::vector<std::uint32_t> bucket_triangles_;

@@ -34,7 +34,7 @@ Result<DrawnTriangles> DecodeTriangles(std::string_view bytes, const geo::TileKe
                (std::int64_t{tile->v[b]} - tile->v[a]) * (std::int64_t{tile->u[c]} - tile->u[a]);
   }
   DrawnTriangles drawn = TrianglesOf(*tile);
-  drawn.lacks_holes = has_holes || covered != std::int64_t{2} * proto::kQuantizedMax * proto::kQuantizedMax;
+  drawn.holes_are_left_out = has_holes || covered != std::int64_t{2} * proto::kQuantizedMax * proto::kQuantizedMax;
   return drawn;
 }
 

@@ -40,7 +40,7 @@ struct EncodedTile {
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kMade;
   const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
-  HeaderLines header_lines;        // MakeTileHeaders of server/api/tile_formats.h
+  HeaderLines header_lines;        // written by the HeaderWriter of TileTiers; empty without one
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.header_lines.text.size(); }

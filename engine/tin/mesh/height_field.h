@@ -35,9 +35,9 @@ class HeightField {
   float At(SamplePosition sample) const { return At(sample.x, sample.y); }
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
-  // Distance between rows, in samples. Rows, and the memory after the last one, are padded so that loads of 16 samples
-  // that begin at a sample of an inner row stay inside, and in fields smaller than 16 x 8 also those of eight rows
-  // beyond the field. The values of the padding are arbitrary.
+  // Distance between rows, in samples. Loads of 16 samples that begin in any row but the last stay inside the memory.
+  // Fields with fewer than 16 columns or 8 rows have padding after the last row, so that loads in up to eight rows
+  // beyond it stay inside, too. The values of the padding are arbitrary.
   int stride() const { return static_cast<int>(stride_); }
 
   // A power of two, in metres; all heights are multiples of it. 0 if none is known. Sums of heights and their products
@@ -77,7 +77,7 @@ class HeightField {
   float quantum_ = 0;
   float max_integer_area_ = 0;
   std::size_t stride_ = 0;
-  std::vector<float> heights_;  // NaN between rows
+  std::vector<float> heights_;
   int patches_along_x_ = 0, patches_along_y_ = 0;
   std::vector<bool> has_height_;  // by patch, row by row; empty if there are no voids
 };

@@ -272,7 +272,7 @@ TEST(DrawnMesh, IsAHoleWhereNoTriangleIsNear) {
                             (static_cast<double>(key.y) + v) * side - 90};
   };
   DrawnTriangles half = RoughGrid(key, [](int, int row) { return row >= 20; }), none;
-  half.lacks_holes = none.lacks_holes = true;
+  half.holes_are_left_out = none.holes_are_left_out = true;
   const DrawnMesh northern(key, std::move(half)), empty(key, std::move(none));
   EXPECT_FALSE(std::isnan(northern.Nearest(at(0.3, 0.9)).height_m));
   for (const DrawnMesh* mesh : {&northern, &empty}) {
