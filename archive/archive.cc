@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <atomic>
-#include <list>
 #include <mutex>
+#include <set>
 #include <unordered_map>
 #include <utility>
 
@@ -13,6 +13,7 @@
 #include "archive/pmtiles/pmtiles_file.h"
 #include "archive/pmtiles_mapping.h"
 #include "archive/unit_name.h"
+#include "engine/common/idle_pool.h"
 #include "engine/gdal/remote_file.h"
 #include "tiler/tile/tile_bounds.h"
 
@@ -28,19 +29,13 @@ class ArchiveBase : public Archive {
 
   const std::string& place() const override { return place_; }
   const Manifest& manifest() const override { return manifest_; }
-  bool is_outdated() const override { return is_outdated_; }
 
   Result<std::optional<ArchivedTile>> Find(const geo::TileKey& key) const override {
     const bool is_mercator = tiler::IsMercator(manifest_.kind.format);
     if (!tiler::IsInScheme(key, is_mercator) || key.level < manifest_.min_level || key.level > manifest_.max_level) {
       return std::nullopt;
     }
-    const Result<FilePtr> file = FileOf(key);
-    if (!file) return tl::unexpected(file.error());
-    if (*file == nullptr) return std::nullopt;
-    Result<std::optional<ArchivedTile>> found = (*file)->Find(TileIdOf(PmtilesKeyOf(key, is_mercator)));
-    if (!found) Forget(key);
-    return found;
+    return FindTile(key, TileIdOf(PmtilesKeyOf(key, is_mercator)));
   }
 
   Result<std::optional<dem::HeightRange>> FindRange(const geo::TileKey& key) const override {
@@ -61,17 +56,12 @@ class ArchiveBase : public Archive {
   }
 
  protected:
-  // Null: the archive has no file with this tile.
-  virtual Result<FilePtr> FileOf(const geo::TileKey& key) const = 0;
-  // The file of this tile is damaged: the next look-up opens it again, since it may have been repaired meanwhile.
-  virtual void Forget(const geo::TileKey& key) const = 0;
+  virtual Result<std::optional<ArchivedTile>> FindTile(const geo::TileKey& key, std::uint64_t tile_id) const = 0;
   virtual Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const = 0;
-  void SetOutdated() const { is_outdated_ = true; }
 
  private:
   const std::string place_;
   const Manifest manifest_;
-  mutable std::atomic<bool> is_outdated_{false};
 };
 
 class SingleArchive final : public ArchiveBase {
@@ -79,47 +69,52 @@ class SingleArchive final : public ArchiveBase {
   SingleArchive(std::string place, Manifest manifest, FilePtr file)
       : ArchiveBase(std::move(place), std::move(manifest)), file_(std::move(file)) {}
 
+  bool is_outdated() const override { return is_outdated_; }
+
  protected:
-  Result<FilePtr> FileOf(const geo::TileKey&) const override { return file_; }
-  void Forget(const geo::TileKey&) const override { SetOutdated(); }
+  Result<std::optional<ArchivedTile>> FindTile(const geo::TileKey&, std::uint64_t tile_id) const override {
+    Result<std::optional<ArchivedTile>> found = file_->Find(tile_id);
+    if (!found) is_outdated_ = true;
+    return found;
+  }
   Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const override {
     return take(*file_);
   }
 
  private:
   const FilePtr file_;
+  mutable std::atomic<bool> is_outdated_{false};
 };
 
 class ChunkedArchive final : public ArchiveBase {
  public:
   ChunkedArchive(std::string place, Manifest read) : ArchiveBase(std::move(place), std::move(read)) {
-    for (const UnitEntry& unit : manifest().units) units_.emplace(unit.name, &unit);
+    for (const UnitEntry& unit : manifest().units) {
+      if (unit.tiles == 0) continue;
+      units_[unit.name].entry = &unit;
+      if (!MayExist(PathOf(unit))) lost_.insert(&unit);
+    }
+  }
+
+  bool is_outdated() const override {
+    const std::lock_guard lock(mutex_);
+    return !lost_.empty();
   }
 
  protected:
-  Result<FilePtr> FileOf(const geo::TileKey& key) const override {
+  Result<std::optional<ArchivedTile>> FindTile(const geo::TileKey& key, std::uint64_t tile_id) const override {
     const auto unit = units_.find(UnitNameOf(key));
-    if (unit == units_.end() || unit->second->tiles == 0) return nullptr;
-    {
-      const std::lock_guard lock(mutex_);
-      const auto found = std::ranges::find(open_, unit->second, &Open::unit);
-      if (found != open_.end()) {
-        open_.splice(open_.begin(), open_, found);
-        return open_.front().file;
-      }
+    if (unit == units_.end()) return std::nullopt;
+    auto file = unit->second.idle.Take();
+    if (!file) {
+      Result<FilePtr> opened = OpenUnit(*unit->second.entry);
+      if (!opened) return tl::unexpected(std::move(opened.error()));
+      file.Set(std::make_shared<FilePtr>(*std::move(opened)));
     }
-    Result<FilePtr> file = OpenUnit(*unit->second);  // several threads may open it: no harm
-    if (!file) return file;
-    const std::lock_guard lock(mutex_);
-    open_.push_front({unit->second, *file});
-    if (open_.size() > kMaxOpenFiles) open_.pop_back();
-    return file;
-  }
-
-  void Forget(const geo::TileKey& key) const override {
-    const auto unit = units_.find(UnitNameOf(key));
-    const std::lock_guard lock(mutex_);
-    if (unit != units_.end()) open_.remove_if([&](const Open& open) { return open.unit == unit->second; });
+    Result<std::optional<ArchivedTile>> found = (*file)->Find(tile_id);
+    // It is damaged: the next look-up opens it again, since it may have been repaired meanwhile.
+    if (!found) unit->second.idle.Clear();
+    return found;
   }
 
   Result<void> ForEachFile(const std::function<Result<void>(const PmtilesFile&)>& take) const override {
@@ -133,31 +128,42 @@ class ChunkedArchive final : public ArchiveBase {
   }
 
  private:
-  struct Open {
-    const UnitEntry* unit = nullptr;
-    FilePtr file;
+  struct Unit {
+    const UnitEntry* entry = nullptr;
+    mutable dem::IdlePool<FilePtr> idle;
   };
 
+  std::string PathOf(const UnitEntry& unit) const { return place() + "/" + UnitPath(unit.name); }
+
+  // Notes whether the unit's file is lost.
   Result<FilePtr> OpenUnit(const UnitEntry& unit) const {
-    const std::string path = place() + "/" + UnitPath(unit.name);
+    Result<FilePtr> file = OpenFile(PathOf(unit), unit);
+    const std::lock_guard lock(mutex_);
+    if (file) {
+      lost_.erase(&unit);
+    } else {
+      lost_.insert(&unit);
+    }
+    return file;
+  }
+
+  static Result<FilePtr> OpenFile(const std::string& path, const UnitEntry& unit) {
     constexpr std::size_t kMaxMetadataBytes = std::size_t{1} << 20;  // a unit's metadata is short
     Result<std::unique_ptr<const PmtilesFile>> file = PmtilesFile::Open(path, kMaxMetadataBytes);
     if (!file) {
       if (file.error().code != ErrorCode::kNotFound) return tl::unexpected(std::move(file.error()));
-      SetOutdated();
       return MakeError(ErrorCode::kUnavailable, "{} is missing, although the manifest names it; bake it again", path);
     }
     if ((*file)->bytes() != unit.bytes || UnitKeyIn((*file)->metadata()) != unit.key) {
-      SetOutdated();
       return MakeError(ErrorCode::kUnavailable,
                        "{} is not the file that the manifest describes: it is of another bake; bake it again", path);
     }
     return FilePtr(*std::move(file));
   }
 
-  std::unordered_map<std::string, const UnitEntry*> units_;  // by name
+  std::unordered_map<std::string, Unit> units_;  // with tiles, by name
   mutable std::mutex mutex_;
-  mutable std::list<Open> open_;  // most recently used first; guarded by mutex_
+  mutable std::set<const UnitEntry*> lost_;  // whose files could not be opened when last tried; guarded by mutex_
 };
 
 }  // namespace

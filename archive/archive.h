@@ -1,6 +1,7 @@
 // Reads an archive. Hostile files are safe to read: every size is checked, every tile has a checksum.
 //
-// Thread-safe. Files of units are opened when they are first needed; a bounded number stays open.
+// Thread-safe. Files of units are opened when they are needed, and stay open within the limit of all idle pools
+// (engine/common/idle_pool.h). An archive in one file keeps it open.
 #pragma once
 
 #include <functional>
@@ -19,9 +20,6 @@ namespace terrace::archive {
 
 class Archive {
  public:
-  // The largest number of files that one archive keeps open.
-  static constexpr std::size_t kMaxOpenFiles = 32;
-
   // `place`: a folder with a manifest, or a file written by WriteSingle; also /vsis3/... where the source policy allows
   // it. kNotFound: nothing is there, or the bake is unfinished. kInvalidArgument: it is something else, or of a newer
   // format. kUnavailable: it cannot be read now. Messages name the place and the remedy.
@@ -44,8 +42,9 @@ class Archive {
   // The range of a tile's heights in metres. Nothing and errors: as Find.
   virtual Result<std::optional<dem::HeightRange>> FindRange(const geo::TileKey& key) const = 0;
 
-  // Whether a look-up has met files that are not those of this archive any more, or that cannot be read: the archive
-  // has to be opened again. Files in buckets are not watched in another way.
+  // Whether files are missing, are not those of this archive any more, or cannot be read: the archive has to be opened
+  // again. Missing files of folders are found when the archive is opened, the others by look-ups. Files in buckets are
+  // not watched in another way.
   virtual bool is_outdated() const = 0;
 
   // Calls `take` for each tile, unit by unit, in the order of each unit's file. Ends when `take` fails. Reads and

@@ -209,6 +209,9 @@ std::map<std::string, std::string> TerrainApplication::problems() const {
   const std::lock_guard lock(mutex_);
   std::map<std::string, std::string> all = problems_;
   if (!cache.empty()) all.emplace(kCacheProblem, cache);
+  for (const DatasetView& dataset : state_->catalog->datasets) {
+    if (dataset.only_archive && dataset.only_archive->is_outdated()) all.emplace(dataset.name, kArchiveFault);
+  }
   return all;
 }
 

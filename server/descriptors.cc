@@ -37,8 +37,9 @@ std::size_t VrtParts(std::size_t open_sources, std::size_t threads) {
 
 Result<DescriptorBudget> SplitDescriptors(const DescriptorDemand& demand, std::size_t limit, std::size_t in_use) {
   const std::size_t threads = demand.worker_threads + kOpeners;  // threads that may use a source at the same time
-  const std::size_t server = kOfServer + demand.archive_files + demand.shared_cache + kOfIoThread * demand.io_threads +
-                             (demand.access_log_file ? 1 : 0) + (demand.stores > 0 ? 1 : 0) +
+  const std::size_t server = kOfServer + demand.single_archives + demand.shared_cache +
+                             kOfIoThread * demand.io_threads + (demand.access_log_file ? 1 : 0) +
+                             (demand.stores > 0 ? 1 : 0) +
                              (demand.has_admin_listener ? kAdminConnections + kOfListener : 0);
   const std::size_t of_stores = demand.stores * (RecordDb::kOtherDescriptors + RecordDb::kMinOpenFiles);
   const std::size_t least = in_use + server + of_stores + threads + kMinConnections;

@@ -1,7 +1,7 @@
 // The budget of file descriptors: divides the limit on open files between connections, sources and the disk cache.
 //
 // It is divided once, at the start, and each part keeps its share while the process runs: a dataset that is added by a
-// reload uses the share for sources.
+// reload, and its archive, use the share for sources.
 #pragma once
 
 #include <cstddef>
@@ -23,8 +23,8 @@ struct DescriptorDemand {
   std::size_t open_sources = 0;
   bool has_vrts = false;  // GDAL also keeps their parts open
   std::size_t connections = 1;
-  std::size_t archive_files = 0;
-  std::size_t shared_cache = 0;  // connections to it
+  std::size_t single_archives = 0;  // in one file, which stays open; files of units are sources
+  std::size_t shared_cache = 0;     // connections to it
   bool has_admin_listener = false;
 };
 

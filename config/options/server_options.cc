@@ -241,7 +241,8 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "N",
        .section = "load",
        .help = "Files of sources, of all datasets, that stay open between reads",
-       .details = "Rasters, images, and grids of PROJ. The least recently used ones are closed. Files in use do not "
+       .details = "Rasters, images, grids of PROJ, and units of archives. The least recently used ones are closed. "
+                  "Files in use do not "
                   "count; each thread uses at most one. The server lowers the number if "
                   "[descriptors](operations.md#descriptors) are scarce",
        .codec = Integer(&Config::max_open_sources, 0, 100'000)},

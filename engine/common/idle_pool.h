@@ -1,4 +1,5 @@
-// A pool that keeps unused file handles open: GDAL datasets, images, PROJ operations with their grids.
+// A pool that keeps unused file handles open: GDAL datasets, images, PROJ operations with their grids, units of
+// archives.
 //
 // Each object is used by one thread at a time and returns to its pool. All pools of the process share one list with a
 // limit: the objects unused for longest are closed, whichever pool they belong to. Objects in use do not count; the

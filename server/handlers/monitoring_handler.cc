@@ -71,9 +71,9 @@ Answer AnswerReady(const HandlerState& state, const RequestContext& context) {
     } else if (dataset.empty()) {
       text += "the configuration file is wrong, the last good one is in force\n";
     } else {
-      text += fmt::format(
-          "dataset{}: {}\n", context.sees_all() ? " " + dataset : "",
-          reason == kReopening ? kReopening : "cannot be opened as its files are now; the log has the reason");
+      const bool names_files = reason != kReopening && reason != kArchiveFault;
+      text += fmt::format("dataset{}: {}\n", context.sees_all() ? " " + dataset : "",
+                          names_files ? "cannot be opened as its files are now; the log has the reason" : reason);
     }
   }
   for (const PendingDataset& dataset : pending) {

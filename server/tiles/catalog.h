@@ -67,9 +67,12 @@ struct Catalog {
 };
 using CatalogPtr = std::shared_ptr<const Catalog>;
 
-// The problem of a dataset whose reopening takes long. /readyz shows this text. For other
-// problems, which name files, it says only that the log has the reason.
+// The problem of a dataset whose reopening takes long. /readyz shows this text and the next one. For other problems,
+// which name files, it says only that the log has the reason.
 inline constexpr const char* kReopening = "is being reopened; cached tiles are still served";
+
+// The problem of a dataset without sources whose archive is outdated (BakedTiles::is_outdated).
+inline constexpr const char* kArchiveFault = "files of its archive are missing or cannot be read";
 
 CatalogPtr MakeCatalog(std::shared_ptr<const tiler::TilePipeline> pipeline, std::vector<std::string> pending = {});
 

@@ -3,9 +3,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <iterator>
+#include <memory>
 #include <set>
+#include <vector>
 
 #include "archive/unit_writer.h"
+#include "engine/common/idle_pool.h"
 #include "tests/archive/small_archive.h"
 #include "tests/support/scratch_directory.h"
 #include "tiler/tile/strong_etag.h"
@@ -111,6 +115,39 @@ TEST_F(ArchiveTest, MissingUnitIsAnErrorThatNamesIt) {
   const auto found = archive->Find({7, 100, 50});
   ASSERT_FALSE(found);
   EXPECT_NE(found.error().message.find("units/7-100-50.pmtiles"), std::string::npos);
+}
+
+TEST_F(ArchiveTest, IsOutdatedWhileAFileIsLost) {
+  Bake();
+  const std::string unit = Place() + "/units/7-100-50.pmtiles";
+  std::filesystem::rename(unit, unit + ".away");
+  const auto archive = OpenBaked();
+  EXPECT_TRUE(archive->is_outdated()) << "before any look-up";
+  EXPECT_TRUE(archive->Find({0, 0, 0}));
+  EXPECT_TRUE(archive->is_outdated());
+  std::filesystem::rename(unit + ".away", unit);
+  EXPECT_TRUE(archive->Find({7, 100, 50}));
+  EXPECT_FALSE(archive->is_outdated());
+}
+
+TEST_F(ArchiveTest, OneLimitHoldsForTheFilesOfAllArchives) {
+  Bake();
+  const auto open_files = [] {
+    const std::filesystem::directory_iterator files("/proc/self/fd");
+    return std::distance(begin(files), end(files));
+  };
+  const auto before = open_files();
+  dem::SetMaxIdle(2);
+  std::vector<std::shared_ptr<const Archive>> archives;
+  for (int i = 0; i < 5; ++i) {
+    archives.push_back(OpenBaked());
+    for (const geo::TileKey& key : InventedKeys()) EXPECT_TRUE(archives.back()->Find(key));
+    EXPECT_EQ(open_files(), before + 2);
+  }
+  archives.clear();
+  EXPECT_EQ(open_files(), before);
+  constexpr std::size_t kDefault = 256;
+  dem::SetMaxIdle(kDefault);
 }
 
 TEST_F(ArchiveTest, VerifiedUnitEqualsItsFile) {

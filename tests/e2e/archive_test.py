@@ -349,6 +349,26 @@ class ArchiveTest(unittest.TestCase):
                 self.assertIn("top.pmtiles is damaged", server.log())
                 self.assertIn(short.name, server.log())
 
+    def test_archive_alone_that_lost_a_file_is_degraded_until_it_is_back(self):
+        place = self.copy()
+        unit = next((place / "png/units").glob("*.pmtiles"))  # terrain is opened at the start, for the tileset
+        away, target = unit.with_suffix(".away"), f"/cell/{unit.stem.replace('-', '/')}.png"
+        degraded = "degraded\ndataset cell: files of its archive are missing or cannot be read\n"
+        with self.serve_alone(place) as server:
+            self.assertEqual(server.get("/readyz")[2].decode(), "ready\n")
+            unit.rename(away)
+            self.assertEqual(server.get(target)[0], 503)
+            self.assertEqual(server.get("/readyz")[2].decode(), degraded)
+            end = time.monotonic() + 30
+            while "is served now" not in server.log() and time.monotonic() < end:  # it opens the archive anew once
+                time.sleep(0.1)
+            self.assertEqual(server.get("/readyz")[2].decode(), degraded)
+            with self.serve_alone(place) as other:
+                self.assertEqual(other.get("/readyz")[2].decode(), degraded)
+            away.rename(unit)
+            self.assertEqual(server.get(target)[0], 200)
+            self.assertEqual(server.get("/readyz")[2].decode(), "ready\n")
+
     def test_unfinished_archive(self):
         place = self.copy()
         for manifest in place.rglob("manifest.json"):

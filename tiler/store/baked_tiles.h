@@ -49,7 +49,8 @@ class BakedTiles {
   // ElevationModel::RangeBound of a baked tile; for other tiles the range of the dataset. Errors: those of Find.
   virtual Result<dem::HeightRange> RangeBound(const geo::TileKey& key) const = 0;
 
-  // Whether a look-up has met files of another bake, or files that cannot be read: the archive has to be opened again.
+  // Whether files are known to be missing, of another bake, or not readable: the archive has to be opened again.
+  // Thread-safe.
   virtual bool is_outdated() const = 0;
 
   // Why Find finds nothing for a request: kNotFound.

@@ -152,6 +152,12 @@ Result<tiler::Dataset> OpenBakedAlone(const config::DatasetConfig& wanted) {
   dataset.metadata_availability = baked.metadata_availability;
   dataset.generation = GenerationOf(*archives);
   dataset.baked = archive::MakeBakedTiles(*std::move(archives));
+  if (dataset.baked->is_outdated()) {
+    spdlog::warn(
+        "dataset {}: files of its archive {} are missing, and their tiles answer 503; 'terrace bake --finish' lists "
+        "them",
+        wanted.name, wanted.baked);
+  }
   return dataset;
 }
 

@@ -7,9 +7,7 @@
 #include <string>
 #include <system_error>
 #include <thread>
-#include <vector>
 
-#include "archive/archive.h"
 #include "server/store/record_db.h"
 
 namespace terrace::cli {
@@ -26,16 +24,6 @@ bool HasVrt(const config::DatasetConfig& dataset) {
          });
 }
 
-// A place has an archive for each format. At least 1, also if none is there yet.
-std::size_t ArchivesAt(const std::string& place) {
-  const std::vector<std::string> files = archive::Archive::FilesOf(place);
-  const auto is_file = [](const std::string& file) {
-    std::error_code ignored;
-    return std::filesystem::is_regular_file(file, ignored);
-  };
-  return std::max<std::size_t>(1, static_cast<std::size_t>(std::ranges::count_if(files, is_file)));
-}
-
 server::DescriptorDemand DemandOf(const config::Config& config) {
   server::DescriptorDemand demand;
   demand.io_threads = config.io_threads;
@@ -47,7 +35,8 @@ server::DescriptorDemand DemandOf(const config::Config& config) {
   demand.connections = config.max_connections;
   demand.has_admin_listener = config.admin_listen.has_value();
   for (const config::DatasetConfig& dataset : config.datasets) {
-    if (!dataset.baked.empty()) demand.archive_files += ArchivesAt(dataset.baked) * archive::Archive::kMaxOpenFiles;
+    std::error_code ignored;
+    if (std::filesystem::is_regular_file(dataset.baked, ignored)) ++demand.single_archives;
   }
   if (config.disk_cache.directory.empty()) return demand;
   for (const std::size_t bytes : {config.disk_cache.tile_bytes, config.disk_cache.refinement_bytes}) {
