@@ -33,6 +33,13 @@ Result<Manifest> ManifestOf(const std::string& path, const std::string& metadata
 
 Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
   const std::string path = place + "/" + kManifestFile, json = ToJson(manifest);
+  // A manifest that is larger than readers take must not end a bake.
+  if (json.size() > kMaxManifestBytes) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: would have {} bytes, and the limit is {}; bake fewer levels or a smaller area", path,
+                     json.size(), kMaxManifestBytes);
+  }
+  if (const auto read = ParseManifest(json); !read) return WithPlace(path, read).map([](const auto&) {});
   if (const Result<std::string> there = ReadFile(path, kMaxManifestBytes); there && *there == json) return {};
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));

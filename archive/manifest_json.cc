@@ -71,15 +71,30 @@ T WholeOf(const Json& json, T min, T max) {
 }
 constexpr std::uint64_t kAnyCount = std::uint64_t{1} << 62;
 
-// Parses JSON that may be made to harm: a value of two bytes takes fifty in memory. Throws Wrong, and what Json::parse
-// throws.
+// Parses JSON that may be made to harm: a value of two bytes takes fifty in memory, and functions of Json call
+// themselves for nested values. Throws Wrong, and what Json::parse throws.
 Json ParseBounded(std::string_view text) {
   // Ten times as many as the manifest of all land of the Earth at 30 m has.
-  constexpr std::ptrdiff_t kMaxValues = 2'000'000;
-  // One of these comes before each value but the first.
-  const auto comes_before_value = [](char c) { return c == ',' || c == '[' || c == '{'; };
-  if (std::ranges::count_if(text, comes_before_value) >= kMaxValues) {
-    throw Wrong(fmt::format("it has more than {} values, which no bake writes; copy it again", kMaxValues));
+  constexpr int kMaxValues = 2'000'000, kMaxDepth = 64;
+  int values = 1, depth = 0;
+  bool is_in_string = false, is_escaped = false;
+  for (const char c : text) {
+    if (is_in_string) {
+      is_in_string = is_escaped || c != '"';
+      is_escaped = !is_escaped && c == '\\';
+      continue;
+    }
+    is_in_string = c == '"';
+    // One of these comes before each value but the first.
+    if (c == ',' || c == '[' || c == '{') ++values;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') --depth;
+    if (values > kMaxValues) {
+      throw Wrong(fmt::format("it has more than {} values, which no bake writes; copy it again", kMaxValues));
+    }
+    if (depth > kMaxDepth) {
+      throw Wrong(fmt::format("it is nested more than {} deep, which no bake writes; copy it again", kMaxDepth));
+    }
   }
   return Json::parse(text);
 }

@@ -2,6 +2,7 @@
 
 #include <signal.h>
 #include <unistd.h>
+#include <xxhash.h>
 
 #include <array>
 #include <cerrno>
@@ -64,8 +65,13 @@ std::string FirstWord(const char* path) {
 // Identifies a boot of a machine.
 std::string BootOf() { return FirstWord("/proc/sys/kernel/random/boot_id"); }
 
-// Stays the same after a restart. Names of hosts do not identify a machine: those of containers are often equal.
-std::string MachineOf() { return FirstWord("/etc/machine-id"); }
+// Stays the same after a restart. A hash, because the number itself is confidential (machine-id(5)). Names of hosts do
+// not identify a machine: those of containers are often equal.
+std::string MachineOf() {
+  const std::string id = FirstWord("/etc/machine-id");
+  if (id == kUnknown || id == "uninitialized") return kUnknown;
+  return fmt::format("{:016x}", XXH3_64bits_withSeed(id.data(), id.size(), /*seed=*/0x7465727261636521));
+}
 
 // The owner of a lock, as its file states it: host, process, its start, boot, namespace of process numbers, machine.
 struct Owner {
@@ -76,7 +82,12 @@ struct Owner {
     std::istringstream(text) >> owner.host >> owner.pid >> owner.start >> owner.boot >> owner.space >> owner.machine;
     return owner;
   }
-  bool IsOfThisMachine() const { return machine != kUnknown && machine == MachineOf() && host == HostName(); }
+  // Of this boot or an earlier one. Containers may share a machine-id, so outside of them only.
+  bool IsOfThisMachine() const {
+    constexpr const char* kFirstSpace = "pid:[4026531836]";  // the kernel's own (PROC_PID_INIT_INO)
+    return space == kFirstSpace && NumberSpace() == kFirstSpace && machine != kUnknown && machine == MachineOf() &&
+           host == HostName();
+  }
   // Whether the process has certainly ended. Nothing is known about processes of other machines and containers.
   bool HasEnded() const {
     if (boot == kUnknown) return false;

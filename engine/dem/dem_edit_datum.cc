@@ -90,7 +90,7 @@ Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const NodeGrid& node_g
     const Edit& edit = edits->edits()[number];
     return !edit.changes_heights() || edit.IsStatedIn(datum);
   });
-  if (are_stated) return std::vector<double>();
+  if (datum == HeightDatum::kEllipsoid || are_stated) return std::vector<double>();
   const auto above = ReadUnedited(node_grid, window, HeightDatum::kEllipsoid, what, stop);
   if (!above) return tl::unexpected(above.error());
   std::vector<double> zeros(above->begin(), above->end());

@@ -53,6 +53,7 @@ std::optional<GeoPosition> SharedPosition(Polygon polygon) {
   boost::geometry::unique(polygon);  // sides on both sides of a repeated corner would share it
   std::vector<Side> sides;
   const auto add = [&](const auto& ring) {
+    if (ring.size() < 2) return;  // its positions are all one
     const std::size_t first = sides.size(), last = first + ring.size() - 2;
     for (std::size_t i = 0; first + i <= last; ++i) sides.push_back({{ring[i], ring[i + 1]}, first + i, first, last});
   };

@@ -55,7 +55,7 @@ std::string AttributeOfDepths(GDALRasterBand& band) {
   }
   const char* const quantity = band.GetMetadataItem("standard_name");
   const std::string name = quantity == nullptr ? "" : quantity;
-  return name == "depth" || name.find("_depth_below_") != std::string::npos ? "standard_name: " + name : "";
+  return name == "depth" || name.find("depth_below_") != std::string::npos ? "standard_name: " + name : "";
 }
 
 std::optional<double> DeclaredNodata(GDALRasterBand& band) {

@@ -84,7 +84,13 @@ Result<void> CheckFile(const SourcePolicy& policy, const std::string& path) {
   if (::stat(real->c_str(), &status) != 0 || !S_ISREG(status.st_mode)) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: not a regular file; give the path of one raster file", path);
   }
-  return CheckRoots(policy, path, *real);
+  if (auto allowed = CheckRoots(policy, path, *real); !allowed) return allowed;
+  // Some drivers of GDAL open a file that cannot be read, and crash when they read it.
+  if (::faccessat(AT_FDCWD, real->c_str(), R_OK, AT_EACCESS) != 0) {
+    return MakeError(ErrorCode::kUnavailable, "{}: cannot be read: {}; give this user permission to read it", path,
+                     ErrorText());
+  }
+  return {};
 }
 
 // Files that GDAL opens automatically beside a raster. If they exist, they must be allowed, too.
@@ -204,10 +210,10 @@ Result<void> CheckLinks(GDALDataset& dataset, const std::string& path) {
 }
 
 std::vector<std::string> ClearGdalEnvironment() {
-  // The last ones are of drivers.
-  constexpr std::array<std::string_view, 16> kPrefixes = {"GDAL_", "CPL_",   "OGR_",     "OSR_",     "PROJ_", "VSI_",
-                                                          "VRT_",  "GTIFF_", "TIFF_",    "AAIGRID_", "DTED_", "HFA_",
-                                                          "NITF_", "GRIB_",  "USGSDEM_", "ISIS3_"};
+  // Of GDAL and PROJ, then of drivers.
+  constexpr std::array<std::string_view, 20> kPrefixes = {
+      "GDAL_", "CPL_",   "OGR_", "OSR_",   "PROJ_", "VSI_",  "VRT_", "AAIGRID_", "DTED_", "ENVI_",
+      "GRIB_", "GTIFF_", "HFA_", "ISIS3_", "JPEG_", "NITF_", "OPJ_", "PNG_",     "TIFF_", "USGSDEM_"};
   constexpr std::array<std::string_view, 3> kKept = {"GDAL_DATA", "PROJ_DATA", "PROJ_LIB"};
   std::vector<std::string> names;
   for (char** entry = environ; *entry != nullptr; ++entry) {

@@ -98,7 +98,7 @@ asio::awaitable<Response> DocumentMaker::MakeOnWorker(DocumentPlan plan, tiler::
   std::string key = fmt::format("{} {} {}", fmt::ptr(catalog_.get()), tiler::NameOf(coding), plan.key);
   const auto deadline = TileService::Clock::now() + deadline_;
   Result<DocumentPtr> made =
-      co_await workers_.RunShared(std::move(key), std::move(work), deadline, context.request->client);
+      co_await workers_.RunShared(std::move(key), "the document", std::move(work), deadline, context.request->client);
   if (!made) co_return co_await BackendFailure(made.error(), context.request->id);
   if ((*made)->is_final) kept_.Insert(Key{plan.key, coding}, *made);
   co_return Serve(**made, plan, *context.request);

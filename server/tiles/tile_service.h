@@ -69,13 +69,14 @@ class TileService {
     return pool_.Run<T>(std::move(work), TermsOf(length, deadline, client));
   }
 
-  // Like Run with kShort, but calls with equal keys that wait at the same time share one run and its result.
+  // Like Run with kShort, but calls with equal keys that wait at the same time share one run and its result. `name`: of
+  // the work, in messages.
   // Precondition: calls with equal keys have the same T and equivalent work. The coroutine must run on a single thread.
   template <typename T>
-  asio::awaitable<Result<std::shared_ptr<const T>>> RunShared(std::string key, Work<std::shared_ptr<const T>> work,
+  asio::awaitable<Result<std::shared_ptr<const T>>> RunShared(std::string key, std::string name,
+                                                              Work<std::shared_ptr<const T>> work,
                                                               Clock::time_point deadline, std::uint64_t client) {
     Work<std::shared_ptr<const void>> untyped = std::move(work);
-    std::string name = "work for equal requests";
     auto flight = co_await shared_runs_.Join(std::move(key), std::move(name), std::move(untyped),
                                              TermsOf(Length::kShort, deadline, client));
     if (!flight.value) co_return tl::unexpected(std::move(flight.value.error()));

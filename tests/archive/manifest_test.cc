@@ -110,6 +110,21 @@ TEST(ManifestTest, TooManyValuesAreRefused) {
   }
 }
 
+// Functions of the JSON library call themselves for each level.
+TEST(ManifestTest, DeepNestingIsRefused) {
+  const std::string json = WithoutChecksum(ToJson(FullManifest()));
+  const auto with = [&](std::size_t depth) {
+    std::string deep = json;
+    deep.insert(deep.find('{') + 1, "\"quote \\\"[[\": " + std::string(depth, '[') + std::string(depth, ']') + ",");
+    return deep;
+  };
+  EXPECT_TRUE(ParseManifest(with(60)));
+  for (const Result<Manifest>& read : {ParseManifest(with(300'000)), ManifestOf("a.pmtiles", with(300'000))}) {
+    ASSERT_FALSE(read);
+    EXPECT_NE(read.error().message.find("nested more than 64 deep"), std::string::npos) << read.error().message;
+  }
+}
+
 TEST(ManifestTest, NonsenseIsRefused) {
   const std::string json = WithoutChecksum(ToJson(FullManifest()));
   ASSERT_TRUE(ParseManifest(json));

@@ -52,6 +52,28 @@ TEST(OpenErrors, NameTheHeaderOfASagaRaster) {
   ExpectRefused(renamed, {"is the header of a SAGA raster"});
 }
 
+TEST(OpenErrors, NameSrtmCellsWithoutTheNameOfOne) {
+  const TempDir dir;
+  const std::string cell(std::size_t{1201} * 1201 * 2, '\1');
+  for (const char* const name : {"srtm.hgt", "N46E008.hgt"}) std::ofstream(dir.File(name), std::ios::binary) << cell;
+  ExpectRefused(dir.File("srtm.hgt"), {"its name or size is not that of an SRTM cell", "N46E008.hgt"});
+  EXPECT_TRUE(ElevationModel::Open(dir.File("N46E008.hgt")));
+}
+
+// GDAL's driver of SRTM cells crashes when it reads such a file.
+TEST(OpenErrors, NameFilesThatMayNotBeRead) {
+  const TempDir dir;
+  const std::string path = dir.File("N46E008.hgt");
+  std::ofstream(path, std::ios::binary) << std::string(std::size_t{1201} * 1201 * 2, '\1');
+  ::chmod(path.c_str(), 0);
+  ::chmod(dir.path().c_str(), 0755);
+  const uid_t user = ::geteuid();
+  constexpr uid_t kNobody = 65534;
+  ASSERT_TRUE(user != 0 || ::seteuid(kNobody) == 0);
+  ExpectRefused(path, {"cannot be read: Permission denied"});
+  ASSERT_TRUE(user != 0 || ::seteuid(user) == 0);
+}
+
 TEST(OpenErrors, OfferGeoreferencing) {
   const TempDir dir;
   ExpectRefused(WriteRaster(dir, {.georeferenced = false, .crs = ""}),

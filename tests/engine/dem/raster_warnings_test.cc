@@ -129,6 +129,15 @@ TEST(RasterWarnings, NameDepths) {
   ExpectOne(WarningsAbout(path, {.vertical = "ellipsoid"}), "has depths (NAVD88 depth)");
 }
 
+// The British National Grid beyond Britain.
+TEST(RasterWarnings, SystemsThatCannotBeConvertedExactlyAreNamed) {
+  const TempDir dir;
+  RasterSpec spec{.geo_transform = {1'500'000, 100, 0, 300'000, 0, -100}, .crs = "EPSG:27700"};
+  ExpectOne(WarningsAbout(WriteRaster(dir, spec), {.vertical = "ellipsoid"}), "PROJ knows no exact way from OSGB36");
+  spec.geo_transform = {400'000, 100, 0, 300'000, 0, -100};
+  EXPECT_EQ(WarningsAbout(WriteRaster(dir, spec), {.vertical = "ellipsoid"}), std::vector<std::string>());
+}
+
 // Writes a netCDF file of heights at these latitudes, half a degree apart from west to east. `positive`, `quantity`:
 // attributes; null: none.
 std::string WriteNetCdf(const TempDir& dir, const std::vector<double>& latitudes, const char* positive = nullptr,
@@ -208,6 +217,7 @@ TEST(RasterWarnings, BandsThatStateDepthsAreRefused) {
   };
   EXPECT_FALSE(of_quantity(nullptr, "sea_floor_depth_below_geoid"));
   EXPECT_FALSE(of_quantity(nullptr, "depth"));
+  EXPECT_FALSE(of_quantity(nullptr, "depth_below_geoid"));
   EXPECT_TRUE(of_quantity("up", "sea_floor_depth_below_geoid"));
   EXPECT_TRUE(of_quantity(nullptr, "surface_altitude"));
 }
