@@ -1,5 +1,6 @@
 #include "engine/gdal/source_policy.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gdal_priv.h>
 #include <sys/stat.h>
@@ -14,6 +15,7 @@
 #include <string_view>
 #include <system_error>
 
+#include "engine/core/errno_text.h"
 #include "engine/gdal/driver_list.h"
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/vrt_check.h"

@@ -1,5 +1,7 @@
 // Every bad input is rejected with a message that names the file and the remedy.
 #include <gdal_priv.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
