@@ -10,7 +10,9 @@
 namespace terrace::archive {
 namespace {
 
-constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{64} << 20;
+// Ten times as many as the manifest of all land of the Earth at 30 m has. A value takes more than 20 bytes, so that
+// ParseManifest takes each manifest of this size.
+constexpr std::uint64_t kMaxManifestBytes = std::uint64_t{32} << 20;
 
 Result<Manifest> WithPlace(const std::string& place, Result<Manifest> manifest) {
   if (manifest) return manifest;
@@ -39,7 +41,6 @@ Result<void> WriteManifest(const std::string& place, const Manifest& manifest) {
                      "{}: would have {} bytes, and the limit is {}; bake fewer levels or a smaller area", path,
                      json.size(), kMaxManifestBytes);
   }
-  if (const auto read = ParseManifest(json); !read) return WithPlace(path, read).map([](const auto&) {});
   if (const Result<std::string> there = ReadFile(path, kMaxManifestBytes); there && *there == json) return {};
   Result<OutputFile> out = OutputFile::Create(path);
   if (!out) return tl::unexpected(std::move(out.error()));
