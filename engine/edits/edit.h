@@ -121,10 +121,10 @@ struct Edit {
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
   // Whether the edit applies to heights in a datum without a conversion of its own heights.
-  bool IsStatedIn(HeightDatum heights) const {
+  bool IsStatedIn(HeightDatum of_heights) const {
     if (op == EditOp::kOffset) return true;
-    if (heights == HeightDatum::kEllipsoid) return undulations == nullptr;
-    return heights == HeightDatum::kSource ? is_in_source_datum : is_in_orthometric;
+    if (of_heights == HeightDatum::kEllipsoid) return undulations == nullptr;
+    return of_heights == HeightDatum::kSource ? is_in_source_datum : is_in_orthometric;
   }
   // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double WeightAt(double distance_m) const {
