@@ -1,6 +1,6 @@
 # Installs the tiler library for find_package(terrace): static libraries, the headers of its interface with those that
-# they include, and the package files. Component "development"; `cmake --install` without a component leaves it out, so packages of the server do not
-# contain it.
+# they include, and the package files. Component "development"; `cmake --install` without a component leaves it out, so
+# packages of the server do not contain it.
 include(CMakePackageConfigHelpers)
 
 # terrace_reached_headers(RESULT HEADER...): these headers and those that they include, relative to the tree.

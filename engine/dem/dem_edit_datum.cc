@@ -82,29 +82,30 @@ bool ElevationModel::Impl::CountsFrom(const std::string& geoid, HeightDatum datu
 }
 
 template <typename NodeGrid>
-Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const NodeGrid& node_grid, const NodeWindow& window,
-                                                          std::span<const std::size_t> which, HeightDatum datum,
-                                                          std::span<const float> unedited, const std::string& what,
-                                                          const std::stop_token& stop) const {
-  const bool are_stated = std::ranges::all_of(which, [&](std::size_t number) {
+Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const NodeGrid& node_grid, const NodeWindow& window,
+                                                                   std::span<const std::size_t> which,
+                                                                   HeightDatum datum, std::span<const float> unedited,
+                                                                   const std::string& what,
+                                                                   const std::stop_token& stop) const {
+  const bool are_in_datum = std::ranges::all_of(which, [&](std::size_t number) {
     const Edit& edit = edits->edits()[number];
-    return !edit.changes_heights() || edit.IsStatedIn(datum);
+    return !edit.changes_heights() || edit.TargetDatum(datum) == datum;
   });
-  if (datum == HeightDatum::kEllipsoid || are_stated) return std::vector<double>();
+  if (are_in_datum) return std::vector<double>();
   const auto above = ReadUnedited(node_grid, window, HeightDatum::kEllipsoid, what, stop);
   if (!above) return tl::unexpected(above.error());
-  std::vector<double> zeros(above->begin(), above->end());
-  for (std::size_t k = 0; k < zeros.size(); ++k) zeros[k] -= static_cast<double>(unedited[k]);
-  return zeros;
+  std::vector<double> undulations(above->begin(), above->end());
+  for (std::size_t k = 0; k < undulations.size(); ++k) undulations[k] -= static_cast<double>(unedited[k]);
+  return undulations;
 }
 
-template Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const geo::Lattice&, const NodeWindow&,
-                                                                   std::span<const std::size_t>, HeightDatum,
-                                                                   std::span<const float>, const std::string&,
-                                                                   const std::stop_token&) const;
-template Result<std::vector<double>> ElevationModel::Impl::ZerosOf(const geo::MercatorGrid&, const NodeWindow&,
-                                                                   std::span<const std::size_t>, HeightDatum,
-                                                                   std::span<const float>, const std::string&,
-                                                                   const std::stop_token&) const;
+template Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const geo::Lattice&, const NodeWindow&,
+                                                                            std::span<const std::size_t>, HeightDatum,
+                                                                            std::span<const float>, const std::string&,
+                                                                            const std::stop_token&) const;
+template Result<std::vector<double>> ElevationModel::Impl::DatumUndulations(const geo::MercatorGrid&, const NodeWindow&,
+                                                                            std::span<const std::size_t>, HeightDatum,
+                                                                            std::span<const float>, const std::string&,
+                                                                            const std::stop_token&) const;
 
 }  // namespace terrace::dem

@@ -228,7 +228,7 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
   // and datum share them.
   std::map<std::pair<std::size_t, HeightDatum>, ReplacedHeights> known;
   const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
-    const std::pair wanted(edit.replacement, edit.IsStatedIn(datum.datum) ? datum.datum : HeightDatum::kEllipsoid);
+    const std::pair wanted(edit.replacement, edit.TargetDatum(datum.datum));
     if (const auto found = known.find(wanted); found != known.end()) return &found->second;
     const Impl& other = *replacements[edit.replacement]->impl_;
     std::vector<PartReading> readings;
@@ -288,9 +288,7 @@ Result<void> ElevationModel::Impl::EditPoints(std::span<const GeoPosition> point
     above = *std::move(read);
   }
   std::map<std::pair<std::size_t, HeightDatum>, std::vector<float>> others;  // by replacement and datum
-  const auto of = [&](const Edit& edit) {
-    return std::pair(edit.replacement, edit.IsStatedIn(datum) ? datum : HeightDatum::kEllipsoid);
-  };
+  const auto of = [&](const Edit& edit) { return std::pair(edit.replacement, edit.TargetDatum(datum)); };
   for (std::size_t k = 0; k < at.size(); ++k) {
     for (const std::size_t number : which[k]) {
       const Edit& edit = edits->edits()[number];

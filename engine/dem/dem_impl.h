@@ -73,13 +73,13 @@ class ElevationModel::Impl {
   Result<std::string> AddUndulations(Edit& edit) const;
   // Whether all heights in a datum that an edit may reach count from a geoid (GeoidIn). dem_edit_datum.cc.
   bool CountsFrom(const std::string& geoid, HeightDatum datum, const Box& reach) const;
-  // The zeros of EditedDatum at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
+  // EditedDatum::undulations at a window's nodes; empty: no edit needs them. `unedited`: heights in `datum`.
   // dem_edit_datum.cc.
   template <typename NodeGrid>
-  Result<std::vector<double>> ZerosOf(const NodeGrid& node_grid, const NodeWindow& window,
-                                      std::span<const std::size_t> which, HeightDatum datum,
-                                      std::span<const float> unedited, const std::string& what,
-                                      const std::stop_token& stop) const;
+  Result<std::vector<double>> DatumUndulations(const NodeGrid& node_grid, const NodeWindow& window,
+                                               std::span<const std::size_t> which, HeightDatum datum,
+                                               std::span<const float> unedited, const std::string& what,
+                                               const std::stop_token& stop) const;
   // Of a flatten without a height.
   Result<std::string> AddFlatHeight(Edit& edit, const std::stop_token& stop) const;
   // Of a replace.

@@ -282,9 +282,9 @@ Result<std::vector<float>> ElevationModel::Impl::ReadNodes(const NodeGrid& node_
   if (!heights) return heights;
   const std::vector<std::size_t> which = EditsAt(node_grid, window);
   if (which.empty()) return heights;
-  const auto zeros = ZerosOf(node_grid, window, which, datum, *heights, what, stop);
-  if (!zeros) return tl::unexpected(zeros.error());
-  if (auto edited = ApplyEdits(node_grid, window, which, {datum, *zeros}, *heights, stop); !edited) {
+  const auto undulations = DatumUndulations(node_grid, window, which, datum, *heights, what, stop);
+  if (!undulations) return tl::unexpected(undulations.error());
+  if (auto edited = ApplyEdits(node_grid, window, which, {datum, *undulations}, *heights, stop); !edited) {
     return tl::unexpected(std::move(edited).error());
   }
   return heights;
@@ -371,15 +371,15 @@ Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const No
   if (const auto filled = impl_->FillWithFloor(grid, window, datum, unedited); !filled) {
     return tl::unexpected(filled.error());
   }
-  const auto zeros = impl_->ZerosOf(grid, window, which, datum, unedited, what, stop);
-  if (!zeros) return tl::unexpected(zeros.error());
+  const auto undulations = impl_->DatumUndulations(grid, window, which, datum, unedited, what, stop);
+  if (!undulations) return tl::unexpected(undulations.error());
   const bool has_voids = HasVoids(*known);
-  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *zeros}, *known, stop); !done) {
+  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *undulations}, *known, stop); !done) {
     return tl::unexpected(done.error());
   }
   if (!has_voids) return known;
   std::vector<float> edited = unedited;
-  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *zeros}, edited, stop); !done) {
+  if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *undulations}, edited, stop); !done) {
     return tl::unexpected(done.error());
   }
   // A void that is left in `known` was not set by an edit. One that fades into the floor shows there as well.

@@ -120,11 +120,12 @@ struct Edit {
     return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
-  // Whether the edit applies to heights in a datum without a conversion of its own heights.
-  bool IsStatedIn(HeightDatum of_heights) const {
-    if (op == EditOp::kOffset) return true;
-    if (of_heights == HeightDatum::kEllipsoid) return undulations == nullptr;
-    return of_heights == HeightDatum::kSource ? is_in_source_datum : is_in_orthometric;
+  // The datum of the edit's target when it changes heights in a datum: the same if the target counts from its zero
+  // wherever the edit may reach, else the ellipsoid, from which the target is then converted.
+  HeightDatum TargetDatum(HeightDatum of_heights) const {
+    const bool is_same = op == EditOp::kOffset || (of_heights == HeightDatum::kSource && is_in_source_datum) ||
+                         (of_heights == HeightDatum::kOrthometric && is_in_orthometric);
+    return is_same ? of_heights : HeightDatum::kEllipsoid;
   }
   // The weight of an edit at a distance from its polygon or its line: 1 inside, 0 beyond the blend.
   double WeightAt(double distance_m) const {

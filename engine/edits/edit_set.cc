@@ -39,10 +39,8 @@ struct EmptyBox {
 };
 thread_local EmptyBox last_empty;
 
-// Whether an edit's target above the ellipsoid has to be converted to the heights' datum.
-bool IsConverted(const Edit& edit, const EditedDatum& datum) {
-  return datum.datum != HeightDatum::kEllipsoid && !edit.IsStatedIn(datum.datum);
-}
+// Whether an edit's target has to be converted to the heights' datum.
+bool IsConverted(const Edit& edit, const EditedDatum& datum) { return edit.TargetDatum(datum.datum) != datum.datum; }
 
 // The edited height. `target`: NaN where a replacement has none.
 double Edited(EditOp op, double height, double target, double weight) {

@@ -33,8 +33,7 @@ using EditRows = std::unordered_map<std::size_t, EditRow>;
 // The datum of heights that are edited.
 struct EditedDatum {
   HeightDatum datum = HeightDatum::kEllipsoid;
-  // Of its zero above the ellipsoid, metres, by node. Not used for edits that are stated in the datum
-  // (Edit::IsStatedIn), so empty if all are.
+  // Of its zero above the ellipsoid, metres, by node. Empty if no edit needs them (Edit::TargetDatum).
   std::span<const double> undulations = {};
 };
 

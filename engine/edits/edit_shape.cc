@@ -172,7 +172,7 @@ double StatedTarget(const Edit& edit, PlanPoint point, const EditPlace& place, s
 double Target(const Edit& edit, PlanPoint point, const EditPlace& place, std::span<const std::uint32_t> near,
               HeightDatum datum) {
   const double stated = StatedTarget(edit, point, place, near);
-  if (edit.undulations == nullptr || edit.IsStatedIn(datum)) return stated;
+  if (edit.undulations == nullptr || edit.TargetDatum(datum) != HeightDatum::kEllipsoid) return stated;
   return stated + edit.undulations->At(point);
 }
 
