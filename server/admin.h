@@ -11,6 +11,7 @@
 
 #include "engine/core/result.h"
 #include "server/http/application.h"
+#include "server/jobs/worker_pool.h"
 #include "server/telemetry/access_log.h"
 #include "server/telemetry/metrics.h"
 #include "server/telemetry/metrics_page.h"
@@ -31,6 +32,7 @@ Result<Purge> ParsePurge(std::string_view query, const Catalog& catalog);
 
 // What the application uses; outlives it.
 struct AdminParts {
+  WorkerPool& workers;
   TileService& tiles;
   tiler::RefinementCache* refinements = nullptr;  // may be null
   Metrics& metrics;

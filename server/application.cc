@@ -13,7 +13,7 @@
 namespace terrace::server {
 namespace {
 
-using Clock = TileService::Clock;
+using Clock = JobClock;
 
 // How long a request waits for a replaced source, and how often it checks.
 constexpr std::chrono::milliseconds kReplaceTime{3'000}, kReplacePeriod{20};
@@ -174,7 +174,8 @@ TerrainApplication::HandlerStatePtr TerrainApplication::Make(CatalogPtr catalog,
   config.max_locations = started_.max_locations;
   config.trusted_proxies = started_.trusted_proxies;
   config.forwarded_header = started_.forwarded_header;
-  return std::make_shared<const HandlerState>(std::move(catalog), parts_.tiles, parts_.viewer, config, *this);
+  return std::make_shared<const HandlerState>(std::move(catalog), parts_.workers, parts_.tiles, parts_.document_flights,
+                                              parts_.viewer, config, *this);
 }
 
 std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::address& peer) {

@@ -28,7 +28,9 @@ namespace terrace::server {
 // What the application uses to answer and report requests; outlives it.
 struct ApplicationParts {
   ClientAccess& access;
+  WorkerPool& workers;
   TileService& tiles;
+  DocumentFlights& document_flights;
   Metrics& metrics;
   MetricsPage& metrics_page;
   AccessLog& access_log;
@@ -75,8 +77,7 @@ class TerrainApplication final : public Application, public ProcessState {
   bool HasLastingProblem(const std::string& dataset) const;
 
   asio::awaitable<bool> FirstCatalog() const;
-  asio::awaitable<bool> NextCatalog(HandlerStatePtr now, std::string dataset,
-                                    TileService::Clock::time_point give_up) const;
+  asio::awaitable<bool> NextCatalog(HandlerStatePtr now, std::string dataset, JobClock::time_point give_up) const;
 
   const ApplicationParts parts_;
   mutable std::mutex mutex_;

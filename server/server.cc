@@ -70,15 +70,15 @@ class RunningServer final : public Server {
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
         access_(std::move(access)),
-        tiles_({options_.config.worker_threads, options_.config.queue_length, options_.config.cache_bytes,
-                options_.tile_stores, MakeTileHeaders},
+        workers_(options_.config.worker_threads, options_.config.queue_length),
+        tiles_(workers_, {options_.config.cache_bytes, options_.tile_stores, MakeTileHeaders},
                std::bind_front(&Metrics::CountBuild, &metrics_)),
-        metrics_page_([this] { return metrics_.Text(tiles_.stats(), CurrentState()); }, options_.metrics_age),
-        application_({*access_, tiles_, metrics_, metrics_page_, access_log_,
+        metrics_page_([this] { return metrics_.Text(CurrentState()); }, options_.metrics_age),
+        application_({*access_, workers_, tiles_, document_flights_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_problem, options_.progress_of},
                      std::move(catalog), options_.config),
-        admin_({tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
+        admin_({workers_, tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
                 [this] { return application_.catalog(); }, application_.deadline()}),
         io_(options_.config.io_threads),
         signals_(io_.first()) {}
@@ -175,7 +175,7 @@ class RunningServer final : public Server {
     listener_->Close();
     const bool drained = access_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
         std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
-    tiles_.CancelBuilds();
+    workers_.Cancel();
     // The time beyond the drain timeout is too short to wait for the disk.
     if (!drained) {
       for (tiler::StoreBase* store : Stores()) store->Abandon();
@@ -188,7 +188,7 @@ class RunningServer final : public Server {
     CloseAdminListener();
     io_.Stop();
     metrics_page_.Stop();
-    tiles_.Shutdown();
+    workers_.Shutdown();
     const char* const stopped = application_.opening() ? "stopped before any dataset was served" : "stopped";
     if (drained) {
       spdlog::info("{}; no request is left unanswered", stopped);
@@ -254,6 +254,10 @@ class RunningServer final : public Server {
 
   Metrics::ServerState CurrentState() const {
     Metrics::ServerState state;
+    state.tiles = tiles_.stats();
+    state.queued = workers_.queued();
+    state.in_flight = state.tiles.in_flight + document_flights_.in_flight() + workers_.runs();
+    state.joined = state.tiles.joined + document_flights_.joined_total();
     if (options_.refinements) state.refinements = options_.refinements->stats();
     state.stores = Stores();
     state.tile_stores = options_.tile_stores.size();
@@ -299,7 +303,9 @@ class RunningServer final : public Server {
   AccessLog access_log_;
   Metrics metrics_;
   const std::unique_ptr<ClientAccess> access_;  // jobs of workers hold bodies that count in it
+  WorkerPool workers_;
   TileService tiles_;
+  DocumentFlights document_flights_{workers_};
   MetricsPage metrics_page_;
   TerrainApplication application_;
   AdminApplication admin_;

@@ -22,8 +22,8 @@
 #include "server/http/application.h"
 #include "server/http/request.h"
 #include "server/http/response.h"
+#include "server/jobs/single_flight.h"
 #include "server/tiles/catalog.h"
-#include "server/tiles/tile_service.h"
 #include "tiler/store/byte_cache.h"
 
 namespace terrace::server {
@@ -83,14 +83,17 @@ Result<RenderedDocument> MakeDocument(const DocumentPlan::Write& write, tiler::C
 // Like Serve for a Document.
 Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Request& request);
 
+// Documents that are being made, of all catalogs.
+using DocumentFlights = SingleFlight<std::string, std::shared_ptr<const RenderedDocument>>;
+
 // Thread-safe.
 class DocumentMaker {
  public:
   // Size of the cache. The least recently used documents are evicted first.
   static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
 
-  // `workers` must outlive this object. All plans refer to `catalog`. `deadline`: of making a document.
-  DocumentMaker(CatalogPtr catalog, TileService& workers, std::chrono::milliseconds deadline);
+  // `flights` must outlive this object. All plans refer to `catalog`. `deadline`: of making a document.
+  DocumentMaker(CatalogPtr catalog, DocumentFlights& flights, std::chrono::milliseconds deadline);
 
   // Returns cached documents at once. This object and `context` must outlive the answer.
   Answer Make(DocumentAnswer described, const RequestContext& context) const;
@@ -112,7 +115,7 @@ class DocumentMaker {
   asio::awaitable<Response> MakeOnWorker(DocumentPlan plan, tiler::Coding coding, const RequestContext& context) const;
 
   const CatalogPtr catalog_;
-  TileService& workers_;
+  DocumentFlights& flights_;
   const std::chrono::milliseconds deadline_;
   mutable tiler::ByteCache<Key, KeyHash, RenderedDocument> kept_{kKeptBytes};
 };

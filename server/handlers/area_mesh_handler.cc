@@ -40,8 +40,7 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
                                     tiler::AreaRequest area, tiler::AreaPlan plan, tiler::Coding coding,
                                     Response response) {
   Work<tiler::EncodedTile> work = [catalog = state.catalog, dataset, area, plan, coding,
-                                   requested_at =
-                                       TileService::Clock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
+                                   requested_at = JobClock::now()](std::stop_token stop) -> Result<tiler::EncodedTile> {
     const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
     Result<tiler::EncodedTile> mesh = catalog->pipeline->BuildArea(dataset, plan, area, stop);
     if (!mesh) return mesh;
@@ -53,7 +52,7 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
   };
   const auto deadline = state.Deadline();
   Result<tiler::EncodedTile> mesh =
-      co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+      co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
   if (!mesh) co_return co_await RefuseQuery(mesh.error(), state.catalog->datasets[dataset], context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {

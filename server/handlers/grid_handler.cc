@@ -145,10 +145,10 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
                                    std::shared_ptr<const GridQuery> query, tiler::Coding coding, Response response) {
   const DatasetView& view = state.catalog->datasets[dataset];
   Work<MadeGrid> work = [catalog = state.catalog, dataset, query, coding, most = state.max_mesh_samples,
-                         requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
+                         requested_at = JobClock::now()](const std::stop_token& stop) -> Result<MadeGrid> {
     MadeGrid made;
     made.reply.times.queue = MicrosecondsSince(requested_at);
-    auto begun = TileService::Clock::now();
+    auto begun = JobClock::now();
     const Result<dem::OutputGrid> grid = dem::PlanOutputGrid(query->grid, most);
     if (!grid) return tl::unexpected(grid.error());
     if (query->format == GridFormat::kGeoTiff) {  // before heights are read in vain
@@ -157,7 +157,7 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
     const Result<std::vector<float>> heights = ReadNodes(*catalog->pipeline, dataset, *query, *grid, stop);
     if (!heights) return tl::unexpected(heights.error());
     made.reply.times.read = MicrosecondsSince(begun);
-    begun = TileService::Clock::now();
+    begun = JobClock::now();
     const Steps steps = Steps::Of(*heights, query->range);
     const auto checked = CheckHasHeights(*query, *grid, steps, catalog->datasets[dataset]);
     if (!checked) return tl::unexpected(checked.error());
@@ -170,8 +170,7 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
     return made;
   };
   const auto deadline = state.Deadline();
-  Result<MadeGrid> made =
-      co_await state.tiles.Run(std::move(work), TileService::Length::kLong, deadline, context.request->client);
+  Result<MadeGrid> made = co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
   if (!made) co_return co_await RefuseQuery(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
   Response reply = co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);

@@ -22,9 +22,10 @@ std::vector<HandlerState::DatasetDocuments> MakeDatasetDocuments(const std::vect
 
 }  // namespace
 
-HandlerState::HandlerState(CatalogPtr c, TileService& t, std::shared_ptr<const StaticFiles> v,
-                           const config::Config& config, const ProcessState& p)
+HandlerState::HandlerState(CatalogPtr c, WorkerPool& w, TileService& t, DocumentFlights& document_flights,
+                           std::shared_ptr<const StaticFiles> v, const config::Config& config, const ProcessState& p)
     : catalog(std::move(c)),
+      workers(w),
       tiles(t),
       process(p),
       viewer(std::move(v)),
@@ -36,6 +37,6 @@ HandlerState::HandlerState(CatalogPtr c, TileService& t, std::shared_ptr<const S
       dataset_documents(MakeDatasetDocuments(catalog->datasets)),
       list(Document::Make(DatasetsJson(catalog->datasets), "application/json")),
       index(Document::Make(IndexHtml(catalog->datasets), "text/html; charset=utf-8")),
-      documents(catalog, tiles, deadline) {}
+      documents(catalog, document_flights, deadline) {}
 
 }  // namespace terrace::server

@@ -25,6 +25,7 @@
 #include "server/documents/document.h"
 #include "server/documents/static_files.h"
 #include "server/http/application.h"
+#include "server/jobs/worker_pool.h"
 #include "server/query/heights_query.h"
 #include "server/tiles/catalog.h"
 #include "server/tiles/tile_service.h"
@@ -57,14 +58,15 @@ class ProcessState {
 
 // What handlers answer from: one for each catalog. Thread-safe. A request keeps it alive until it is answered.
 struct HandlerState {
-  // `tiles`: its workers run all work that may block. `tiles` and `process` must outlive this object.
-  HandlerState(CatalogPtr catalog, TileService& tiles, std::shared_ptr<const StaticFiles> viewer,
-               const config::Config& config, const ProcessState& process);
+  // `workers` run all work that may block. What is passed by reference must outlive this object, except `config`.
+  HandlerState(CatalogPtr catalog, WorkerPool& workers, TileService& tiles, DocumentFlights& document_flights,
+               std::shared_ptr<const StaticFiles> viewer, const config::Config& config, const ProcessState& process);
 
   // The deadline of work that begins now. Waits for memory before and after it have the session's (http/session.h).
-  TileService::Clock::time_point Deadline() const { return TileService::Clock::now() + deadline; }
+  JobClock::time_point Deadline() const { return JobClock::now() + deadline; }
 
   const CatalogPtr catalog;
+  WorkerPool& workers;
   TileService& tiles;
   const ProcessState& process;
   const std::shared_ptr<const StaticFiles> viewer;

@@ -38,22 +38,21 @@ constexpr std::size_t kShortList = 1000;
 constexpr std::size_t kStopPeriod = 1024;
 
 asio::awaitable<Result<ServedTile>> TileOf(const HandlerState& state, tiler::TileRequest tile,
-                                           TileService::Clock::time_point deadline, std::uint64_t client) {
+                                           JobClock::time_point deadline, std::uint64_t client) {
   if (std::optional<ServedTile> found = state.tiles.Find(*state.catalog, tile)) co_return *std::move(found);
   co_return co_await state.tiles.Build(state.catalog, tile, deadline, client);
 }
 
 // Gets the certified errors of the points' tiles one after the other, from the cache or by building the tiles.
 asio::awaitable<Result<CertifiedPoints>> Certify(const HandlerState& state, std::uint32_t dataset,
-                                                 const HeightsQuery& query, TileService::Clock::time_point deadline,
+                                                 const HeightsQuery& query, JobClock::time_point deadline,
                                                  std::uint64_t client) {
   // On a worker, because finding the tiles of thousands of points in a large mosaic takes time.
   Work<CertifiedPoints> find = [catalog = state.catalog, dataset, wanted = query.points,
                                 level = *query.certify_level](const std::stop_token& stop) {
     return CertifyingTilesOf(catalog->datasets[dataset], wanted, level, stop);
   };
-  Result<CertifiedPoints> points =
-      co_await state.tiles.Run(std::move(find), TileService::Length::kShort, deadline, client);
+  Result<CertifiedPoints> points = co_await state.workers.Run(std::move(find), ShortTerms(deadline, client));
   if (!points) co_return points;
   for (std::size_t i = 0; i < points->tiles.size(); ++i) {
     tiler::TileRequest tile;
@@ -114,13 +113,13 @@ asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestCo
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);
-  const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
+  const JobTerms terms = (is_long ? LongTerms : ShortTerms)(deadline, request.client);
   auto query = std::make_shared<const HeightsQuery>(*std::move(parsed));
   Work<MadeReply> work = [catalog = state.catalog, dataset, coding, query, certified,
-                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+                          requested_at = JobClock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = MicrosecondsSince(requested_at);
-    const auto begun = TileService::Clock::now();
+    const auto begun = JobClock::now();
     const Result<tiler::PointHeights> heights = ReadSurface(*catalog->pipeline, dataset, *query, stop);
     if (!heights) return tl::unexpected(heights.error());
     made.times.read = MicrosecondsSince(begun);
@@ -131,7 +130,7 @@ asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestCo
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return made;
   };
-  Result<MadeReply> made = co_await state.tiles.Run(std::move(work), length, deadline, request.client);
+  Result<MadeReply> made = co_await state.workers.Run(std::move(work), terms);
   co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 

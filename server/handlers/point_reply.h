@@ -35,7 +35,7 @@ template <typename Query>
 asio::awaitable<Result<Query>> ParsePoints(const HandlerState& state, const RequestContext& context,
                                            Result<Query> (*parse)(const PointsInput& input, std::size_t max_points,
                                                                   const std::stop_token& stop),
-                                           bool is_quick, TileService::Clock::time_point deadline) {
+                                           bool is_quick, JobClock::time_point deadline) {
   const Request& request = *context.request;
   const std::string& query = context.route.query;
   const bool is_post = request.method == Method::kPost;
@@ -48,7 +48,7 @@ asio::awaitable<Result<Query>> ParsePoints(const HandlerState& state, const Requ
                       max_points = state.max_locations](const std::stop_token& stop) {
     return parse({query, type, body}, max_points, stop);
   };
-  co_return co_await state.tiles.Run(std::move(work), TileService::Length::kShort, deadline, request.client);
+  co_return co_await state.workers.Run(std::move(work), ShortTerms(deadline, request.client));
 }
 
 // Starts a reply with JSON, in a coding that the client accepts, or with binary values, uncompressed: they hardly

@@ -130,10 +130,10 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
   const bool is_long = parsed->rays.size() > kFewRays || parsed->drawn;
   auto query = std::make_shared<SightQuery>(*std::move(parsed));
   Work<MadeReply> work = [catalog = state.catalog, dataset, coding, query,
-                          requested_at = TileService::Clock::now()](const std::stop_token& stop) -> Result<MadeReply> {
+                          requested_at = JobClock::now()](const std::stop_token& stop) -> Result<MadeReply> {
     MadeReply made;
     made.times.queue = MicrosecondsSince(requested_at);
-    const auto begun = TileService::Clock::now();
+    const auto begun = JobClock::now();
     const tiler::TilePipeline& pipeline = *catalog->pipeline;
     if (query->from_ground) {
       const Result<void> raised = RaiseFromGround(pipeline, dataset, *query, stop);
@@ -147,8 +147,8 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the rays any more");
     return made;
   };
-  const auto length = is_long ? TileService::Length::kLong : TileService::Length::kShort;
-  Result<MadeReply> made = co_await state.tiles.Run(std::move(work), length, deadline, request.client);
+  const JobTerms terms = (is_long ? LongTerms : ShortTerms)(deadline, request.client);
+  Result<MadeReply> made = co_await state.workers.Run(std::move(work), terms);
   co_return Conditional(co_await FinishPointReply(std::move(response), std::move(made), view, request.id), request);
 }
 

@@ -21,6 +21,23 @@ JobClock::time_point KeyOf(const JobTerms& terms, JobClock::time_point now) { re
 
 }  // namespace
 
+JobTerms ShortTerms(JobClock::time_point deadline, std::uint64_t client) {
+  JobTerms terms;
+  terms.client = client;
+  terms.deadline = deadline;
+  terms.kind = 0;
+  return terms;
+}
+
+JobTerms LongTerms(JobClock::time_point deadline, std::uint64_t client) {
+  constexpr int kAfterTiles = 40;  // deeper than any level of tiles
+  JobTerms terms = ShortTerms(deadline, client);
+  terms.level = kAfterTiles;
+  terms.is_long = true;
+  terms.kind = 1;
+  return terms;
+}
+
 FairQueue::FairQueue(unsigned threads) : threads_(threads), max_long_(std::max(threads, 2U) - 1) {}
 
 double FairQueue::Client::UsedAt(JobClock::time_point now) const {

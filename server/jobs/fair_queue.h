@@ -33,6 +33,12 @@ struct JobTerms {
   std::uint64_t kind = 0;  // jobs of one kind take about the same time
 };
 
+// The terms of work for one request other than a tile. A client's short work runs before its tiles, its long work after
+// them. They have kinds of their own, below kFirstTileKind.
+JobTerms ShortTerms(JobClock::time_point deadline, std::uint64_t client);
+JobTerms LongTerms(JobClock::time_point deadline, std::uint64_t client);
+inline constexpr std::uint64_t kFirstTileKind = 2;
+
 // A job that waits or runs. Its functions must not throw.
 struct PoolJob {
   std::function<void()> run;

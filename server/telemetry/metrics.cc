@@ -102,13 +102,13 @@ prometheus::MetricFamily Samples(const tiler::TilePipeline* pipeline) {
   return family;
 }
 
-prometheus::MetricFamily StoreTimes(const TileService::Stats& tiles, const Metrics::ServerState& state) {
+prometheus::MetricFamily StoreTimes(const Metrics::ServerState& state) {
   prometheus::MetricFamily family{"terrace_store_read_seconds_total",
                                   "Time of look-ups of tiles in the tiers below memory, found or not",
                                   kCounter,
                                   {}};
-  for (std::size_t i = 0; i < std::min(tiles.store_times.size(), state.stores.size()); ++i) {
-    AddMetric(family, {{"tier", state.stores[i]->name()}}, InSeconds(tiles.store_times[i]));
+  for (std::size_t i = 0; i < std::min(state.tiles.store_times.size(), state.stores.size()); ++i) {
+    AddMetric(family, {{"tier", state.stores[i]->name()}}, InSeconds(state.tiles.store_times[i]));
   }
   return family;
 }
@@ -301,12 +301,13 @@ void Metrics::RetainDatasets(const std::vector<DatasetView>& datasets) {
   }
 }
 
-std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& state) const {
+std::string Metrics::Text(const ServerState& state) const {
   std::vector<prometheus::MetricFamily> all = families_->registry.Collect();
   const auto add = [&all](prometheus::MetricType type, const char* name, const char* help, auto value) {
     AddMetric(all.emplace_back(prometheus::MetricFamily{name, help, type, {}}), {}, static_cast<double>(value));
   };
-  std::vector<CacheTier> tiers = {{"memory", "tiles", {tiles.cache}}, {"memory", "refinements", {state.refinements}}};
+  std::vector<CacheTier> tiers = {{"memory", "tiles", {state.tiles.cache}},
+                                  {"memory", "refinements", {state.refinements}}};
   if (state.catalog->pipeline) {
     tiers.push_back({"memory", "drawn_meshes", {state.catalog->pipeline->drawn_meshes()}, false});
   }
@@ -321,11 +322,11 @@ std::string Metrics::Text(const TileService::Stats& tiles, const ServerState& st
     tiers.push_back({store.name(), i < state.tile_stores ? "tiles" : "refinements", store.stats()});
   }
   AddCaches(tiers, in_memory, all);
-  add(kCounter, "terrace_flights_joined_total", "Requests that waited for the build of another request", tiles.joined);
-  add(kCounter, "terrace_builds_refused_total", "Tile requests refused as overloaded", tiles.refused);
-  all.push_back(StoreTimes(tiles, state));
-  add(kGauge, "terrace_flights", "Jobs under way or waiting", tiles.in_flight);
-  add(kGauge, "terrace_queue_length", "Jobs that wait for a worker", tiles.queued);
+  add(kCounter, "terrace_flights_joined_total", "Requests that waited for the build of another request", state.joined);
+  add(kCounter, "terrace_builds_refused_total", "Tile requests refused as overloaded", state.tiles.refused);
+  all.push_back(StoreTimes(state));
+  add(kGauge, "terrace_flights", "Jobs under way or waiting", state.in_flight);
+  add(kGauge, "terrace_queue_length", "Jobs that wait for a worker", state.queued);
   add(kGauge, "terrace_http_connections", "Open connections", state.connections);
   add(kCounter, "terrace_http_connections_refused_total", "Connections turned away", state.refused_connections);
   add(kGauge, "terrace_http_transfer_bytes", "Bytes of bodies on their way", state.transfers.held_bytes);

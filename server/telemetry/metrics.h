@@ -29,6 +29,10 @@ class Metrics {
   void RetainDatasets(const std::vector<DatasetView>& datasets);
 
   struct ServerState {
+    TileService::Stats tiles;
+    std::size_t queued = 0;             // jobs that wait for a worker
+    std::size_t in_flight = 0;          // tiles, documents and other work that requests wait for
+    std::uint64_t joined = 0;           // requests that waited for the work of another request
     tiler::ByteCacheStats refinements;  // in memory
     // The tiers below memory: the first `tile_stores` hold tiles, the others refinements.
     std::vector<tiler::StoreBase*> stores;
@@ -41,7 +45,7 @@ class Metrics {
     std::uint64_t catalogs = 0;  // how often one has replaced another
   };
   // Returns the text of all counters and of the given state.
-  std::string Text(const TileService::Stats& tiles, const ServerState& state) const;
+  std::string Text(const ServerState& state) const;
 
  private:
   struct Families;

@@ -12,15 +12,10 @@
 namespace terrace::server {
 namespace {
 
-using Clock = TileService::Clock;
-
-constexpr int kAfterTiles = 40;  // deeper than any level of tiles
-
-// Kinds of jobs (JobTerms): tiles of a dataset and level, and work for one request.
+// The tiles of a dataset and level are one kind of jobs (JobTerms). No level is above 63.
 std::uint64_t KindOfTile(const tiler::CacheKey& key) {
-  return key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
+  return kFirstTileKind + key.generation * 64 + static_cast<std::uint64_t>(key.request.key.level);
 }
-constexpr std::uint64_t kShortKind = 62, kLongKind = 63;  // larger than any level
 
 std::string NameOf(const tiler::TileRequest& request) { return "tile " + geo::ToString(request.key); }
 
@@ -34,14 +29,10 @@ tiler::CacheKey KeyOf(const Catalog& catalog, tiler::TileRequest request) {
 
 }  // namespace
 
-TileService::TileService(TileServiceOptions options, BuildObserver observer)
+TileService::TileService(WorkerPool& workers, TileServiceOptions options, BuildObserver observer)
     : observer_(std::move(observer)),
       tiers_(options.cache_bytes, std::move(options.stores), options.write_header_lines),
-      pool_(options.worker_threads, options.queue_length),
-      flights_(pool_),
-      shared_runs_(pool_) {}
-
-TileService::~TileService() { Shutdown(); }
+      flights_(workers) {}
 
 std::optional<ServedTile> TileService::Find(const Catalog& catalog, const tiler::TileRequest& request) {
   tiler::TilePtr tile = tiers_.memory().Find(KeyOf(catalog, request));
@@ -51,11 +42,11 @@ std::optional<ServedTile> TileService::Find(const Catalog& catalog, const tiler:
 }
 
 asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler::TileRequest request,
-                                                       Clock::time_point deadline, std::uint64_t client) {
+                                                       JobClock::time_point deadline, std::uint64_t client) {
   using Flights = decltype(flights_);
   const tiler::CacheKey key = KeyOf(*catalog, request);
   Flights::Build find_or_build = [this, catalog = std::move(catalog), request, key,
-                                  requested_at = Clock::now()](const std::stop_token& stop) {
+                                  requested_at = JobClock::now()](const std::stop_token& stop) {
     const std::chrono::microseconds queued = MicrosecondsSince(requested_at);
     bool is_built = false;
     // Looks in memory again: an earlier flight may have ended between Find and the start of this one.
@@ -84,16 +75,6 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }
 
-JobTerms TileService::TermsOf(Length length, Clock::time_point deadline, std::uint64_t client) {
-  JobTerms terms;
-  terms.client = client;
-  terms.is_long = length == Length::kLong;
-  terms.level = terms.is_long ? kAfterTiles : 0;
-  terms.kind = terms.is_long ? kLongKind : kShortKind;
-  terms.deadline = deadline;
-  return terms;
-}
-
 void TileService::RetainTilesOf(const Catalog& catalog) {
   std::vector<std::uint64_t> generations;
   bool has_edits = false;
@@ -119,11 +100,10 @@ TileService::Stats TileService::stats() const {
   Stats stats;
   stats.hits = hits_.load(std::memory_order_relaxed);
   stats.misses = misses_.load(std::memory_order_relaxed);
-  stats.joined = flights_.joined_total() + shared_runs_.joined_total();
+  stats.joined = flights_.joined_total();
   stats.refused = refused_.load(std::memory_order_relaxed);
   stats.store_times = tiers_.store_times();
-  stats.queued = pool_.queued();
-  stats.in_flight = flights_.in_flight() + shared_runs_.in_flight() + pool_.runs();
+  stats.in_flight = flights_.in_flight();
   stats.cache = tiers_.memory().stats();
   stats.cache.hits = stats.hits;
   stats.cache.misses = stats.misses;

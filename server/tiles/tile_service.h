@@ -1,15 +1,13 @@
 // Gets tiles for requests: from memory, from a build in progress, or on the worker pool from tiler::TileTiers.
 // Thread-safe. Cached tiles outlive their catalog: a new catalog finds the tiles of datasets that stay in the same
-// generation. The pool also runs work for single requests (heights, meshes of areas, documents).
+// generation.
 #pragma once
 
 #include <atomic>
 #include <chrono>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <stop_token>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -28,8 +26,6 @@ namespace terrace::server {
 using BuildObserver = std::function<void(const DatasetView&, const Result<tiler::TilePtr>&)>;
 
 struct TileServiceOptions {
-  unsigned worker_threads = 0;                                 // 0: as many as the machine has processors
-  std::size_t queue_length = 10'000;                           // jobs that wait for a worker, of all clients
   std::size_t cache_bytes = std::size_t{256} << 20;            // 0: no cache
   std::vector<std::shared_ptr<tiler::TileStore>> stores = {};  // see tiler::TileTiers
   tiler::HeaderWriter write_header_lines = nullptr;            // see tiler::TileTiers; called on a worker
@@ -47,10 +43,8 @@ struct ServedTile {
 
 class TileService {
  public:
-  using Clock = JobClock;
-
-  explicit TileService(TileServiceOptions options, BuildObserver observer = nullptr);
-  ~TileService();
+  // Tiles are built on `workers`, which must be shut down before this object is destroyed.
+  explicit TileService(WorkerPool& workers, TileServiceOptions options = {}, BuildObserver observer = nullptr);
 
   // Returns the tile if it is in the cache, and counts a hit. May be called on any thread.
   std::optional<ServedTile> Find(const Catalog& catalog, const tiler::TileRequest& request);
@@ -58,30 +52,8 @@ class TileService {
   // For tiles that Find has not found: joins a flight, or starts one. Errors: those of TilePipeline::Build, and
   // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
   // single thread. `client`: as in JobTerms. Precondition: the request names one of the datasets.
-  asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request, Clock::time_point deadline,
-                                            std::uint64_t client = 0);
-
-  // Runs `work` on a worker for this caller; the result is neither shared nor cached. Errors and conditions:
-  // WorkerPool::Run. If there are several workers, long work never occupies all of them, so that tiles are still built.
-  enum class Length { kShort, kLong };
-  template <typename T>
-  asio::awaitable<Result<T>> Run(Work<T> work, Length length, Clock::time_point deadline, std::uint64_t client = 0) {
-    return pool_.Run<T>(std::move(work), TermsOf(length, deadline, client));
-  }
-
-  // Like Run with kShort, but calls with equal keys that wait at the same time share one run and its result. `name`: of
-  // the work, in messages.
-  // Precondition: calls with equal keys have the same T and equivalent work. The coroutine must run on a single thread.
-  template <typename T>
-  asio::awaitable<Result<std::shared_ptr<const T>>> RunShared(std::string key, std::string name,
-                                                              Work<std::shared_ptr<const T>> work,
-                                                              Clock::time_point deadline, std::uint64_t client) {
-    Work<std::shared_ptr<const void>> untyped = std::move(work);
-    auto flight = co_await shared_runs_.Join(std::move(key), std::move(name), std::move(untyped),
-                                             TermsOf(Length::kShort, deadline, client));
-    if (!flight.value) co_return tl::unexpected(std::move(flight.value.error()));
-    co_return std::static_pointer_cast<const T>(*std::move(flight.value));
-  }
+  asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request,
+                                            JobClock::time_point deadline, std::uint64_t client = 0);
 
   // Removes from memory the tiles of datasets that are not in `catalog`, and the tiles whose edits have changed. From
   // now on tiles of datasets that are not in `catalog` are not inserted; a build that has begun may still insert a tile
@@ -95,32 +67,22 @@ class TileService {
 
   void SetCacheBytes(std::size_t capacity) { tiers_.memory().SetCapacity(capacity); }
 
-  // Cancels waiting calls of Build and Run; later calls fail at once. Find still works.
-  void CancelBuilds() { pool_.Cancel(); }
-
-  // CancelBuilds, then waits for the workers to end.
-  void Shutdown() { pool_.Shutdown(); }
-
   struct Stats {
     std::uint64_t hits = 0;                              // found in memory
     std::uint64_t misses = 0;                            // calls of Build that started a flight
     std::uint64_t joined = 0;                            // waited for the same work as another request
     std::uint64_t refused = 0;                           // requests for tiles refused as overloaded
     std::vector<std::chrono::microseconds> store_times;  // TileTiers::store_times
-    std::size_t queued = 0, in_flight = 0;
+    std::size_t in_flight = 0;                           // builds under way or waiting
     tiler::ByteCacheStats cache;
   };
   Stats stats() const;
 
  private:
-  static JobTerms TermsOf(Length length, Clock::time_point deadline, std::uint64_t client);
-
   const BuildObserver observer_;
   tiler::TileTiers tiers_;
   std::atomic<bool> had_edits_{false};  // of the last catalog
-  WorkerPool pool_;
   SingleFlight<tiler::CacheKey, tiler::TilePtr, tiler::CacheKeyHash> flights_;
-  SingleFlight<std::string, std::shared_ptr<const void>> shared_runs_;
   std::atomic<std::uint64_t> hits_{0}, misses_{0}, refused_{0};
 };
 

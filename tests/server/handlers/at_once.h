@@ -16,8 +16,8 @@ namespace terrace::server {
 class TestHandlerState : private ProcessState {
  public:
   explicit TestHandlerState(CatalogPtr catalog)
-      : tiles_({.worker_threads = 1}),
-        all(std::move(catalog), tiles_, std::make_shared<const StaticFiles>(), Configured(), *this) {}
+      : all(std::move(catalog), workers_, tiles_, document_flights_, std::make_shared<const StaticFiles>(),
+            Configured(), *this) {}
   explicit TestHandlerState(std::vector<DatasetView> datasets)
       : TestHandlerState(std::make_shared<const Catalog>(Catalog{std::move(datasets), nullptr})) {}
 
@@ -35,7 +35,9 @@ class TestHandlerState : private ProcessState {
   std::vector<PendingDataset> PendingOf(const Catalog&) const override { return {}; }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { co_return nullptr; }
 
-  TileService tiles_;
+  WorkerPool workers_{1, 100};
+  TileService tiles_{workers_};
+  DocumentFlights document_flights_{workers_};
 
  public:
   const HandlerState all;

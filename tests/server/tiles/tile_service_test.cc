@@ -28,32 +28,42 @@ std::shared_ptr<Catalog> CatalogOf(TileBuilder builder) {
 
 Result<tiler::EncodedTile> BuildEmpty(const tiler::TileRequest&, std::stop_token) { return tiler::EncodedTile(); }
 
-Result<ServedTile> Get(TileService& service, CatalogPtr catalog, tiler::TileRequest request = {}) {
+// A service with workers of its own.
+struct TestService {
+  explicit TestService(TileServiceOptions options = {}, BuildObserver observer = nullptr)
+      : workers(2, 100), tiles(workers, std::move(options), std::move(observer)) {}
+  ~TestService() { workers.Shutdown(); }
+
+  WorkerPool workers;
+  TileService tiles;
+};
+
+Result<ServedTile> Get(TestService& service, CatalogPtr catalog, tiler::TileRequest request = {}) {
   asio::io_context io(1);
-  const auto deadline = TileService::Clock::now() + std::chrono::seconds(10);
-  if (std::optional<ServedTile> found = service.Find(*catalog, request)) return *std::move(found);
-  auto got = asio::co_spawn(io, service.Build(std::move(catalog), request, deadline), asio::use_future);
+  const auto deadline = JobClock::now() + std::chrono::seconds(10);
+  if (std::optional<ServedTile> found = service.tiles.Find(*catalog, request)) return *std::move(found);
+  auto got = asio::co_spawn(io, service.tiles.Build(std::move(catalog), request, deadline), asio::use_future);
   io.run();
   return got.get();
 }
 
 TEST(TileService, BuildsOnceAndThenFindsWhatIsCached) {
   std::atomic<int> builds{0};
-  TileService service({});
+  TestService service;
   const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     ++builds;
     return tiler::EncodedTile();
   });
-  EXPECT_FALSE(service.Find(*catalog, {}));
+  EXPECT_FALSE(service.tiles.Find(*catalog, {}));
   EXPECT_EQ(builds, 0);
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kHit);
-  const std::optional<ServedTile> found = service.Find(*catalog, {});
+  const std::optional<ServedTile> found = service.tiles.Find(*catalog, {});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->cache, CacheStatus::kHit);
   EXPECT_EQ(builds, 1);
-  EXPECT_EQ(service.stats().hits, 2u);
-  EXPECT_EQ(service.stats().misses, 1u);
+  EXPECT_EQ(service.tiles.stats().hits, 2u);
+  EXPECT_EQ(service.tiles.stats().misses, 1u);
 }
 
 // A tier in memory.
@@ -82,10 +92,9 @@ class FakeStore final : public tiler::TileStore {
 TEST(TileService, AsksTiersInOrderAndFillsThoseAbove) {
   const auto first = std::make_shared<FakeStore>("first"), second = std::make_shared<FakeStore>("second");
   TileServiceOptions options;
-  options.worker_threads = 1;
   options.cache_bytes = 0;
   options.stores = {first, second};
-  TileService service(std::move(options));
+  TestService service(std::move(options));
   const CatalogPtr catalog = CatalogOf(BuildEmpty);
   EXPECT_EQ(Get(service, catalog)->cache, CacheStatus::kMiss);
   EXPECT_EQ(first->size(), 1u);
@@ -98,7 +107,7 @@ TEST(TileService, AsksTiersInOrderAndFillsThoseAbove) {
 
 TEST(TileService, KeepsNoFailure) {
   std::atomic<int> builds{0};
-  TileService service({});
+  TestService service;
   const CatalogPtr catalog = CatalogOf([&](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> {
     if (++builds == 1) return MakeError(ErrorCode::kUnavailable, "gone");
     return tiler::EncodedTile();
@@ -108,14 +117,14 @@ TEST(TileService, KeepsNoFailure) {
 }
 
 TEST(TileService, TurnsExceptionsIntoUnavailable) {
-  TileService service({});
+  TestService service;
   const CatalogPtr catalog = CatalogOf(
       [](const tiler::TileRequest&, std::stop_token) -> Result<tiler::EncodedTile> { throw std::bad_alloc(); });
   EXPECT_EQ(Get(service, catalog).error().code, ErrorCode::kUnavailable);
 }
 
 TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
-  TileService service({});
+  TestService service;
   const auto first = CatalogOf(BuildEmpty);
   ASSERT_TRUE(Get(service, first));
   const auto shifted = CatalogOf(BuildEmpty);
@@ -128,7 +137,7 @@ TEST(TileService, FindsTilesOfAGenerationInLaterCatalogs) {
 }
 
 TEST(TileService, BuildsAgainForAnotherGeneration) {
-  TileService service({});
+  TestService service;
   ASSERT_TRUE(Get(service, CatalogOf(BuildEmpty)));
   const auto changed = CatalogOf(BuildEmpty);
   changed->datasets[0].cache_generation = 2;
@@ -136,21 +145,21 @@ TEST(TileService, BuildsAgainForAnotherGeneration) {
 }
 
 TEST(TileService, ForgetsGenerationsThatAreGone) {
-  TileService service({});
+  TestService service;
   const auto old = CatalogOf(BuildEmpty), next = CatalogOf(BuildEmpty);
   next->datasets[0].cache_generation = 2;
   ASSERT_TRUE(Get(service, old));
   ASSERT_TRUE(Get(service, next));
-  service.RetainTilesOf(*next);
-  EXPECT_EQ(service.stats().cache.entries, 1u);
+  service.tiles.RetainTilesOf(*next);
+  EXPECT_EQ(service.tiles.stats().cache.entries, 1u);
   EXPECT_EQ(Get(service, next)->cache, CacheStatus::kHit);
   EXPECT_EQ(Get(service, old)->cache, CacheStatus::kMiss) << "still answered";
-  EXPECT_EQ(service.stats().cache.entries, 1u) << "but not kept";
+  EXPECT_EQ(service.tiles.stats().cache.entries, 1u) << "but not kept";
 }
 
 // Other edits are another generation, but the tiles that none of them touches have their old keys.
 TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
-  TileService service({});
+  TestService service;
   const auto with_edits = [](std::uint64_t generation, std::uint64_t of_touched) {
     const auto catalog = CatalogOf(BuildEmpty);
     catalog->datasets[0].generation = generation;
@@ -164,24 +173,24 @@ TEST(TileService, KeepsTheTilesThatChangedEditsDoNotTouch) {
   tiler::TileRequest touched, untouched;
   touched.key = {0, 1, 0};
   untouched.key = {0, 0, 0};
-  for (const auto& catalog : {unedited, old, next}) service.RetainTilesOf(*catalog);
-  service.RetainTilesOf(*old);
+  for (const auto& catalog : {unedited, old, next}) service.tiles.RetainTilesOf(*catalog);
+  service.tiles.RetainTilesOf(*old);
   EXPECT_EQ(Get(service, unedited, touched)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, old, touched)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, unedited, untouched)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, old, untouched)->cache, CacheStatus::kHit);
-  service.RetainTilesOf(*next);
-  EXPECT_EQ(service.stats().cache.entries, 1u) << "two had edits that the new catalog does not have";
+  service.tiles.RetainTilesOf(*next);
+  EXPECT_EQ(service.tiles.stats().cache.entries, 1u) << "two had edits that the new catalog does not have";
   EXPECT_EQ(Get(service, next, touched)->cache, CacheStatus::kMiss);
   EXPECT_EQ(Get(service, next, untouched)->cache, CacheStatus::kHit);
-  service.RetainTilesOf(*unedited);
-  EXPECT_EQ(service.stats().cache.entries, 1u);
+  service.tiles.RetainTilesOf(*unedited);
+  EXPECT_EQ(service.tiles.stats().cache.entries, 1u);
   EXPECT_EQ(Get(service, unedited, untouched)->cache, CacheStatus::kHit);
 }
 
 TEST(TileService, TellsTheObserverAboutEveryBuild) {
   std::atomic<int> good{0}, bad{0};
-  TileService service({}, [&](const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
+  TestService service({}, [&](const DatasetView& dataset, const Result<tiler::TilePtr>& tile) {
     EXPECT_EQ(dataset.generation, 1u);
     ++(tile ? good : bad);
   });
@@ -199,19 +208,18 @@ TEST(TileService, TellsTheObserverAboutEveryBuild) {
   EXPECT_EQ(bad, 1);
 }
 
-Result<int> RunAlone(TileService& service, Work<int> work, TileService::Length length) {
+Result<int> RunAlone(TestService& service, Work<int> work,
+                     JobTerms (*terms)(JobClock::time_point deadline, std::uint64_t client)) {
   asio::io_context io(1);
   auto ran = asio::co_spawn(
-      io, service.Run<int>(std::move(work), length, TileService::Clock::now() + std::chrono::seconds(10)),
+      io, service.workers.Run(std::move(work), terms(JobClock::now() + std::chrono::seconds(10), /*client=*/0)),
       asio::use_future);
   io.run();
   return ran.get();
 }
 
 TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
-  TileServiceOptions options;
-  options.worker_threads = 2;
-  TileService service(options);
+  TestService service;
   std::promise<void> begun, end;
   const Work<int> work = [&](std::stop_token) -> Result<int> {
     begun.set_value();
@@ -219,13 +227,13 @@ TEST(TileService, KeepsAWorkerForTilesBesideLongWork) {
     return 1;
   };
   const Work<int> nothing = [](std::stop_token) -> Result<int> { return 0; };
-  auto first = std::async(std::launch::async, [&] { return RunAlone(service, work, TileService::Length::kLong); });
+  auto first = std::async(std::launch::async, [&] { return RunAlone(service, work, LongTerms); });
   begun.get_future().wait();
-  auto second = std::async(std::launch::async, [&] { return RunAlone(service, nothing, TileService::Length::kLong); });
-  while (service.stats().queued == 0) std::this_thread::yield();
+  auto second = std::async(std::launch::async, [&] { return RunAlone(service, nothing, LongTerms); });
+  while (service.workers.queued() == 0) std::this_thread::yield();
   EXPECT_TRUE(Get(service, CatalogOf(BuildEmpty)));
-  EXPECT_TRUE(RunAlone(service, nothing, TileService::Length::kShort));
-  EXPECT_EQ(service.stats().queued, 1u) << "it waits, and nobody waits for it";
+  EXPECT_TRUE(RunAlone(service, nothing, ShortTerms));
+  EXPECT_EQ(service.workers.queued(), 1u) << "it waits, and nobody waits for it";
   end.set_value();
   EXPECT_TRUE(first.get());
   EXPECT_TRUE(second.get());
