@@ -16,7 +16,8 @@ struct TileSamples {
   geo::TileKey key;
   geo::Lattice lattice;
   std::span<const float> heights;  // (cells + 3)^2, row by row from the south-western halo sample
-  // Of this lattice (lattice_angles.h); must outlive this object. Null: each function that needs them computes them.
+  // Sines and cosines of this lattice's nodes; must outlive this object. Null: each function that needs them computes
+  // them.
   const LatticeAngles* angles = nullptr;
 
   int cells() const { return lattice.cells; }

@@ -45,7 +45,8 @@ struct ServerOptions {
 
 class Server {
  public:
-  // Returns when the server is listening. Calls the catalog's functions on worker threads. Without a catalog (null),
+  // Returns when the server is listening. Functions of the catalog's pipeline that block are called on workers;
+  // PlanArea and DatasetView::edits_hash on io threads. Without a catalog (null),
   // requests wait for the first Replace, at most for request_deadline; /livez, /metrics and /readyz ("opening") answer
   // meanwhile. kInvalidArgument: a dataset's name is empty, reserved, used twice or has a '/'; or a token, a trusted
   // proxy, the certificate or its key cannot be used. kUnavailable: the server cannot listen on the address, read the

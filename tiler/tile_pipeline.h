@@ -55,13 +55,14 @@ class TilePipeline {
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
-  // The normals at points of the sources' surface (surface/source_normals.h).
+  // The normals at points of the sources' surface: unit vectors east, north, up; NaN where it has none.
   virtual Result<std::vector<std::array<float, 3>>> ReadNormals(std::uint32_t dataset,
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
-  // Heights of the meshes that clients decode (surface/drawn_points.h). Keeps meshes between calls. kInvalidArgument:
-  // the dataset has no such level, or the points lie in too many tiles. Other errors: those of Build.
+  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes. `normals`: also normals.
+  // Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in too many tiles.
+  // Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;

@@ -34,7 +34,7 @@ ARCHIVE = ["archive/files", "archive/pmtiles", "archive"]
 # Modules of elevation models: each may include those before it.
 DEM = ["engine/common", "engine/gdal", "engine/crs", "engine/raster", "engine/statistics", "engine/sources", "engine/mosaic", "engine/sight",
        "engine/bound", "engine/edits", "engine/image", "engine/export"]
-# Headers of other modules that count as the own of the first: every module that may include it may include these.
+# Rows (name, folder, headers): a module that may include the module `name` may also include these headers of the modules in `folder`.
 PUBLIC_HEADERS = {folder + "/" + name: front for front, folder, names in (
     ("engine/dem", "engine", ("common/box_index.h", "common/content_hash.h", "common/dem_types.h", "common/idle_pool.h", "common/parallel_for.h", "crs/geodesic_path.h",
                               "export/contour_lines.h", "export/output_grid.h", "gdal/file_content.h", "gdal/file_stamp.h", "gdal/gdal_runtime.h", "gdal/remote_file.h",

@@ -63,9 +63,9 @@ class ElevationModel {
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid. If all sources within an edit's reach
-  // have the datum in which the edit states its heights, these are not converted; the same holds for ReadKnownMercator
-  // and ReadPoints.
+  // floor is converted to the datum of the last source that refers to a geoid. An edit's heights are not converted if
+  // all sources within its reach have the datum in which it states them; the same holds for ReadKnownMercator and
+  // ReadPoints.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.

@@ -9,15 +9,10 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "proto/gltf/glb_options.h"
 #include "proto/mesh/grid_mesh.h"
 
 namespace terrace::proto {
-
-struct DracoOptions {
-  int speed = 7;        // 0 smallest .. 10 fastest; 10 is sequential coding, below it edgebreaker
-  int normal_bits = 8;  // 2 .. 16, of each of the two coordinates of an oct-encoded normal
-  bool uv = false;      // texture coordinates as well, to a 4095th of the picture's edge
-};
 
 struct DracoMesh {
   std::string bytes;

@@ -21,6 +21,14 @@ inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", Glb
                                                                    {"quantized", GlbCompression::kQuantized},
                                                                    {"meshopt", GlbCompression::kMeshopt}}};
 
+// The number type of a mesh's positions (GridMesh).
+enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
+
+constexpr PositionWidth WidthOf(GlbCompression compression) {
+  const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
+  return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;
+}
+
 // How the texture of a GLB tile is stored.
 enum class TextureFormat : std::uint8_t {
   kNone,  // no texture

@@ -14,13 +14,11 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
+#include "proto/gltf/gltf_types.h"
 #include "proto/mesh/edge_steps.h"
 #include "proto/tile_samples.h"
 
 namespace terrace::proto {
-
-// The number type of positions.
-enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
 
 // Metres, a power of two. At most a 32nd of the error, so that rounding takes at most 3 % of it on level ground. At
 // most a 64th of the side of a lattice cell on the ground, so that few triangles flip. Never below 2^-16 m, which

@@ -38,7 +38,7 @@ struct QuantizedTile {
 // centre, bounding sphere and horizon occlusion point from the decoded vertices. Preconditions: at least 2 triangles,
 // at most kMaxTileVertices vertices, all four edges complete; the tile has the `extensions`.
 //
-// `positions`: of the tile's vertices, DecodePositions (tile_geometry.h).
+// `positions`: of the tile's vertices as clients decode them, ECEF.
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions,
                                 const std::vector<geo::Vec3>& positions);
 std::string EncodeQuantizedMesh(const QuantizedTile& tile, const TileExtensions& extensions);

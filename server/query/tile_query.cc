@@ -66,8 +66,8 @@ Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at
     } else if (name == "texture" && allow_compression) {
       set = SetNamed(parameters.texture, "texture", value, proto::kTextureFormatNames);
     } else {
-      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction{}{}",
-                      allow_at_least ? ", atleast, extensions" : "", allow_compression ? ", compression, texture" : "");
+      set = MakeError(ErrorCode::kInvalidArgument, "unknown parameter; known are error, fraction, extensions{}{}",
+                      allow_at_least ? ", atleast" : "", allow_compression ? ", compression, texture" : "");
     }
     if (!set) return tl::unexpected(set.error());
   }

@@ -14,14 +14,9 @@
 #include "engine/tin/refinement.h"
 #include "proto/mesh/quantized_mesh.h"
 #include "proto/tile_samples.h"
+#include "tiler/mesh/mesh_options.h"
 
 namespace terrace::tiler {
-
-// Meshing options of a dataset.
-struct MeshOptions {
-  tin::Criterion criterion = tin::Criterion::kDelaunay;
-  bool compact = false;  // runs the drop pass (engine/tin/decimate/drop_pass.h)
-};
 
 struct MeshedTile {
   tin::TinMesh mesh;

@@ -8,7 +8,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/core/result.h"
 #include "engine/geo/tile_key.h"
-#include "proto/gltf/texture.h"
+#include "proto/gltf/gltf_types.h"
 #include "tiler/tile/coding.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"

@@ -9,7 +9,7 @@
 namespace terrace::tiler {
 
 struct TileSelection {
-  std::uint64_t generation = 0;  // identifies the dataset
+  std::uint64_t generation = 0;  // Dataset::cache_generation of the dataset
   int min_level = 0, max_level = geo::kMaxLevel;
   dem::GeoBounds box;  // degrees; west > east: across the antimeridian
 

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "engine/core/result.h"
-#include "proto/gltf/glb_tile.h"
+#include "proto/gltf/gltf_types.h"
 #include "tiler/tile/requested_error.h"
 #include "tiler/tile/tile_request.h"
 

@@ -7,8 +7,7 @@
 
 #include "engine/geo/tile_key.h"
 #include "proto/documents/height_png.h"
-#include "proto/gltf/glb_tile.h"
-#include "proto/gltf/texture.h"
+#include "proto/gltf/gltf_types.h"
 #include "proto/media_type.h"
 #include "tiler/map/map_parameters.h"
 #include "tiler/tile/coding.h"
