@@ -9,6 +9,7 @@
 #include "proto/error/surface_error.h"
 #include "proto/error/tile_error.h"
 #include "proto/gltf/glb_tile.h"
+#include "proto/gltf/texture.h"
 #include "proto/lattice_angles.h"
 #include "proto/mesh/grid_mesh.h"
 #include "proto/mesh/skirt.h"
