@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "engine/core/names.h"
+#include "proto/mesh/position_width.h"
 
 namespace terrace::proto {
 
@@ -21,9 +22,7 @@ inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", Glb
                                                                    {"quantized", GlbCompression::kQuantized},
                                                                    {"meshopt", GlbCompression::kMeshopt}}};
 
-// The number type of a mesh's positions (GridMesh).
-enum class PositionWidth : std::uint8_t { k16Bits, kFloat };
-
+// The width of positions for a form (GridMesh).
 constexpr PositionWidth WidthOf(GlbCompression compression) {
   const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
   return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;

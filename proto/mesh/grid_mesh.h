@@ -14,8 +14,8 @@
 
 #include "engine/geo/ellipsoid.h"
 #include "engine/tin/mesh/tin_mesh.h"
-#include "proto/gltf/gltf_types.h"
 #include "proto/mesh/edge_steps.h"
+#include "proto/mesh/position_width.h"
 #include "proto/tile_samples.h"
 
 namespace terrace::proto {

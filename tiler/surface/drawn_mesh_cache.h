@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "proto/gltf/gltf_types.h"
+#include "proto/mesh/position_width.h"
 #include "tiler/store/byte_cache.h"
 #include "tiler/surface/drawn_mesh.h"
 
