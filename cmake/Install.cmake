@@ -51,11 +51,9 @@ install(TARGETS ${terrace_targets} EXPORT terrace_targets
 install(EXPORT terrace_targets NAMESPACE terrace:: FILE terraceTargets.cmake
   DESTINATION lib/cmake/terrace COMPONENT development EXCLUDE_FROM_ALL)
 
-file(GLOB terrace_interface RELATIVE "${PROJECT_SOURCE_DIR}"
-  "${PROJECT_SOURCE_DIR}/tiler/*.h" "${PROJECT_SOURCE_DIR}/engine/dem/*.h" "${PROJECT_SOURCE_DIR}/engine/geo/*.h")
-list(REMOVE_ITEM terrace_interface engine/dem/dem_impl.h tiler/encoders.h)
-terrace_reached_headers(terrace_headers ${terrace_interface} tiler/store/tile_tiers.h
-  engine/statistics/averages_budget.h engine/statistics/cache_folder.h)
+# The headers of docs/embedding.md.
+terrace_reached_headers(terrace_headers engine/dem/elevation_model.h engine/geo/error_ladder.h
+  engine/statistics/averages_budget.h engine/statistics/cache_folder.h tiler/store/tile_tiers.h tiler/tile_pipeline.h)
 foreach(header IN LISTS terrace_headers)
   cmake_path(GET header PARENT_PATH folder)
   install(FILES "${PROJECT_SOURCE_DIR}/${header}" DESTINATION "include/terrace/${folder}"

@@ -44,10 +44,10 @@ class TilePipeline {
 
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; a tile for maps deeper than
-  // max_mercator_depth; imagery of a dataset without an image; in a dataset without sources, a tile that its archive
-  // lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced, so the dataset has to
-  // be opened again. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; heights, a hillshade, slopes or
+  // contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset without sources, a
+  // tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced,
+  // so the dataset has to be opened again. kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals, PlanArea and BuildArea: the dataset has no
@@ -60,9 +60,9 @@ class TilePipeline {
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
-  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes. `normals`: also normals.
-  // Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in too many tiles.
-  // Other errors: those of Build.
+  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. `normals`:
+  // also normals. Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in too
+  // many tiles. Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;

@@ -46,7 +46,7 @@ const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable() {
 
 Codec<Config> DiskCacheOption() {
   return ObjectOf(&Config::disk_cache, &DiskCacheConfig::directory, DiskCacheOptionTable(),
-                  R"({"directory": "/var/cache/terrace"})");
+                  R"({"directory": "/var/cache/terrace/tiles"})");
 }
 
 }  // namespace terrace::config

@@ -123,7 +123,7 @@ Codec<DatasetConfig> ImageryCodec();
 const std::vector<Option<ImageryConfig>>& ImageryOptionTable();
 
 // disk_cache_option.cc
-// {"directory": "/var/cache/terrace", "tile_bytes": ..., ...}. As a flag: only the directory.
+// {"directory": "/var/cache/terrace/tiles", "tile_bytes": ..., ...}. As a flag: only the directory.
 Codec<Config> DiskCacheOption();
 
 const std::vector<Option<DiskCacheConfig>>& DiskCacheOptionTable();

@@ -219,7 +219,7 @@ const std::vector<Option<Config>>& ServerOptionTable() {
        .value = "DIR",
        .section = "load",
        .help = "Folder that keeps finished tiles and refinements across restarts",
-       .details = "In the file an object, `{\"directory\": \"/var/cache/terrace\"}`; as a flag the folder alone. "
+       .details = "In the file an object, `{\"directory\": \"/var/cache/terrace/tiles\"}`; as a flag the folder alone. "
                   "Relative to the folder of the file. [More](#disk-cache)",
        .codec = DiskCacheOption(),
        .other_words = "cache"},

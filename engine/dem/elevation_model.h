@@ -94,8 +94,8 @@ class ElevationModel {
 
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: a hole, or an edit that changes heights, lies below
-  // a ray.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit that changes heights or cuts a hole lies
+  // below a ray.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

@@ -64,9 +64,9 @@ void OpenSpare(const asio::any_io_executor& executor, std::optional<asio::posix:
 }
 
 // Logged once until the next connection is accepted.
-void Warn(bool& crowded, const std::string& why) {
-  if (!crowded) spdlog::warn("turning connections away for now: {}", why);
-  crowded = true;
+void Warn(bool& has_warned, const std::string& why) {
+  if (!has_warned) spdlog::warn("turning connections away for now: {}", why);
+  has_warned = true;
 }
 
 Response RefusalOf(int status) {
@@ -203,7 +203,7 @@ asio::awaitable<void> Listener::AcceptAll() {
       continue;
     }
     // No descriptors, or no memory for one more.
-    Warn(crowded_, error.message());
+    Warn(has_warned_, error.message());
     context_->connections->EvictOne("");
     co_await Pause(kBackOff);
     RejectPending();
@@ -237,10 +237,10 @@ asio::awaitable<void> Listener::Admit(tcp::socket socket) {
   ConnectionSet& connections = *context_->connections;
   if (connections.HasTooMany(client)) co_return Refuse(socket, 429);
   const bool evicts = connections.full() && connections.EvictOne(client);
-  const auto until = std::chrono::steady_clock::now() + (evicts || !crowded_ ? kMoment : kBackOff);
+  const auto until = std::chrono::steady_clock::now() + (evicts || !has_warned_ ? kMoment : kBackOff);
   while (connections.full() && std::chrono::steady_clock::now() < until) co_await Pause(kBackOff);
   if (connections.full() && !evicts) co_return Refuse(socket, 503);
-  crowded_ = crowded_ && evicts;  // replacing a connection does not end the overload
+  has_warned_ = has_warned_ && evicts;  // replacing a connection does not end the overload
   StartSession(std::move(socket), context_, client);
 }
 
@@ -261,7 +261,7 @@ void Listener::RejectPending() {
 // Sends the reason if that does not block, and closes.
 void Listener::Refuse(tcp::socket& socket, int status) {
   context_->connections->CountRefused();
-  if (status == 503) Warn(crowded_, "as many connections as configured are open");
+  if (status == 503) Warn(has_warned_, "as many connections as configured are open");
   if (context_->tls) return;
   error_code ignored;
   socket.non_blocking(true, ignored);

@@ -77,7 +77,7 @@ class Listener : public std::enable_shared_from_this<Listener> {
   bool started_ = false, closing_ = false;  // for the acceptor's thread
   std::promise<void> closed_;
   std::optional<asio::posix::stream_descriptor> spare_;  // released briefly when no descriptors are left
-  bool crowded_ = false;
+  bool has_warned_ = false;  // of refused connections, since one was last accepted without replacing another
 };
 
 }  // namespace terrace::server

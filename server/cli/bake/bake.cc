@@ -224,7 +224,7 @@ void AddBake(CLI::App& app, int& exit_code) {
       "  terrace bake alps.tif --out alps-2 --update alps\n"
       "  terrace bake alps.tif --out /mnt/alps --queue redis://10.0.0.5:6379/0 --job alps    (on many machines)\n"
       "  terrace bake status --queue redis://10.0.0.5:6379/0 --job alps --watch\n"
-      "  terrace bake --config terrace.json --dataset maui --into-cache /var/cache/terrace\n"
+      "  terrace bake --config terrace.json --dataset maui --into-cache /var/cache/terrace/tiles\n"
       "  terrace bake alps.tif --dry-run\n\n"
       "A bake that was interrupted goes on when the same command is run again: finished files are checked and\n"
       "kept. The manifest is written last.\n\n"
