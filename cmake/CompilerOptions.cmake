@@ -33,6 +33,9 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
   # As with g++ 12, Highway's fallback is HWY_SCALAR. Its emulation of vectors takes clang-14 two minutes under sanitizers.
   add_compile_definitions(HWY_BROKEN_EMU128=1)
 endif()
+# Sources that use Highway are compiled once for each instruction set. SSSE3 is the best one only of processors from 2006
+# to 2008, which run the scalar code instead. Sanitizers do without SSE4 too: AVX2 is the same code with wider vectors.
+add_compile_definitions("HWY_DISABLED_TARGETS=$<IF:$<BOOL:${TERRACE_SANITIZER}>,(HWY_SSSE3|HWY_SSE4),HWY_SSSE3>")
 if(TERRACE_SANITIZER STREQUAL "address")
   # clang-14 reports Asio's coroutine frames under -fsanitize=function.
   add_compile_options(-fsanitize=address,undefined -fno-sanitize=function -fno-sanitize-recover=all -fno-omit-frame-pointer -g1)
