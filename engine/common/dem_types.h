@@ -58,10 +58,10 @@ struct DemOptions {
   double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
   // Metres: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};
-  std::optional<double> floor = {};  // metres above the ellipsoid, used outside the sources, in collars, and with
-                                     // HoleFill::kFloor in holes; default: a height at or below the lowest one
-  HoleFill voids = HoleFill::kSmooth;
-  int max_void_gap = 64;  // samples: voids narrower than this along a row, column or diagonal are filled
+  std::optional<double> floor = {};    // metres above the ellipsoid, used outside the sources, in collars, and with
+                                       // HoleFill::kFloor in holes; default: a height at or below the lowest one
+  HoleFill voids = HoleFill::kSmooth;  // in holes; other voids follow `max_void_gap` and `floor`
+  int max_void_gap = 64;               // samples: voids narrower than this along a row, column or diagonal are filled
   RasterCache cache = {};
   std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard

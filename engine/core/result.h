@@ -19,7 +19,7 @@ enum class ErrorCode {
   kUnavailable,      // a source or a resource does not respond now; a retry may succeed
   kChanged,          // a source file has changed since it was opened; reopening it may succeed
   kOverloaded,  // refused for now: a queue or store is full, memory is short, another process writes to the same folder
-  kCancelled,   // nobody waits for the result any more, or the deadline has passed
+  kCancelled,   // nobody waits for the result any more, the deadline has passed, or the caller excluded this work
   kInternal,    // a library failed unexpectedly
 };
 

@@ -87,7 +87,8 @@ class ElevationModel {
   // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
   // sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has no effect.
   // `filled` has one element for each point, or none; an element becomes 1 where the point lies in the pixel of a void
-  // sample. A height does not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // sample. Edits apply: NaN also in holes that they cut; above the ellipsoid, also the heights that they set outside
+  // the sources. A height does not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

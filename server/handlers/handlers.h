@@ -62,7 +62,8 @@ struct HandlerState {
   HandlerState(CatalogPtr catalog, WorkerPool& workers, TileService& tiles, DocumentFlights& document_flights,
                std::shared_ptr<const StaticFiles> viewer, const config::Config& config, const ProcessState& process);
 
-  // The deadline of work that begins now. Waits for memory before and after it have the session's (http/session.h).
+  // The deadline of work that begins now. Before and after this work a request may also wait for memory, until the
+  // session's deadline (http/session.h).
   JobClock::time_point Deadline() const { return JobClock::now() + deadline; }
 
   const CatalogPtr catalog;

@@ -136,7 +136,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<std::optional<T>> WhileConnected(asio::awaitable<T> waited);
   asio::awaitable<Response> Await(asio::awaitable<Response> answer);
   Response Failed(const std::exception& exception) const;
-  asio::awaitable<void> Interrupted();
+  asio::awaitable<void> UntilInterrupted();
   using MaybeRoom = std::optional<TransferBudget::Hold>;
   asio::awaitable<std::optional<MaybeRoom>> RoomLater(Response& response);
   TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
@@ -314,12 +314,12 @@ template <typename T>
 asio::awaitable<std::optional<T>> Session::WhileConnected(asio::awaitable<T> waited) {
   using asio::experimental::awaitable_operators::operator||;
   stream_.ExpiresNever();  // `waited` has its own deadline
-  std::variant<T, std::monostate> first = co_await (std::move(waited) || Interrupted());
+  std::variant<T, std::monostate> first = co_await (std::move(waited) || UntilInterrupted());
   if (first.index() == 1) co_return std::nullopt;
   co_return std::move(std::get<0>(first));
 }
 
-asio::awaitable<void> Session::Interrupted() {
+asio::awaitable<void> Session::UntilInterrupted() {
   using asio::experimental::awaitable_operators::operator||;
   if (!has_upload_) co_return co_await ClientLeft(stream_);
   boost::system::error_code ignored;  // the expected cancellation

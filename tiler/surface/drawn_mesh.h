@@ -20,14 +20,14 @@ struct DrawnTriangles {
   std::vector<geo::Vec3> positions;           // ECEF metres
   std::vector<std::array<double, 2>> places;  // of the positions in the tile: 0 west .. 1 east, 0 south .. 1 north
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise from outside
-  std::vector<std::uint8_t>
-      in_hole;  // by triangle, 1: in a hole that an edit cuts, clients do not draw it; empty: they draw all
-  bool holes_are_left_out = false;  // a place in the tile without a triangle is in such a hole
+  // By triangle, 1: in a hole that an edit cuts, clients do not draw it. Empty: they draw all.
+  std::vector<std::uint8_t> in_hole;
+  bool holes_are_left_out = false;  // true: where the tile has no triangle, an edit has cut a hole
 };
 
 struct DrawnPoint {
-  double height_m = 0;     // above the ellipsoid, along the plumb line; NaN in such a hole
-  geo::Vec3 normal;        // of the triangle: unit, ECEF, upwards; NaN in such a hole
+  double height_m = 0;     // above the ellipsoid, along the plumb line; NaN in a hole that an edit cuts
+  geo::Vec3 normal;        // of the triangle: unit, ECEF, upwards; NaN in a hole that an edit cuts
   bool is_beside = false;  // the plumb line meets no triangle, and the place is not known to be in such a hole
 };
 
