@@ -63,23 +63,33 @@ export class Access {
 
   // Heights at {longitude, latitude}: metres, undefined where the dataset has none.
   async heights(dataset, places) {
-    const locations = places.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
+    const locations = places.map(locationOf).join("|");
     const headers = { ...this.headers, "Content-Type": "application/json" };
-    const reply = await fetch(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
-    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
-    return (await reply.json()).results.map(({ elevation }) => elevation ?? undefined);
+    const { results } = await readJson(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
+    return results.map(({ elevation }) => elevation ?? undefined);
   }
 
   // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where
   // the dataset has none.
   async profile(dataset, corners, samples) {
-    const path = corners.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
-    const query = new URLSearchParams({ path, samples });
-    const reply = await fetch(`${dataset.urls.heights}?${query}`, { headers: this.headers });
-    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
-    const { results } = await reply.json();
+    const query = new URLSearchParams({ path: corners.map(locationOf).join("|"), samples });
+    const { results } = await readJson(`${dataset.urls.heights}?${query}`, { headers: this.headers });
     return results.map(({ elevation, distance, location }) =>
       ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
+  }
+
+  // The line from `eye` metres above the ground at the first corner to `target` metres above it at the last, as /sight
+  // describes it: {visible, clearance, lowest}. Throws if the ground has no height at an end.
+  async sight(dataset, corners, { eye, target, refraction }) {
+    const end = (corner, above) => `${locationOf(corner)},${above}`;
+    const ask = (surface) => {
+      const query = new URLSearchParams({ from: end(corners[0], eye), to: end(corners.at(-1), target), heights: "ground", refraction, surface });
+      return readJson(`${dataset.urls.sight}?${query}`, { headers: this.headers });
+    };
+    const reply = ask("source");
+    // The sources do not contain edits: above these the server answers over tiles alone, and over few of them.
+    const { results } = await (dataset.urls.edits ? reply.catch(() => ask("served")) : reply);
+    return results[0];
   }
 }
 
@@ -87,6 +97,17 @@ export class Access {
 export function pendingText({ name, percent, failed }) {
   return failed ? `${name} cannot be opened as it is now; the server's log says why.`
     : `${name} is being prepared: ${percent} %. It is shown as soon as it is there.`;
+}
+
+// Throws what the server says is wrong.
+async function readJson(url, options) {
+  const reply = await fetch(url, options);
+  if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
+  return reply.json();
+}
+
+function locationOf({ longitude, latitude }) {
+  return `${latitude.toFixed(7)},${longitude.toFixed(7)}`;
 }
 
 function headersOf(token) {
@@ -99,6 +120,6 @@ function withDefaults(dataset) {
     ...dataset,
     bounds: dataset.bounds ?? [-180, -90, 180, 90],
     heights: { min: dataset.heights?.min ?? 0, max: dataset.heights?.max ?? 4000 },
-    urls: { layer: `${base}/layer.json`, tileset: `${base}/tileset.json`, heights: `${base}/heights`, ...dataset.urls },
+    urls: { layer: `${base}/layer.json`, tileset: `${base}/tileset.json`, heights: `${base}/heights`, sight: `${base}/sight`, ...dataset.urls },
   };
 }

@@ -1,6 +1,6 @@
 // Measuring on the globe: distance over the ground with a profile, and line of sight. Heights are the dataset's own, from
 // /heights, not those of the drawn triangles.
-import { lineOfSight, measurePath } from "/viewer/ground_path.js";
+import { kRefraction, measurePath, seenGround } from "/viewer/ground_path.js";
 import { formatHeight, formatMetres } from "/viewer/numbers.js";
 import { ProfilePlot } from "/viewer/profile_plot.js";
 
@@ -107,22 +107,34 @@ export class Measure {
     this.plot.show(points);
   }
 
-  #describeSight() {
-    const { points } = this;
+  // The server has the verdict: it compares the line with all ground below it, not with samples.
+  async #describeSight() {
+    const turn = ++this.#turn;
+    const { points, corners } = this;
     const [eye, target] = ["eye", "target"].map((id) => Math.max(0, byId(id).valueAsNumber || 0));
-    const sight = { ...lineOfSight(points, eye, target), eye, target };
-    const seen = sight.seen.filter(Boolean).length / sight.seen.length;
-    const { obstacle } = sight;
-    const verdict = obstacle ? `Hidden: the ground at ${formatMetres(obstacle.distance)} stands ${formatMetres(obstacle.above)} above the line` : "Visible";
-    byId("dock-text").textContent = `${verdict}. ${formatMetres(points.at(-1).distance)} away; ${Math.round(100 * seen)} % of the ground between is seen.`;
+    try {
+      const { visible, clearance, lowest } = await this.access.sight(this.dataset(), corners, { eye, target, refraction: kRefraction });
+      if (turn !== this.#turn) return;
+      const seen = seenGround(points, eye);
+      const share = seen.filter(Boolean).length / seen.length;
+      const verdict = visible ? "Visible" : `Hidden: the ground at ${formatMetres(lowest.distance)} stands ${formatMetres(-clearance)} above the line`;
+      byId("dock-text").textContent = `${verdict}. ${formatMetres(points.at(-1).distance)} away; ${Math.round(100 * share)} % of the ground between is seen.`;
+      this.#drawSeen(seen);
+      this.plot.show(points, { seen, eye, target, isTargetSeen: visible });
+    } catch (error) {
+      if (turn === this.#turn) byId("dock-text").textContent = `The line of sight could not be computed: ${error.message}.`;
+    }
+  }
+
+  #drawSeen(seen) {
+    const { points } = this;
     const pieces = [];
     points.forEach((point, i) => {
-      const className = sight.seen[i] ? "seen" : "unseen";
+      const className = seen[i] ? "seen" : "unseen";
       if (pieces.at(-1)?.className !== className) pieces.push({ className, points: i > 0 ? [points[i - 1]] : [] });
       pieces.at(-1).points.push(point);
     });
     this.globe.overlay.setLine("measured", pieces.map((piece) => ({ ...piece, points: this.#onGround(piece.points) })));
-    this.plot.show(points, sight);
   }
 
   #onGround(points) {
