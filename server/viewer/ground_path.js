@@ -27,12 +27,14 @@ export function measurePath(points) {
   return sum;
 }
 
-// Whether each point of the ground is seen from `eye` metres above the first: [bool]. Between two points nothing hides.
+// Whether each point of the ground is seen from `eye` metres above the first: [bool], undefined where the height is.
+// Between two points nothing hides. The first point has a height.
 export function seenGround(points, eye) {
-  const origin = (points[0].height ?? 0) + eye;
+  const origin = points[0].height + eye;
   let horizon = -Infinity;
   return points.map(({ distance, height }) => {
-    if (height === undefined || distance === 0) return true;
+    if (height === undefined) return undefined;
+    if (distance === 0) return true;
     const slope = (height - drop(distance) - origin) / distance;
     const isSeen = slope >= horizon;
     horizon = Math.max(horizon, slope);

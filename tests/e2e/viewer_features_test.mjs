@@ -28,6 +28,7 @@ describe('numbers of the viewer', () => {
     assert.ok(seenGround(plain, 2).every(Boolean));
     const seen = seenGround(plain.map((point, i) => (i === 50 ? { ...point, height: 120 } : point)), 2);
     assert.ok(seen[50] && !seen[60]);
+    assert.deepEqual(seenGround([{ distance: 0, height: 5 }, { distance: 10 }, { distance: 20, height: 4 }], 2), [true, undefined, true]);
     // From 2 m the sea is seen to 5.4 km: the square root of 2 R h / (1 - k).
     const sea = Array.from({ length: 1001 }, (_, i) => ({ distance: 10 * i, height: 0 }));
     const horizon = 10 * seenGround(sea, 2).indexOf(false);
@@ -108,6 +109,20 @@ describe('features of the viewer', () => {
     await page.locator('#target').fill('9000');
     await says(/^Visible/);
     await assertAccessible(page, 'a line of sight');
+    const look = (longitude) => page.evaluate((east) => {
+      terrace.state.measure.add({ longitude: -84.13, latitude: 36.43, height: 400 });
+      return terrace.state.measure.add({ longitude: east, latitude: 36.21, height: 400 });
+    }, longitude);
+    await look(-83.9);  // beside the data
+    await says(/^The line of sight is not known: the dataset has no height at the target\.$/);
+    await page.route('**/heights?path=*', async (route) => {
+      const body = await (await route.fetch()).json();
+      for (const result of body.results.slice(1, -1)) result.elevation = null;
+      await route.fulfill({ json: body });
+    });
+    await look(-84.14);
+    await says(/^Visible\. .*100 % of the ground between is seen\. Parts of the ground have no heights/);
+    await page.unroute('**/heights?path=*');
     await page.locator('#dock-close').click();
     assert.equal(await page.locator('.overlay .line').count(), 0);
   });
