@@ -3,6 +3,7 @@
 import { take } from "/viewer/begun.js";
 
 const kKey = "terrace.token";
+const kMaxTiles = 50;  // for the heights of one request; the server reads at most 64
 
 // The server does not know the token.
 export class UnknownToken extends Error {}
@@ -47,7 +48,7 @@ export class Access {
   }
 
   heightUrl(dataset, longitude, latitude) {
-    return `${dataset.urls.heights}?locations=${latitude},${longitude}`;
+    return heightsUrl(dataset, [{ longitude, latitude }], { locations: `${latitude},${longitude}` });
   }
 
   // Metres above the ellipsoid; undefined if the server has no height there.
@@ -65,15 +66,15 @@ export class Access {
   async heights(dataset, places) {
     const locations = places.map(locationOf).join("|");
     const headers = { ...this.headers, "Content-Type": "application/json" };
-    const { results } = await readJson(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
+    const { results } = await readJson(heightsUrl(dataset, places, {}), { method: "POST", headers, body: JSON.stringify({ locations }) });
     return results.map(({ elevation }) => elevation ?? undefined);
   }
 
   // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where
   // the dataset has none.
   async profile(dataset, corners, samples) {
-    const query = new URLSearchParams({ path: corners.map(locationOf).join("|"), samples });
-    const { results } = await readJson(`${dataset.urls.heights}?${query}`, { headers: this.headers });
+    const query = { path: corners.map(locationOf).join("|"), samples };
+    const { results } = await readJson(heightsUrl(dataset, between(corners), query), { headers: this.headers });
     return results.map(({ elevation, distance, location }) =>
       ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
   }
@@ -110,16 +111,47 @@ function locationOf({ longitude, latitude }) {
   return `${latitude.toFixed(7)},${longitude.toFixed(7)}`;
 }
 
+// The URL of heights at or along `places`. An archive has only those of its tiles.
+function heightsUrl({ urls, isArchive, max_level: deepest }, places, query) {
+  const served = isArchive ? { surface: "served", level: levelOf(deepest, places) } : {};
+  return `${urls.heights}?${new URLSearchParams({ ...query, ...served })}`;
+}
+
+// The deepest level on which the places lie in few tiles.
+function levelOf(deepest, places) {
+  const tiles = (level) => {
+    const index = (degrees) => Math.floor((degrees * 2 ** level) / 180);
+    return new Set(places.map(({ longitude, latitude }) => `${index(longitude)} ${index(latitude)}`)).size;
+  };
+  let level = deepest;
+  while (level > 0 && tiles(level) > kMaxTiles) --level;
+  return level;
+}
+
+// Places along the corners in steps of 1/100, as straight lines on the map.
+function between(corners) {
+  return corners.slice(1).flatMap((to, i) => {
+    const from = corners[i];
+    const turn = to.longitude - from.longitude;
+    const east = turn - 360 * Math.round(turn / 360);
+    return Array.from({ length: 101 }, (_, k) => ({
+      longitude: from.longitude + (east * k) / 100, latitude: from.latitude + ((to.latitude - from.latitude) * k) / 100,
+    }));
+  });
+}
+
 function headersOf(token) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 
+// `isArchive`: without its sources, which /mesh needs.
 function withDefaults(dataset) {
   const base = `/${encodeURIComponent(dataset.name)}`;
   return {
     ...dataset,
+    isArchive: !dataset.urls?.mesh,
     bounds: dataset.bounds ?? [-180, -90, 180, 90],
     heights: { min: dataset.heights?.min ?? 0, max: dataset.heights?.max ?? 4000 },
-    urls: { layer: `${base}/layer.json`, tileset: `${base}/tileset.json`, heights: `${base}/heights`, sight: `${base}/sight`, ...dataset.urls },
+    urls: { layer: `${base}/layer.json`, heights: `${base}/heights`, ...dataset.urls },
   };
 }

@@ -91,6 +91,7 @@ async function show() {
   const { dataset } = state;
   if (!dataset) return;
   clearToolsOfAnother(dataset);
+  if (dataset.isArchive) setSwitches({ ...state, tiles3d: state.tiles3d && Boolean(dataset.urls.tileset), right: undefined });
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);

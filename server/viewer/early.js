@@ -18,9 +18,13 @@ export function startOf(view, datasets) {
   return { isNamed: named !== undefined, dataset, fraction: (named && view.fraction) ?? defaultFraction(dataset) };
 }
 
-// layer.json of a dataset, for a fraction of the level error.
+// The query of layer.json and tileset.json for a fraction of the level error. An archive has one error.
+export function errorQuery({ isArchive }, fraction) {
+  return isArchive ? "" : `?fraction=${fraction}`;
+}
+
 export function layerUrl(dataset, fraction) {
-  return `${dataset.urls.layer.replace(/layer\.json.*$/, "")}layer.json?fraction=${fraction}`;
+  return `${dataset.urls.layer.replace(/layer\.json.*$/, "")}layer.json${errorQuery(dataset, fraction)}`;
 }
 
 async function beginTiles(layer, headers) {

@@ -4,7 +4,7 @@ import {
   GeographicTilingScheme, GroundPolylinePrimitive, GroundPrimitive, HeadingPitchRange, Math as CesiumMath,
   QuantizedMeshTerrainData, Rectangle, Resource, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
-import { layerUrl } from "/viewer/early.js";
+import { errorQuery, layerUrl } from "/viewer/early.js";
 import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
 import { niceInterval } from "/viewer/colours.js";
@@ -122,7 +122,7 @@ export class Globe {
     this.scene.globe.show = true;
     this.widget.useDefaultRenderLoop = true;
     this.adaptToCamera();
-    const tileset = `${dataset.urls.tileset}?fraction=${compared}`;
+    const tileset = `${dataset.urls.tileset}${errorQuery(dataset, compared)}`;
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
   }
 

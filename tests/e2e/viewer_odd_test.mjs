@@ -1,11 +1,11 @@
-// The viewer with unusual input: odd rasters, garbage in the address, very small windows.
+// The viewer with unusual input: odd rasters, an archive without its sources, garbage in the address, very small windows.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { end, openBrowser } from './browser.mjs';
-import { samples, serve } from './harness.mjs';
+import { run, samples, serve } from './harness.mjs';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
 
 const kWait = { timeout: 90000, polling: 200 };
@@ -44,7 +44,13 @@ describe('the viewer', () => {
     const isle = writeGrid(path.join(folder, 'isle.asc'), 60, (x, y) => ((x - 30) ** 2 + (y - 30) ** 2 < 200 ? 1200 + x : -9999));
     const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
     const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
-    server = await serve(isle, level, small, path.join(samples, 'jacksboro.tif'));
+    const archive = path.join(folder, 'archive');
+    const bake = run('bake', path.join(samples, 'jacksboro.tif'), '--out', archive);
+    assert.equal(bake.code, 0, bake.err);
+    const config = path.join(folder, 'terrace.json');
+    const datasets = [isle, level, small, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
+    fs.writeFileSync(config, JSON.stringify({ datasets: [...datasets, { name: 'archive', baked: archive }] }));
+    server = await serve('--config', config);
     ({ browser, page } = await openBrowser(640, 400));
   });
 
@@ -88,6 +94,29 @@ describe('the viewer', () => {
     }
     const { camera, fraction, right } = await decoded('#dataset=x&camera=-179.5,-80,-4000,359.9,12.5&fraction=1e-300&right=1e300');
     assert.deepEqual({ camera, fraction, right }, { camera: [-179.5, -80, -4000, 359.9, 12.5], fraction: 1 / 32, right: 4 });
+    assert.deepEqual(page.wrongs, []);
+  });
+
+  it('reads the heights of an archive without its sources', async () => {
+    await open('#dataset=archive&fraction=4&tiles3d');
+    for (const id of ['#tiles3d', '#compare', '#splitter', '#fraction']) assert.ok(await page.locator(id).isHidden(), `${id}: one error, no 3D Tiles`);
+    assert.equal(await page.locator('#message').isVisible(), false);
+    await page.locator('#globe').press('Enter');
+    await page.getByText(/ data [\d,]+ m$/).waitFor();
+    const corners = [[-84.3, 36.3], [-84.2, 36.3], [-84.2, 36.35]].map(([longitude, latitude]) => ({ longitude, latitude, height: 400 }));
+    for (const [tool, count, text] of [['distance', 2, /8,982 m straight, .* up, /], ['sight', 2, /^(Visible|Hidden)/], ['draft', 3, /Raises the ground/]]) {
+      await page.locator(`#tool-${tool}`).click();
+      await page.waitForFunction((mode) => (mode === 'draft' ? terrace.state.draft?.isOpen : terrace.state.measure?.mode === mode), tool, kWait);
+      await page.evaluate(([places, name]) => places.forEach((place) => terrace.state[name].add(place)),
+        [corners.slice(0, count), tool === 'draft' ? 'draft' : 'measure']);
+      await page.locator(tool === 'draft' ? '#draft-text' : '#dock-text').getByText(text).waitFor();
+    }
+    await page.evaluate(() => {
+      terrace.state.draft.corners = [];
+      for (const [longitude, latitude] of [[-84.39, 36.17], [-84.09, 36.17], [-84.25, 36.44]]) terrace.state.draft.add({ longitude, latitude, height: 400 });
+    });
+    await page.locator('#draft-text').getByText(/^405.* km².*Raises the ground/).waitFor();  // 90 of the finest tiles
+    await page.evaluate(() => terrace.state.draft.end());
     assert.deepEqual(page.wrongs, []);
   });
 
