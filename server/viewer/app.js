@@ -18,8 +18,8 @@ const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chose
 const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
-// `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
-// of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local
+// `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
+// `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local
 // mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the server does not have this dataset any more.
 // `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
@@ -313,8 +313,10 @@ async function apply(view) {
   setSun(view.sun);
   await show();
   if (!state.wanted || tellPending()) return;
-  if (state.moreWithToken) ask(`${view.dataset} needs a token, or is not on this server.`);
-  else complain(`There is no dataset ${view.dataset} on this server; this is ${state.dataset.name}.`);
+  if (state.moreWithToken) return ask(`${view.dataset} needs a token, or is not on this server.`);
+  state.wanted = undefined;
+  remember();
+  complain(`There is no dataset ${view.dataset} on this server; this is ${state.dataset.name}.`);
 }
 
 function refresh() {

@@ -220,6 +220,7 @@ describe('the viewer', () => {
     const lost = await openPage(browser, `${url}/#dataset=nowhere`);
     await lost.locator('#message').waitFor({ timeout: kSettleMs });
     assert.match(await lost.locator('#message').innerText(), /no dataset nowhere on this server; this is /);
+    assert.match(lost.url(), /#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/, 'the address has what is shown');
     await lost.close();
   });
 
