@@ -1,7 +1,7 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
 import { pendingText, UnknownToken } from "/viewer/access.js";
 import { access, firstList, startOf } from "/viewer/early.js";
-import { boxOf, defaultFraction, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
+import { boxOf, defaultFraction, discOf, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
 import { formatHeight } from "/viewer/numbers.js";
 import { Panel } from "/viewer/panel.js";
@@ -114,7 +114,7 @@ async function show() {
 // The heights of a part of a dataset are unknown.
 async function lookAt(region, seconds) {
   const { dataset } = state;
-  const { longitude, latitude } = boxOf(region.bounds);
+  const { longitude, latitude } = discOf(region);
   const ground = region.isPart ? await access.heightAt(dataset, longitude, latitude) : undefined;
   if (dataset === state.dataset) globe.lookAt({ ...region, ground }, seconds);
 }

@@ -6,14 +6,15 @@ import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { end, openBrowser } from './browser.mjs';
 import { run, samples, serve } from './harness.mjs';
+import { discOf, isGlobal } from '../../server/viewer/framing.js';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
 
 const kWait = { timeout: 90000, polling: 200 };
 
 // An ASCII grid in degrees; `height(x, y)` of each sample, -9999 is a void.
-function writeGrid(file, side, height) {
-  const rows = Array.from({ length: side }, (_, y) => Array.from({ length: side }, (_, x) => height(x, y)).join(' '));
-  fs.writeFileSync(file, `ncols ${side}\nnrows ${side}\nxllcorner 10\nyllcorner 45\ncellsize 0.001\nNODATA_value -9999\n${rows.join('\n')}\n`);
+function writeGrid(file, side, height, { columns = side, west = 10, south = 45, cell = 0.001 } = {}) {
+  const rows = Array.from({ length: side }, (_, y) => Array.from({ length: columns }, (_, x) => height(x, y)).join(' '));
+  fs.writeFileSync(file, `ncols ${columns}\nnrows ${side}\nxllcorner ${west}\nyllcorner ${south}\ncellsize ${cell}\nNODATA_value -9999\n${rows.join('\n')}\n`);
   fs.writeFileSync(file.replace(/asc$/, 'prj'), 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],' +
     'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]');
   return file;
@@ -24,6 +25,22 @@ describe('a level raster', () => {
     assert.deepEqual(heightColour(500, { min: 500, max: 500 }), heightColour(500, { min: 500, max: 501 }));
     assert.deepEqual(heightTicks({ min: 500, max: 500 }), []);
     assert.deepEqual(heightTicks({ min: 0, max: 0 }), []);
+  });
+});
+
+describe('a first view', () => {
+  const frame = (...bounds) => ({ bounds });
+
+  it('is of a globe only if the data is wide in metres', () => {
+    for (const wide of [frame(-180, -90, 180, 90), frame(-180, 60, 180, 90), frame(100, -40, -150, 10)]) assert.ok(isGlobal(wide), `${wide.bounds}`);
+    for (const small of [frame(-180, 85, 180, 90), frame(-180, -90, 180, -89), frame(-70, 80, 50, 84), frame(5, 45, 15, 48)]) {
+      assert.ok(!isGlobal(small), `${small.bounds}`);
+    }
+  });
+
+  it('has a pole in the middle of what goes around it', () => {
+    assert.deepEqual(discOf(frame(-180, -90, 180, -89)), { longitude: 0, latitude: -90, diameter: 2 * 111320 });
+    assert.equal(discOf(frame(5, 45, 15, 48)).latitude, 46.5);
   });
 });
 
@@ -44,11 +61,12 @@ describe('the viewer', () => {
     const isle = writeGrid(path.join(folder, 'isle.asc'), 60, (x, y) => ((x - 30) ** 2 + (y - 30) ** 2 < 200 ? 1200 + x : -9999));
     const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
     const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
+    const cap = writeGrid(path.join(folder, 'cap.asc'), 6, (x, y) => 100 * y, { columns: 720, west: -180, south: 87, cell: 0.5 });
     const archive = path.join(folder, 'archive');
     const bake = run('bake', path.join(samples, 'jacksboro.tif'), '--out', archive);
     assert.equal(bake.code, 0, bake.err);
     const config = path.join(folder, 'terrace.json');
-    const datasets = [isle, level, small, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
+    const datasets = [isle, level, small, cap, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
     fs.writeFileSync(config, JSON.stringify({ datasets: [...datasets, { name: 'archive', baked: archive }] }));
     server = await serve('--config', config);
     ({ browser, page } = await openBrowser(640, 400));
@@ -81,6 +99,12 @@ describe('the viewer', () => {
       assert.ok(Math.hypot(longitude - 10, latitude - 45) < 0.1);
     });
   }
+
+  it('shows a region around a pole from near', async () => {
+    await open('#dataset=cap');
+    const [, latitude, height] = await page.evaluate(() => terrace.globe.camera);
+    assert.ok(latitude > 85 && height > 1e5 && height < 5e5, `${latitude}, ${height} m`);
+  });
 
   it('takes garbage in the address for what is nearest to it, or for nothing', async () => {
     await open('#%%%&&==&dataset&fraction=1e300&right=-1&exaggeration=1e9&split=-7&colours=plaid&sun=2026-99-99T99:99&camera=1e9,-1e9,1e99,1e9,1e9');
