@@ -203,8 +203,9 @@ export class Globe {
     }
     const disc = discOf(region);
     const pitch = -28 - 45 * Math.min(1, disc.diameter / 5e6);
-    const [min, max] = [region.heights.min, region.heights.max].map((height) => Math.max(0, height));
-    const ground = this.exaggeration * (region.ground ?? min + 0.2 * (max - min));
+    const { min, max } = region.heights;
+    const low = max > 0 ? Math.max(0, min) : min;  // where there is land, the view is of it
+    const ground = this.exaggeration * (region.ground ?? low + 0.2 * (max - low));
     const sphere = new BoundingSphere(Cartesian3.fromDegrees(disc.longitude, disc.latitude, ground), disc.diameter / 2);
     const [heading, tilt] = [32, pitch].map(CesiumMath.toRadians);
     const offset = new HeadingPitchRange(heading, tilt, viewDistance(region) * narrow);

@@ -61,12 +61,13 @@ describe('the viewer', () => {
     const isle = writeGrid(path.join(folder, 'isle.asc'), 60, (x, y) => ((x - 30) ** 2 + (y - 30) ** 2 < 200 ? 1200 + x : -9999));
     const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
     const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
+    const deep = writeGrid(path.join(folder, 'deep.asc'), 20, (x, y) => x + y - 9020);
     const cap = writeGrid(path.join(folder, 'cap.asc'), 6, (x, y) => 100 * y, { columns: 720, west: -180, south: 87, cell: 0.5 });
     const archive = path.join(folder, 'archive');
     const bake = run('bake', path.join(samples, 'jacksboro.tif'), '--out', archive);
     assert.equal(bake.code, 0, bake.err);
     const config = path.join(folder, 'terrace.json');
-    const datasets = [isle, level, small, cap, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
+    const datasets = [isle, level, small, deep, cap, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
     fs.writeFileSync(config, JSON.stringify({ datasets: [...datasets, { name: 'archive', baked: archive }] }));
     server = await serve('--config', config);
     ({ browser, page } = await openBrowser(640, 400));
@@ -90,11 +91,10 @@ describe('the viewer', () => {
     assert.ok(blue < 0.001, `${blue} of the picture is blue`);
   });
 
-  for (const name of ['small', 'level']) {
+  for (const [name, ground] of [['small', 3001], ['level', 2500], ['deep', -9000]]) {
     it(`shows the raster ${name} from above its ground`, async () => {
       await open(`#dataset=${name}`);
       const [longitude, latitude, height] = await page.evaluate(() => terrace.globe.camera);
-      const ground = name === 'small' ? 3001 : 2500;
       assert.ok(height > ground && height < ground + 5000, `${height} m`);
       assert.ok(Math.hypot(longitude - 10, latitude - 45) < 0.1);
     });
