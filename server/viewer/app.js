@@ -19,9 +19,9 @@ const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
-// `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local
-// mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the server does not have this dataset any more.
-// `shown`: the name of the dataset that was shown last.
+// `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
+// "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
+// server does not have this dataset any more. `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
@@ -176,7 +176,7 @@ function missTile(problem) {
   state.hasFailed = true;
   watch.check().then(() => {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
-    complain(problem);
+    complain(traffic.problem ? `Tiles of ${state.dataset.name} cannot be read: ${traffic.problem}. The page tries again.` : problem);
     setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
   });
 }
