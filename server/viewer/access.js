@@ -3,6 +3,7 @@
 import { take } from "/viewer/begun.js";
 
 const kKey = "terrace.token";
+const kMaxTiles = 50;  // for the heights of one request; the server reads at most 64
 
 // The server does not know the token.
 export class UnknownToken extends Error {}
@@ -47,7 +48,7 @@ export class Access {
   }
 
   heightUrl(dataset, longitude, latitude) {
-    return `${dataset.urls.heights}?locations=${latitude},${longitude}`;
+    return heightsUrl(dataset, [{ longitude, latitude }], { locations: `${latitude},${longitude}` });
   }
 
   // Metres above the ellipsoid; undefined if the server has no height there.
@@ -63,23 +64,33 @@ export class Access {
 
   // Heights at {longitude, latitude}: metres, undefined where the dataset has none.
   async heights(dataset, places) {
-    const locations = places.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
+    const locations = places.map(locationOf).join("|");
     const headers = { ...this.headers, "Content-Type": "application/json" };
-    const reply = await fetch(dataset.urls.heights, { method: "POST", headers, body: JSON.stringify({ locations }) });
-    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
-    return (await reply.json()).results.map(({ elevation }) => elevation ?? undefined);
+    const { results } = await readJson(heightsUrl(dataset, places, {}), { method: "POST", headers, body: JSON.stringify({ locations }) });
+    return results.map(({ elevation }) => elevation ?? undefined);
   }
 
   // Heights at `samples` points along the corners, as [{longitude, latitude, distance, height}]; height is undefined where
   // the dataset has none.
   async profile(dataset, corners, samples) {
-    const path = corners.map(({ longitude, latitude }) => `${latitude.toFixed(7)},${longitude.toFixed(7)}`).join("|");
-    const query = new URLSearchParams({ path, samples });
-    const reply = await fetch(`${dataset.urls.heights}?${query}`, { headers: this.headers });
-    if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
-    const { results } = await reply.json();
+    const query = { path: corners.map(locationOf).join("|"), samples };
+    const { results } = await readJson(heightsUrl(dataset, between(corners), query), { headers: this.headers });
     return results.map(({ elevation, distance, location }) =>
       ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
+  }
+
+  // The line from `eye` metres above the ground at the first corner to `target` metres above it at the last, as /sight
+  // describes it: {visible, clearance, lowest}. Throws if the ground has no height at an end.
+  async sight(dataset, corners, { eye, target, refraction }) {
+    const end = (corner, above) => `${locationOf(corner)},${above}`;
+    const ask = (surface) => {
+      const query = new URLSearchParams({ from: end(corners[0], eye), to: end(corners.at(-1), target), heights: "ground", refraction, surface });
+      return readJson(`${dataset.urls.sight}?${query}`, { headers: this.headers });
+    };
+    const reply = ask("source");
+    // The sources do not contain edits: above these the server answers over tiles alone, and over few of them.
+    const { results } = await (dataset.urls.edits ? reply.catch(() => ask("served")) : reply);
+    return results[0];
   }
 }
 
@@ -89,16 +100,58 @@ export function pendingText({ name, percent, failed }) {
     : `${name} is being prepared: ${percent} %. It is shown as soon as it is there.`;
 }
 
+// Throws what the server says is wrong.
+async function readJson(url, options) {
+  const reply = await fetch(url, options);
+  if (!reply.ok) throw new Error((await reply.json().catch(() => ({}))).detail ?? `the server answered ${reply.status}`);
+  return reply.json();
+}
+
+function locationOf({ longitude, latitude }) {
+  return `${latitude.toFixed(7)},${longitude.toFixed(7)}`;
+}
+
+// The URL of heights at or along `places`. An archive has only those of its tiles.
+function heightsUrl({ urls, isArchive, max_level: deepest }, places, query) {
+  const served = isArchive ? { surface: "served", level: levelOf(deepest, places) } : {};
+  return `${urls.heights}?${new URLSearchParams({ ...query, ...served })}`;
+}
+
+// The deepest level on which the places lie in few tiles.
+function levelOf(deepest, places) {
+  const tiles = (level) => {
+    const index = (degrees) => Math.floor((degrees * 2 ** level) / 180);
+    return new Set(places.map(({ longitude, latitude }) => `${index(longitude)} ${index(latitude)}`)).size;
+  };
+  let level = deepest;
+  while (level > 0 && tiles(level) > kMaxTiles) --level;
+  return level;
+}
+
+// Places along the corners in steps of 1/100, as straight lines on the map.
+function between(corners) {
+  return corners.slice(1).flatMap((to, i) => {
+    const from = corners[i];
+    const turn = to.longitude - from.longitude;
+    const east = turn - 360 * Math.round(turn / 360);
+    return Array.from({ length: 101 }, (_, k) => ({
+      longitude: from.longitude + (east * k) / 100, latitude: from.latitude + ((to.latitude - from.latitude) * k) / 100,
+    }));
+  });
+}
+
 function headersOf(token) {
   return token ? { Authorization: `Bearer ${token}` } : {};
 }
 
+// `isArchive`: without its sources, which /mesh needs.
 function withDefaults(dataset) {
   const base = `/${encodeURIComponent(dataset.name)}`;
   return {
     ...dataset,
+    isArchive: !dataset.urls?.mesh,
     bounds: dataset.bounds ?? [-180, -90, 180, 90],
     heights: { min: dataset.heights?.min ?? 0, max: dataset.heights?.max ?? 4000 },
-    urls: { layer: `${base}/layer.json`, tileset: `${base}/tileset.json`, heights: `${base}/heights`, ...dataset.urls },
+    urls: { layer: `${base}/layer.json`, heights: `${base}/heights`, ...dataset.urls },
   };
 }

@@ -1,7 +1,7 @@
 // The viewer: datasets from the server, controls from the panel, terrain on the globe, and the view in the URL.
 import { pendingText, UnknownToken } from "/viewer/access.js";
 import { access, firstList, startOf } from "/viewer/early.js";
-import { boxOf, defaultFraction, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
+import { boxOf, defaultFraction, discOf, firstRegion, fractionOfStep, stepOfFraction } from "/viewer/framing.js";
 import { Globe } from "/viewer/globe.js";
 import { formatHeight } from "/viewer/numbers.js";
 import { Panel } from "/viewer/panel.js";
@@ -18,10 +18,10 @@ const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chose
 const kRetryMs = 5000;  // of what is not essential
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
-// `wanted`: a view of a dataset that is not in the list; it may be there with a token. `right`: the fraction on the right
-// of the line. `preparing`: datasets that the server has not opened yet. `sun`: "2026-06-21T18:30" in the dataset's local
-// mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the server does not have this dataset any more.
-// `shown`: the name of the dataset that was shown last.
+// `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
+// `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
+// "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
+// server does not have this dataset any more. `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
                 hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
@@ -91,6 +91,7 @@ async function show() {
   const { dataset } = state;
   if (!dataset) return;
   clearToolsOfAnother(dataset);
+  if (dataset.isArchive) setSwitches({ ...state, tiles3d: state.tiles3d && Boolean(dataset.urls.tileset), right: undefined });
   state.hasFailed = false;
   panel.setDataset(dataset, firstRegion(dataset).isPart);
   panel.setFraction(state.fraction);
@@ -113,7 +114,7 @@ async function show() {
 // The heights of a part of a dataset are unknown.
 async function lookAt(region, seconds) {
   const { dataset } = state;
-  const { longitude, latitude } = boxOf(region.bounds);
+  const { longitude, latitude } = discOf(region);
   const ground = region.isPart ? await access.heightAt(dataset, longitude, latitude) : undefined;
   if (dataset === state.dataset) globe.lookAt({ ...region, ground }, seconds);
 }
@@ -175,7 +176,7 @@ function missTile(problem) {
   state.hasFailed = true;
   watch.check().then(() => {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
-    complain(problem);
+    complain(traffic.problem ? `Tiles of ${state.dataset.name} cannot be read: ${traffic.problem}. The page tries again.` : problem);
     setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
   });
 }
@@ -312,8 +313,10 @@ async function apply(view) {
   setSun(view.sun);
   await show();
   if (!state.wanted || tellPending()) return;
-  if (state.moreWithToken) ask(`${view.dataset} needs a token, or is not on this server.`);
-  else complain(`There is no dataset ${view.dataset} on this server; this is ${state.dataset.name}.`);
+  if (state.moreWithToken) return ask(`${view.dataset} needs a token, or is not on this server.`);
+  state.wanted = undefined;
+  remember();
+  complain(`There is no dataset ${view.dataset} on this server; this is ${state.dataset.name}.`);
 }
 
 function refresh() {

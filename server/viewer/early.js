@@ -2,7 +2,7 @@
 // first layer.json, the tiles of level 0, and the height in the middle of the view.
 import { Access, UnknownToken } from "/viewer/access.js";
 import { begin } from "/viewer/begun.js";
-import { boxOf, defaultFraction, firstRegion } from "/viewer/framing.js";
+import { defaultFraction, discOf, firstRegion } from "/viewer/framing.js";
 import { decodeView } from "/viewer/view_url.js";
 
 const kRoots = ["0/0/0", "0/1/0"];
@@ -18,9 +18,13 @@ export function startOf(view, datasets) {
   return { isNamed: named !== undefined, dataset, fraction: (named && view.fraction) ?? defaultFraction(dataset) };
 }
 
-// layer.json of a dataset, for a fraction of the level error.
+// The query of layer.json and tileset.json for a fraction of the level error. An archive has one error.
+export function errorQuery({ isArchive }, fraction) {
+  return isArchive ? "" : `?fraction=${fraction}`;
+}
+
 export function layerUrl(dataset, fraction) {
-  return `${dataset.urls.layer.replace(/layer\.json.*$/, "")}layer.json?fraction=${fraction}`;
+  return `${dataset.urls.layer.replace(/layer\.json.*$/, "")}layer.json${errorQuery(dataset, fraction)}`;
 }
 
 async function beginTiles(layer, headers) {
@@ -41,7 +45,7 @@ async function beginView({ datasets }) {
   const { isNamed, dataset, fraction } = startOf(view, datasets);
   const region = firstRegion(dataset);
   if (region.isPart && !(isNamed && view.camera)) {
-    const { longitude, latitude } = boxOf(region.bounds);
+    const { longitude, latitude } = discOf(region);
     begin(access.heightUrl(dataset, longitude, latitude), access.headers).catch(() => {});
   }
   await beginTiles(layerUrl(dataset, fraction), access.headers);

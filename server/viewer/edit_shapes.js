@@ -1,13 +1,20 @@
 // Polygons of edits as rings of {longitude, latitude}, without a repeated first corner. Uses neither CesiumJS nor the page.
 const kMetresPerDegree = 111320;
 
+const turned = (degrees) => degrees - 360 * Math.round(degrees / 360);
+
+// Corners whose longitudes go on beyond 180 degrees, on the side of the first one.
+function unwrapped(corners) {
+  const { longitude: first } = corners[0];
+  return corners.map((corner) => ({ ...corner, longitude: first + turned(corner.longitude - first) }));
+}
+
 // Corners in metres east and north of the first one; good for shapes much smaller than the Earth.
 function inMetres(corners) {
   const [first] = corners;
   const east = kMetresPerDegree * Math.cos((first.latitude * Math.PI) / 180);
-  const turned = (degrees) => degrees - 360 * Math.round(degrees / 360);
-  return corners.map(({ longitude, latitude }) =>
-    [turned(longitude - first.longitude) * east, (latitude - first.latitude) * kMetresPerDegree]);
+  return unwrapped(corners).map(({ longitude, latitude }) =>
+    [(longitude - first.longitude) * east, (latitude - first.latitude) * kMetresPerDegree]);
 }
 
 const cross = ([ax, ay], [bx, by], [cx, cy]) => (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
@@ -37,7 +44,8 @@ export function crossesItself(corners) {
 }
 
 // Places inside the ring on a grid of about `count` over its box, as {longitude, latitude}.
-export function placesInside(corners, count) {
+export function placesInside(outline, count) {
+  const corners = unwrapped(outline);
   const [longitudes, latitudes] = ["longitude", "latitude"].map((name) => corners.map((corner) => corner[name]));
   const [west, east] = [Math.min(...longitudes), Math.max(...longitudes)];
   const [south, north] = [Math.min(...latitudes), Math.max(...latitudes)];
@@ -53,12 +61,12 @@ export function placesInside(corners, count) {
       const at = a.longitude + ((latitude - a.latitude) / (b.latitude - a.latitude)) * (b.longitude - a.longitude);
       if (longitude < at) isInside = !isInside;
     });
-    if (isInside) places.push({ longitude, latitude });
+    if (isInside) places.push({ longitude: turned(longitude), latitude });
   }
   if (places.length > 0) return places;
   // Thinner than the grid.
   const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
-  return [...corners, { longitude: mean(longitudes), latitude: mean(latitudes) }];
+  return [...outline, { longitude: turned(mean(longitudes)), latitude: mean(latitudes) }];
 }
 
 // What flattening to `height` would do to ground of these heights on `area` square metres. Volumes in cubic metres, of
@@ -77,13 +85,57 @@ export function earthwork(heights, height, area) {
 
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
+// The parts of a ring on one side of a meridian, as rings: east with `side` 1, west with -1. A corner on it counts as east.
+function partsBeside(ring, meridian, side) {
+  const beyond = ({ longitude }) => side * (longitude - meridian || 1e-12);
+  const crossing = (a, b) => {
+    const share = beyond(a) / (beyond(a) - beyond(b));
+    return { longitude: meridian, latitude: a.latitude + share * (b.latitude - a.latitude) };
+  };
+  // Pieces of the outline on this side, from crossing to crossing.
+  const first = ring.findIndex((b, i) => beyond(ring.at(i - 1)) < 0 && beyond(b) > 0);
+  const chains = [];
+  for (let i = first; i < first + ring.length; ++i) {
+    const [a, b] = [ring.at((i - 1) % ring.length), ring[i % ring.length]];
+    if (beyond(a) < 0 && beyond(b) > 0) chains.push([crossing(a, b)]);
+    if (beyond(b) > 0) chains.at(-1).push(b);
+    else if (beyond(a) > 0) chains.at(-1).push(crossing(a, b));
+  }
+  // Along the meridian the polygon is between the first and the second crossing, the third and the fourth, and so on.
+  const crossings = chains.flatMap((chain) => [chain[0], chain.at(-1)]).sort((a, b) => a.latitude - b.latitude);
+  const next = (chain) => chains.find(([start]) => start === crossings[crossings.indexOf(chain.at(-1)) ^ 1]);
+  const left = new Set(chains);
+  return chains.flatMap((start) => {
+    const part = [];
+    for (let chain = start; left.delete(chain); chain = next(chain)) part.push(...chain);
+    return part.length > 0 ? [part] : [];
+  });
+}
+
+// A ring as rings within -180 to 180 degrees.
+function dividedAt180(corners) {
+  const ring = unwrapped(corners);
+  const meridian = ring[0].longitude < 0 ? -180 : 180;
+  if (!ring.some(({ longitude }) => Math.abs(longitude) > 180)) return [ring];
+  return [1, -1].flatMap((side) => partsBeside(ring, meridian, side).map((part) => part.map(({ longitude, latitude }) =>
+    ({ longitude: longitude + (side === Math.sign(meridian) ? -2 * meridian : 0), latitude }))));
+}
+
+// A closed ring of GeoJSON; undefined if nothing is left of it.
+function closed(ring) {
+  const positions = ring.map(({ longitude, latitude }) => [rounded(longitude, 7), rounded(latitude, 7)]);
+  const distinct = positions.filter((at, i) => String(at) !== String(positions.at(i - 1)));
+  return distinct.length > 2 ? [...distinct, distinct[0]] : undefined;
+}
+
 // The file that `terrace serve --edits` takes: one polygon that is flattened. Metres.
 export function flattenGeoJson(corners, height, blend) {
-  const ring = signedArea(corners) < 0 ? [...corners].reverse() : [...corners];
-  const coordinates = [...ring, ring[0]].map(({ longitude, latitude }) => [rounded(longitude, 7), rounded(latitude, 7)]);
+  const ring = signedArea(corners) < 0 ? [...corners].reverse() : corners;
+  const polygons = dividedAt180(ring).map(closed).filter(Boolean).map((outline) => [outline]);
   const terrain = { op: "flatten", height: rounded(height, 3), ...(blend > 0 ? { blend_m: rounded(blend, 3) } : {}) };
   return {
     type: "FeatureCollection",
-    features: [{ type: "Feature", properties: { terrain }, geometry: { type: "Polygon", coordinates: [coordinates] } }],
+    features: [{ type: "Feature", properties: { terrain }, geometry: polygons.length > 1 ?
+      { type: "MultiPolygon", coordinates: polygons } : { type: "Polygon", coordinates: polygons[0] } }],
   };
 }

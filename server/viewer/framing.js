@@ -1,7 +1,8 @@
 // The best view of a dataset: distance of the camera and fineness of the mesh. Does not use CesiumJS, so that the first
 // requests begin before it is loaded.
 const kMetresPerDegree = 111320;
-const kGlobalWidth = 100;  // a dataset wider than this, in degrees, is shown as a whole globe
+const kGlobalWidth = 1.1e7;  // metres: a dataset wider than this is shown as a whole globe
+const kFullTurn = 350;  // degrees of width from which a region goes all around the Earth
 export const kGlobalDistance = 1.75e7;  // metres from which the whole globe fits
 const radians = (degrees) => (degrees * Math.PI) / 180;
 
@@ -18,8 +19,13 @@ export function boxOf([west, south, east, north]) {
   return { longitude: west + width / 2, latitude: (south + north) / 2, width, height: north - south };
 }
 
-export function isGlobal(dataset) {
-  return boxOf(dataset.bounds).width > kGlobalWidth;
+// Degrees between the equator and what of [west, south, east, north] is nearest to it.
+function distanceFromEquator([, south, , north]) {
+  return south <= 0 && north >= 0 ? 0 : Math.min(Math.abs(south), Math.abs(north));
+}
+
+export function isGlobal({ bounds }) {
+  return boxOf(bounds).width * kMetresPerDegree * Math.cos(radians(distanceFromEquator(bounds))) > kGlobalWidth;
 }
 
 // The share of the Earth that [west, south, east, north] cover.
@@ -36,15 +42,21 @@ export function firstRegion(dataset) {
   return { ...(isPart ? finest : dataset), isPart };
 }
 
-// Diagonal of the dataset, metres.
-export function extent(dataset) {
-  const { latitude, width, height } = boxOf(dataset.bounds);
-  return Math.hypot(width * Math.cos(radians(latitude)), height) * kMetresPerDegree;
+// What a dataset that is not global is within: centre in degrees, diameter in metres. The middle of what goes all around
+// the Earth there is the pole.
+export function discOf({ bounds }) {
+  const { longitude, latitude, width, height } = boxOf(bounds);
+  if (width > kFullTurn) {
+    return { longitude, latitude: 90 * Math.sign(latitude), diameter: 2 * (90 - distanceFromEquator(bounds)) * kMetresPerDegree };
+  }
+  return { longitude, latitude, diameter: Math.hypot(width * Math.cos(radians(latitude)), height) * kMetresPerDegree };
 }
 
 // Metres between the camera and the centre of a dataset that is completely in view.
 export function viewDistance(dataset) {
-  return isGlobal(dataset) ? kGlobalDistance : extent(dataset) * (0.62 + 0.2 * Math.min(1, extent(dataset) / 5e6));
+  if (isGlobal(dataset)) return kGlobalDistance;
+  const { diameter } = discOf(dataset);
+  return diameter * (0.62 + 0.2 * Math.min(1, diameter / 5e6));
 }
 
 // Pixels of error at which CesiumJS goes a level deeper, for a distance in metres. A whole planet gets more tiles,

@@ -4,8 +4,8 @@ import {
   GeographicTilingScheme, GroundPolylinePrimitive, GroundPrimitive, HeadingPitchRange, Math as CesiumMath,
   QuantizedMeshTerrainData, Rectangle, Resource, ScreenSpaceEventHandler, ScreenSpaceEventType,
 } from "/viewer/cesium/index.js";
-import { layerUrl } from "/viewer/early.js";
-import { boxOf, extent, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
+import { errorQuery, layerUrl } from "/viewer/early.js";
+import { boxOf, discOf, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
 import { steerByKeyboard } from "/viewer/keyboard.js";
 import { niceInterval } from "/viewer/colours.js";
 import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.js";
@@ -122,7 +122,7 @@ export class Globe {
     this.scene.globe.show = true;
     this.widget.useDefaultRenderLoop = true;
     this.adaptToCamera();
-    const tileset = `${dataset.urls.tileset}?fraction=${compared}`;
+    const tileset = `${dataset.urls.tileset}${errorQuery(dataset, compared)}`;
     await this.compare(compared ? new Resource({ url: tileset, headers }) : undefined);
   }
 
@@ -201,11 +201,12 @@ export class Globe {
       const destination = Cartesian3.fromDegrees(eastward, northward, kGlobalDistance * narrow);
       return seconds > 0 ? camera.flyTo({ destination, duration: seconds }) : camera.setView({ destination });
     }
-    const size = extent(region);
-    const pitch = -28 - 45 * Math.min(1, size / 5e6);
-    const [min, max] = [region.heights.min, region.heights.max].map((height) => Math.max(0, height));
-    const ground = this.exaggeration * (region.ground ?? min + 0.2 * (max - min));
-    const sphere = new BoundingSphere(Cartesian3.fromDegrees(longitude, latitude, ground), size / 2);
+    const disc = discOf(region);
+    const pitch = -28 - 45 * Math.min(1, disc.diameter / 5e6);
+    const { min, max } = region.heights;
+    const low = max > 0 ? Math.max(0, min) : min;  // where there is land, the view is of it
+    const ground = this.exaggeration * (region.ground ?? low + 0.2 * (max - low));
+    const sphere = new BoundingSphere(Cartesian3.fromDegrees(disc.longitude, disc.latitude, ground), disc.diameter / 2);
     const [heading, tilt] = [32, pitch].map(CesiumMath.toRadians);
     const offset = new HeadingPitchRange(heading, tilt, viewDistance(region) * narrow);
     camera.flyToBoundingSphere(sphere, { offset, duration: seconds });

@@ -1,6 +1,6 @@
 // Lengths and visibility along a path of heights. Plain numbers: no page, no CesiumJS.
 const kEarthRadius = 6371000;  // metres
-const kRefraction = 0.13;  // share of the Earth's curvature that the air's refraction undoes, for light by day
+export const kRefraction = 0.13;  // share of the Earth's curvature that the air's refraction undoes, for light by day
 
 // Metres by which the Earth falls away below a level line of sight.
 export function drop(distance) {
@@ -27,24 +27,17 @@ export function measurePath(points) {
   return sum;
 }
 
-// Whether each point of the ground is seen from `eye` metres above the first, and a target `target` metres above the
-// last. Returns {seen: [bool], isTargetSeen, obstacle}: `obstacle` is {distance, above}, the ground that stands highest
-// above the line to the target, if any does.
-export function lineOfSight(points, eye, target) {
-  const last = points.at(-1);
-  const origin = (points[0].height ?? 0) + eye;
-  const level = ({ distance, height }) => height - drop(distance);
-  const end = level({ ...last, height: (last.height ?? 0) + target });
+// Whether each point of the ground is seen from `eye` metres above the first: [bool], undefined where the height is.
+// Between two points nothing hides. The first point has a height.
+export function seenGround(points, eye) {
+  const origin = points[0].height + eye;
   let horizon = -Infinity;
-  let obstacle;
-  const seen = points.map((point, i) => {
-    if (i === 0 || point.height === undefined || point.distance === 0) return true;
-    const slope = (level(point) - origin) / point.distance;
+  return points.map(({ distance, height }) => {
+    if (height === undefined) return undefined;
+    if (distance === 0) return true;
+    const slope = (height - drop(distance) - origin) / distance;
     const isSeen = slope >= horizon;
     horizon = Math.max(horizon, slope);
-    const above = level(point) - (origin + (end - origin) * (point.distance / last.distance));
-    if (point !== last && above > (obstacle?.above ?? 0)) obstacle = { distance: point.distance, above };
     return isSeen;
   });
-  return { seen, isTargetSeen: obstacle === undefined, obstacle };
 }

@@ -1,6 +1,6 @@
 // Measuring on the globe: distance over the ground with a profile, and line of sight. Heights are the dataset's own, from
 // /heights, not those of the drawn triangles.
-import { lineOfSight, measurePath } from "/viewer/ground_path.js";
+import { kRefraction, measurePath, seenGround } from "/viewer/ground_path.js";
 import { formatHeight, formatMetres } from "/viewer/numbers.js";
 import { ProfilePlot } from "/viewer/profile_plot.js";
 
@@ -107,22 +107,51 @@ export class Measure {
     this.plot.show(points);
   }
 
-  #describeSight() {
-    const { points } = this;
+  // The server has the verdict: it compares the line with all ground below it, not with samples.
+  async #describeSight() {
+    const turn = ++this.#turn;
+    const { points, corners } = this;
     const [eye, target] = ["eye", "target"].map((id) => Math.max(0, byId(id).valueAsNumber || 0));
-    const sight = { ...lineOfSight(points, eye, target), eye, target };
-    const seen = sight.seen.filter(Boolean).length / sight.seen.length;
-    const { obstacle } = sight;
-    const verdict = obstacle ? `Hidden: the ground at ${formatMetres(obstacle.distance)} stands ${formatMetres(obstacle.above)} above the line` : "Visible";
-    byId("dock-text").textContent = `${verdict}. ${formatMetres(points.at(-1).distance)} away; ${Math.round(100 * seen)} % of the ground between is seen.`;
+    const unknown = [["observer", points[0]], ["target", points.at(-1)]].filter(([, { height }]) => height === undefined);
+    if (unknown.length > 0) return this.#showNoVerdict(`the dataset has no height at the ${unknown.map(([end]) => end).join(" and the ")}`);
+    try {
+      const sight = await this.access.sight(this.dataset(), corners, { eye, target, refraction: kRefraction });
+      if (turn !== this.#turn) return;
+      const seen = seenGround(points, eye);
+      byId("dock-text").textContent = this.#textOf(sight, seen);
+      this.#drawSeen(seen);
+      this.plot.show(points, { seen, eye, target, isTargetSeen: sight.visible });
+    } catch (error) {
+      if (turn === this.#turn) this.#showNoVerdict(error.message);
+    }
+  }
+
+  #showNoVerdict(reason) {
+    byId("dock-text").textContent = `The line of sight is not known: ${reason}.`;
+    this.globe.overlay.setLine("measured", undefined);
+    this.plot.show(this.points);
+  }
+
+  #textOf({ visible, clearance, lowest, gaps }, seen) {
+    const known = seen.filter((value) => value !== undefined);
+    const share = Math.round((100 * known.filter(Boolean).length) / known.length);
+    const verdict = visible ? "Visible" : `Hidden: the ground at ${formatMetres(lowest.distance)} stands ${formatMetres(-clearance)} above the line`;
+    const remark = gaps || known.length < seen.length ? " Parts of the ground have no heights; what they hide is unknown." : "";
+    return `${verdict}. ${formatMetres(this.points.at(-1).distance)} away; ${share} % of the ground between is seen.${remark}`;
+  }
+
+  // Ground without a height is not drawn.
+  #drawSeen(seen) {
+    const { points } = this;
     const pieces = [];
     points.forEach((point, i) => {
-      const className = sight.seen[i] ? "seen" : "unseen";
-      if (pieces.at(-1)?.className !== className) pieces.push({ className, points: i > 0 ? [points[i - 1]] : [] });
+      if (seen[i] === undefined) return;
+      const className = seen[i] ? "seen" : "unseen";
+      const isAfterGap = i === 0 || seen[i - 1] === undefined;
+      if (isAfterGap || pieces.at(-1).className !== className) pieces.push({ className, points: isAfterGap ? [] : [points[i - 1]] });
       pieces.at(-1).points.push(point);
     });
-    this.globe.overlay.setLine("measured", pieces.map((piece) => ({ ...piece, points: this.#onGround(piece.points) })));
-    this.plot.show(points, sight);
+    this.globe.overlay.setLine("measured", pieces);
   }
 
   #onGround(points) {

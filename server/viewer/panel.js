@@ -91,9 +91,11 @@ export class Panel {
   }
 
   // `hasPart`: the first view shows a part of the dataset.
-  setDataset({ name, heights, attribution, urls, imagery }, hasPart) {
+  setDataset({ name, heights, attribution, urls, imagery, isArchive }, hasPart) {
     byId("edits").parentElement.hidden = !urls.edits;
     byId("imagery").parentElement.hidden = !urls.imagery_geodetic;
+    byId("tiles3d").parentElement.hidden = !urls.tileset;
+    for (const id of ["fraction", "compare"]) byId(id).parentElement.hidden = isArchive;  // which has one error
     byId("dataset").value = name;
     byId("whole").hidden = !hasPart;
     document.title = `${name} · terrace`;

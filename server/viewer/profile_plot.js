@@ -32,7 +32,7 @@ export class ProfilePlot {
     new ResizeObserver(() => this.points.length > 1 && this.#draw()).observe(element);
   }
 
-  // `points`: [{distance, height}]. `sight`: what lineOfSight returns, with `eye` and `target` in metres; optional.
+  // `points`: [{distance, height}]. `sight`, optional: {eye, target, seen, isTargetSeen}, metres above the ends, and what seenGround returns.
   show(points, sight) {
     Object.assign(this, { points, sight, index: undefined });
     this.element.setAttribute("aria-valuemax", Math.max(0, points.length - 1));

@@ -5,7 +5,18 @@ import { Resource } from "/viewer/cesium/index.js";
 
 export const kPhases = ["read", "refine", "encode", "compress"];
 
+// What the server says is wrong, in the reply to a request of CesiumJS; undefined if it says nothing.
+function detailOf({ status, response }) {
+  if (status < 400) return undefined;
+  try {
+    return JSON.parse(typeof response === "string" ? response : new TextDecoder().decode(response)).detail;
+  } catch {
+    return undefined;
+  }
+}
+
 export class Traffic {
+  // `problem`: what the server said last was wrong, if anything.
   constructor() {
     this.reset();
     const observer = new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry)));
@@ -15,7 +26,7 @@ export class Traffic {
   }
 
   reset() {
-    Object.assign(this, { since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
+    Object.assign(this, { problem: undefined, since: performance.now(), tiles: 0, bytes: 0, hits: 0, answers: 0, computed: 0 });
     this.tiles3d = { tiles: 0, bytes: 0 };  // the same for 3D Tiles, including the bytes of subtrees and tileset.json
     this.errors = new Map();  // metres, by "z/x/y", of 3D Tiles by "root/level/x/y"
     this.milliseconds = Object.fromEntries(kPhases.map((phase) => [phase, 0]));
@@ -48,8 +59,8 @@ export class Traffic {
     return errors.length > 0 ? Math.max(...errors) : undefined;
   }
 
-  // Resource timing has no response headers, so this reads them from the requests of CesiumJS. Requests that have begun
-  // already are not sent again.
+  // Resource timing has no response headers, and errors of CesiumJS have no bodies, so this reads both from its requests.
+  // Requests that have begun already are not sent again.
   #watchRequests() {
     const load = Resource._Implementations.loadWithXhr;
     const note = (url, header) => {
@@ -59,7 +70,10 @@ export class Traffic {
     };
     const send = (url, ...rest) => {
       const request = load(url, ...rest);
-      request?.addEventListener?.("load", () => note(url, request.getResponseHeader("Terrain-Max-Error")));
+      request?.addEventListener?.("load", () => {
+        note(url, request.getResponseHeader("Terrain-Max-Error"));
+        this.problem = detailOf(request) ?? this.problem;
+      });
       return request;
     };
     Resource._Implementations.loadWithXhr = (url, responseType, method, data, headers, deferred, mimeType) => {

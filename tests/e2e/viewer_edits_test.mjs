@@ -51,6 +51,36 @@ describe('shapes of edits', () => {
   });
 });
 
+describe('a shape across 180 degrees', () => {
+  // Open to the east, so that it has two parts there.
+  const bracket = [at(179.5, 0), at(-179.5, 0), at(-179.5, 0.2), at(179.7, 0.2), at(179.7, 0.4), at(-179.5, 0.4), at(-179.5, 0.6), at(179.5, 0.6)];
+
+  it('contains places on both sides, and none beyond', () => {
+    const places = placesInside(bracket, 400);
+    assert.ok(places.length > 250 && places.every(({ longitude }) => Math.abs(longitude) >= 179.5 && Math.abs(longitude) <= 180));
+  });
+
+  it('is divided in the file, which terrace takes', (test) => {
+    const file = flattenGeoJson(bracket, 100, 0);
+    assert.deepEqual(file.features[0].geometry, { type: 'MultiPolygon', coordinates: [
+      [[[-180, 0], [-179.5, 0], [-179.5, 0.2], [-180, 0.2], [-180, 0]]],
+      [[[-180, 0.4], [-179.5, 0.4], [-179.5, 0.6], [-180, 0.6], [-180, 0.4]]],
+      [[[180, 0.2], [179.7, 0.2], [179.7, 0.4], [180, 0.4], [180, 0.6], [179.5, 0.6], [179.5, 0], [180, 0], [180, 0.2]]],
+    ] });
+    const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-edits-'));
+    test.after(() => fs.rmSync(folder, { recursive: true }));
+    const drawn = path.join(folder, 'drawn.geojson');
+    fs.writeFileSync(drawn, JSON.stringify(file));
+    const info = run('info', path.join(samples, 'etopo5.tif'), '--edits', drawn);
+    assert.equal(info.code, 0, info.err);
+  });
+
+  it('is one polygon if only a corner is at 180 degrees', () => {
+    const [{ geometry }] = flattenGeoJson([at(-180, 0), at(-180, 0.4), at(179.8, 0.4)], 100, 0).features;
+    assert.deepEqual(geometry, { type: 'Polygon', coordinates: [[[180, 0.4], [179.8, 0.4], [180, 0], [180, 0.4]]] });
+  });
+});
+
 describe('edits in the viewer', () => {
   const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-edits-'));
   const config = path.join(folder, 'terrace.json');

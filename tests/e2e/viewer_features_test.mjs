@@ -7,7 +7,7 @@ import { after, before, describe, it } from 'node:test';
 import { assertAccessible } from './axe.mjs';
 import { end, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
-import { lineOfSight, measurePath } from '../../server/viewer/ground_path.js';
+import { measurePath, seenGround } from '../../server/viewer/ground_path.js';
 import { fromLocalMeanTime, sunAltitude, sunDirection } from '../../server/viewer/sun.js';
 
 const kWait = { timeout: 90000, polling: 200 };
@@ -25,16 +25,13 @@ describe('numbers of the viewer', () => {
 
   it('see over a plain, not through a wall, and not beyond the horizon', () => {
     const plain = Array.from({ length: 101 }, (_, i) => ({ distance: 10 * i, height: 100 }));
-    assert.ok(lineOfSight(plain, 2, 0).seen.every(Boolean));
-    const walled = plain.map((point, i) => (i === 50 ? { ...point, height: 120 } : point));
-    const { seen, isTargetSeen, obstacle } = lineOfSight(walled, 2, 2);
-    assert.ok(!isTargetSeen && seen[50] && !seen[60]);
-    assert.equal(obstacle.distance, 500);
-    assert.ok(Math.abs(obstacle.above - 18) < 0.1, `${obstacle.above} m`);
-    assert.ok(lineOfSight(walled, 2, 60).isTargetSeen, 'a tower looks over the wall');
+    assert.ok(seenGround(plain, 2).every(Boolean));
+    const seen = seenGround(plain.map((point, i) => (i === 50 ? { ...point, height: 120 } : point)), 2);
+    assert.ok(seen[50] && !seen[60]);
+    assert.deepEqual(seenGround([{ distance: 0, height: 5 }, { distance: 10 }, { distance: 20, height: 4 }], 2), [true, undefined, true]);
     // From 2 m the sea is seen to 5.4 km: the square root of 2 R h / (1 - k).
     const sea = Array.from({ length: 1001 }, (_, i) => ({ distance: 10 * i, height: 0 }));
-    const horizon = 10 * lineOfSight(sea, 2, 0).seen.indexOf(false);
+    const horizon = 10 * seenGround(sea, 2).indexOf(false);
     assert.ok(Math.abs(horizon - 5412) < 60, `${horizon} m`);
   });
 
@@ -56,6 +53,7 @@ describe('features of the viewer', () => {
   const write = (...datasets) => fs.writeFileSync(config, JSON.stringify({ datasets }));
   const settled = () => page.waitForFunction(() => window.terrace?.state.ready && !terrace.globe.loading &&
     terrace.globe.drawn().tiles > 1 && !document.querySelector('.curtain'), undefined, kWait);
+  const says = (wanted) => page.waitForFunction((pattern) => pattern.test(document.getElementById('dock-text').textContent), wanted, kWait);
   const read = (id) => page.locator(id).innerText();
 
   before(async () => {
@@ -99,14 +97,32 @@ describe('features of the viewer', () => {
   it('tell what hides a place', async () => {
     await page.locator('#tool-sight').click();
     await page.waitForFunction(() => terrace.state.measure?.mode === 'sight', undefined, kWait);
+    // A ridge between two of the 400 samples stands 1.1 m above this line.
+    await page.locator('#eye').fill('200');
+    await page.locator('#target').fill('50');
     await page.evaluate(() => {
-      terrace.state.measure.add({ longitude: -84.3, latitude: 36.3, height: 400 });
-      return terrace.state.measure.add({ longitude: -84.2, latitude: 36.3, height: 400 });
+      terrace.state.measure.add({ longitude: -84.13, latitude: 36.43, height: 400 });
+      return terrace.state.measure.add({ longitude: -84.14, latitude: 36.21, height: 400 });
     });
-    await page.waitForFunction(() => /^(Visible|Hidden)/.test(document.getElementById('dock-text').textContent), undefined, kWait);
+    await says(/^Hidden: the ground at [\d.,]+ k?m stands 1\.\d+ m above the line\. 24\.4 km away; \d+ % of the ground between is seen.$/);
+    await page.locator('#plot .sight.blocked').waitFor({ state: 'attached' });
     await page.locator('#target').fill('9000');
-    await page.waitForFunction(() => /^Visible/.test(document.getElementById('dock-text').textContent), undefined, kWait);
+    await says(/^Visible/);
     await assertAccessible(page, 'a line of sight');
+    const look = (longitude) => page.evaluate((east) => {
+      terrace.state.measure.add({ longitude: -84.13, latitude: 36.43, height: 400 });
+      return terrace.state.measure.add({ longitude: east, latitude: 36.21, height: 400 });
+    }, longitude);
+    await look(-83.9);  // beside the data
+    await says(/^The line of sight is not known: the dataset has no height at the target\.$/);
+    await page.route('**/heights?path=*', async (route) => {
+      const body = await (await route.fetch()).json();
+      for (const result of body.results.slice(1, -1)) result.elevation = null;
+      await route.fulfill({ json: body });
+    });
+    await look(-84.14);
+    await says(/^Visible\. .*100 % of the ground between is seen\. Parts of the ground have no heights/);
+    await page.unroute('**/heights?path=*');
     await page.locator('#dock-close').click();
     assert.equal(await page.locator('.overlay .line').count(), 0);
   });

@@ -1,19 +1,20 @@
-// The viewer with unusual input: odd rasters, garbage in the address, very small windows.
+// The viewer with unusual input: odd rasters, an archive without its sources, garbage in the address, very small windows.
 import assert from 'node:assert/strict';
 import fs from 'node:fs';
 import os from 'node:os';
 import path from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { end, openBrowser } from './browser.mjs';
-import { samples, serve } from './harness.mjs';
+import { run, samples, serve } from './harness.mjs';
+import { discOf, isGlobal } from '../../server/viewer/framing.js';
 import { heightColour, heightTicks } from '../../server/viewer/colours.js';
 
 const kWait = { timeout: 90000, polling: 200 };
 
 // An ASCII grid in degrees; `height(x, y)` of each sample, -9999 is a void.
-function writeGrid(file, side, height) {
-  const rows = Array.from({ length: side }, (_, y) => Array.from({ length: side }, (_, x) => height(x, y)).join(' '));
-  fs.writeFileSync(file, `ncols ${side}\nnrows ${side}\nxllcorner 10\nyllcorner 45\ncellsize 0.001\nNODATA_value -9999\n${rows.join('\n')}\n`);
+function writeGrid(file, side, height, { columns = side, west = 10, south = 45, cell = 0.001 } = {}) {
+  const rows = Array.from({ length: side }, (_, y) => Array.from({ length: columns }, (_, x) => height(x, y)).join(' '));
+  fs.writeFileSync(file, `ncols ${columns}\nnrows ${side}\nxllcorner ${west}\nyllcorner ${south}\ncellsize ${cell}\nNODATA_value -9999\n${rows.join('\n')}\n`);
   fs.writeFileSync(file.replace(/asc$/, 'prj'), 'GEOGCS["WGS 84",DATUM["WGS_1984",SPHEROID["WGS 84",6378137,298.257223563]],' +
     'PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]]');
   return file;
@@ -24,6 +25,22 @@ describe('a level raster', () => {
     assert.deepEqual(heightColour(500, { min: 500, max: 500 }), heightColour(500, { min: 500, max: 501 }));
     assert.deepEqual(heightTicks({ min: 500, max: 500 }), []);
     assert.deepEqual(heightTicks({ min: 0, max: 0 }), []);
+  });
+});
+
+describe('a first view', () => {
+  const frame = (...bounds) => ({ bounds });
+
+  it('is of a globe only if the data is wide in metres', () => {
+    for (const wide of [frame(-180, -90, 180, 90), frame(-180, 60, 180, 90), frame(100, -40, -150, 10)]) assert.ok(isGlobal(wide), `${wide.bounds}`);
+    for (const small of [frame(-180, 85, 180, 90), frame(-180, -90, 180, -89), frame(-70, 80, 50, 84), frame(5, 45, 15, 48)]) {
+      assert.ok(!isGlobal(small), `${small.bounds}`);
+    }
+  });
+
+  it('has a pole in the middle of what goes around it', () => {
+    assert.deepEqual(discOf(frame(-180, -90, 180, -89)), { longitude: 0, latitude: -90, diameter: 2 * 111320 });
+    assert.equal(discOf(frame(5, 45, 15, 48)).latitude, 46.5);
   });
 });
 
@@ -44,7 +61,15 @@ describe('the viewer', () => {
     const isle = writeGrid(path.join(folder, 'isle.asc'), 60, (x, y) => ((x - 30) ** 2 + (y - 30) ** 2 < 200 ? 1200 + x : -9999));
     const level = writeGrid(path.join(folder, 'level.asc'), 20, () => 2500);
     const small = writeGrid(path.join(folder, 'small.asc'), 2, (x, y) => 3000 + x + y);
-    server = await serve(isle, level, small, path.join(samples, 'jacksboro.tif'));
+    const deep = writeGrid(path.join(folder, 'deep.asc'), 20, (x, y) => x + y - 9020);
+    const cap = writeGrid(path.join(folder, 'cap.asc'), 6, (x, y) => 100 * y, { columns: 720, west: -180, south: 87, cell: 0.5 });
+    const archive = path.join(folder, 'archive');
+    const bake = run('bake', path.join(samples, 'jacksboro.tif'), '--out', archive);
+    assert.equal(bake.code, 0, bake.err);
+    const config = path.join(folder, 'terrace.json');
+    const datasets = [isle, level, small, deep, cap, path.join(samples, 'jacksboro.tif')].map((file) => ({ name: path.parse(file).name, sources: [file] }));
+    fs.writeFileSync(config, JSON.stringify({ datasets: [...datasets, { name: 'archive', baked: archive }] }));
+    server = await serve('--config', config);
     ({ browser, page } = await openBrowser(640, 400));
   });
 
@@ -66,15 +91,20 @@ describe('the viewer', () => {
     assert.ok(blue < 0.001, `${blue} of the picture is blue`);
   });
 
-  for (const name of ['small', 'level']) {
+  for (const [name, ground] of [['small', 3001], ['level', 2500], ['deep', -9000]]) {
     it(`shows the raster ${name} from above its ground`, async () => {
       await open(`#dataset=${name}`);
       const [longitude, latitude, height] = await page.evaluate(() => terrace.globe.camera);
-      const ground = name === 'small' ? 3001 : 2500;
       assert.ok(height > ground && height < ground + 5000, `${height} m`);
       assert.ok(Math.hypot(longitude - 10, latitude - 45) < 0.1);
     });
   }
+
+  it('shows a region around a pole from near', async () => {
+    await open('#dataset=cap');
+    const [, latitude, height] = await page.evaluate(() => terrace.globe.camera);
+    assert.ok(latitude > 85 && height > 1e5 && height < 5e5, `${latitude}, ${height} m`);
+  });
 
   it('takes garbage in the address for what is nearest to it, or for nothing', async () => {
     await open('#%%%&&==&dataset&fraction=1e300&right=-1&exaggeration=1e9&split=-7&colours=plaid&sun=2026-99-99T99:99&camera=1e9,-1e9,1e99,1e9,1e9');
@@ -88,6 +118,29 @@ describe('the viewer', () => {
     }
     const { camera, fraction, right } = await decoded('#dataset=x&camera=-179.5,-80,-4000,359.9,12.5&fraction=1e-300&right=1e300');
     assert.deepEqual({ camera, fraction, right }, { camera: [-179.5, -80, -4000, 359.9, 12.5], fraction: 1 / 32, right: 4 });
+    assert.deepEqual(page.wrongs, []);
+  });
+
+  it('reads the heights of an archive without its sources', async () => {
+    await open('#dataset=archive&fraction=4&tiles3d');
+    for (const id of ['#tiles3d', '#compare', '#splitter', '#fraction']) assert.ok(await page.locator(id).isHidden(), `${id}: one error, no 3D Tiles`);
+    assert.equal(await page.locator('#message').isVisible(), false);
+    await page.locator('#globe').press('Enter');
+    await page.getByText(/ data [\d,]+ m$/).waitFor();
+    const corners = [[-84.3, 36.3], [-84.2, 36.3], [-84.2, 36.35]].map(([longitude, latitude]) => ({ longitude, latitude, height: 400 }));
+    for (const [tool, count, text] of [['distance', 2, /8,982 m straight, .* up, /], ['sight', 2, /^(Visible|Hidden)/], ['draft', 3, /Raises the ground/]]) {
+      await page.locator(`#tool-${tool}`).click();
+      await page.waitForFunction((mode) => (mode === 'draft' ? terrace.state.draft?.isOpen : terrace.state.measure?.mode === mode), tool, kWait);
+      await page.evaluate(([places, name]) => places.forEach((place) => terrace.state[name].add(place)),
+        [corners.slice(0, count), tool === 'draft' ? 'draft' : 'measure']);
+      await page.locator(tool === 'draft' ? '#draft-text' : '#dock-text').getByText(text).waitFor();
+    }
+    await page.evaluate(() => {
+      terrace.state.draft.corners = [];
+      for (const [longitude, latitude] of [[-84.39, 36.17], [-84.09, 36.17], [-84.25, 36.44]]) terrace.state.draft.add({ longitude, latitude, height: 400 });
+    });
+    await page.locator('#draft-text').getByText(/^405.* km².*Raises the ground/).waitFor();  // 90 of the finest tiles
+    await page.evaluate(() => terrace.state.draft.end());
     assert.deepEqual(page.wrongs, []);
   });
 

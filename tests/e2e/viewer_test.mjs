@@ -220,6 +220,7 @@ describe('the viewer', () => {
     const lost = await openPage(browser, `${url}/#dataset=nowhere`);
     await lost.locator('#message').waitFor({ timeout: kSettleMs });
     assert.match(await lost.locator('#message').innerText(), /no dataset nowhere on this server; this is /);
+    assert.match(lost.url(), /#dataset=(?!nowhere)\w+&fraction=[\d.]+&camera=/, 'the address has what is shown');
     await lost.close();
   });
 
@@ -234,6 +235,11 @@ describe('the viewer', () => {
     await broken.reload();
     await broken.locator('#message').waitFor();
     assert.match(await broken.locator('#message').innerText(), /could not be loaded/);
+    await broken.unroute('**/layer.json*');
+    const problem = { status: 503, contentType: 'application/problem+json', body: '{"status":503,"detail":"the source is being replaced"}' };
+    await broken.route('**/*.terrain*', (route) => route.fulfill(problem));
+    await broken.reload();
+    await broken.getByText(/^Tiles of \w+ cannot be read: the source is being replaced\. The page tries again\.$/).waitFor({ timeout: kSettleMs });
     await broken.close();
   });
 });
