@@ -1,6 +1,11 @@
 #include "fly/http/url.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cstdint>
+
+#include "engine/core/parse_number.h"
 
 namespace terrace::fly {
 
@@ -27,24 +32,29 @@ Result<Url> ParseUrl(std::string_view text) {
   }
   rest = rest.substr(0, rest.find('#'));
   const std::size_t slash = rest.find_first_of("/?");
-  std::string_view authority = rest.substr(0, slash);
+  const std::string_view authority = rest.substr(0, slash);
   url.target = slash == std::string_view::npos ? "/" : std::string(rest.substr(slash));
   if (url.target.front() == '?') url.target.insert(0, "/");
   if (authority.find('@') != std::string_view::npos) return wrong("it contains a user; use --header for credentials");
-  std::size_t colon = authority.rfind(':');
+  std::string_view host = authority.substr(0, authority.find(':'));
+  std::string_view port = authority.substr(host.size());
   if (authority.starts_with("[")) {
     const std::size_t bracket = authority.find(']');
     if (bracket == std::string_view::npos) return wrong("the address is not closed by ]");
-    url.origin.host = authority.substr(1, bracket - 1);
-    colon = authority.find(':', bracket);
-  } else {
-    url.origin.host = authority.substr(0, colon);
+    host = authority.substr(1, bracket - 1);
+    port = authority.substr(bracket + 1);
+    if (!port.empty() && port.front() != ':') return wrong("something other than a port follows the ]");
+  } else if (port.find(':', 1) != std::string_view::npos) {
+    return wrong("the host contains a colon; an IPv6 address is in brackets, as in [::1]:8080");
   }
-  url.origin.port = colon == std::string_view::npos ? "" : std::string(authority.substr(colon + 1));
-  if (url.origin.port.empty()) url.origin.port = url.origin.is_tls ? "443" : "80";
-  const bool is_number =
-      std::all_of(url.origin.port.begin(), url.origin.port.end(), [](char c) { return c >= '0' && c <= '9'; });
-  if (!is_number || url.origin.port.size() > 5) return wrong("the port is no number");
+  url.origin.host = host;
+  url.origin.port = url.origin.is_tls ? "443" : "80";
+  if (port.size() > 1) {
+    const std::string_view digits = port.substr(1);
+    const auto number = ParseNumber<std::uint16_t>(digits);
+    if (!number || *number == 0) return wrong(fmt::format("the port {} is no number from 1 to 65535", digits));
+    url.origin.port = std::to_string(*number);
+  }
   if (url.origin.host.empty()) return wrong("it names no host");
   const bool is_clean =
       std::none_of(url.target.begin(), url.target.end(), [](unsigned char c) { return c <= ' ' || c == 0x7f; });

@@ -11,7 +11,7 @@ namespace terrace::fly {
 struct Origin {
   bool is_tls = false;
   std::string host;  // without brackets, for IPv6 too
-  std::string port;
+  std::string port;  // "1" to "65535"
 
   friend auto operator<=>(const Origin&, const Origin&) = default;
 };
@@ -23,7 +23,7 @@ struct Url {
   std::string Text() const;
 };
 
-// kInvalidArgument if the text is not an http or https URL.
+// kInvalidArgument if the text is not an http or https URL; the message begins with it.
 Result<Url> ParseUrl(std::string_view text);
 
 // RFC 3986, section 5, without "../" inside of `reference`.

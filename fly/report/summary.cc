@@ -25,6 +25,9 @@ std::string Milliseconds(double seconds) {
                        : fmt::format("{:.1f} s", seconds);
 }
 
+// Whether a client loaded tiles, or would have.
+bool IsLoading(const Second& second) { return second.tiles > 0 || second.wanted > 0 || second.in_flight > 0; }
+
 // Tiles per second over the seconds in which at most half of the frames were refined.
 double UnrefinedTilesPerSecond(const std::vector<Second>& seconds) {
   std::uint64_t tiles = 0, count = 0;
@@ -115,12 +118,12 @@ Summary Summarize(const FlightOptions& options, const FlightRecord& record) {
   summary.frame_p50_px = totals.frame_worst_px.Percentile(0.5);
   summary.frame_p99_px = totals.frame_worst_px.Percentile(0.99);
   summary.refined_share = Share(totals.refined_frames, totals.flying_frames);
-  std::uint64_t busy = 0;
+  std::uint64_t loading = 0;
   for (const Second& second : seconds) {
-    busy += second.tiles > 0 ? 1 : 0;
+    loading += IsLoading(second) ? 1 : 0;
     summary.best_tiles_per_second = std::max(summary.best_tiles_per_second, static_cast<double>(second.tiles));
   }
-  summary.tiles_per_second = Share(totals.tiles, busy);
+  summary.tiles_per_second = Share(totals.tiles, loading);
   for (std::size_t i = 0; i < kOutcomes; ++i) {
     const auto outcome = static_cast<Outcome>(i);
     if (outcome != Outcome::kOk && outcome != Outcome::kRefused) summary.errors += totals.outcomes[i];

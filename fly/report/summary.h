@@ -19,7 +19,7 @@ struct Summary {
   double first_view_s = -1, worst_first_view_s = -1;  // median and worst of the clients that had one
   double arrival_s = -1;                      // worst; -1: a client that opened the document had none after its flight
   double p50_s = 0, p99_s = 0, max_s = 0;     // of tiles
-  double tiles_per_second = 0;                // mean over the seconds in which tiles arrived
+  double tiles_per_second = 0;                // mean over the seconds in which tiles arrived, were wanted or in flight
   double best_tiles_per_second = 0;           // in the best second
   double refined_share = 0;                   // of the frames of the flight
   double frame_p50_px = 0, frame_p99_px = 0;  // percentiles of the frames' worst errors

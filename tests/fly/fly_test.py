@@ -95,6 +95,21 @@ class SoundServer(unittest.TestCase):
                 self.assertEqual(done.returncode, 2)
                 self.assertIn(part, done.stderr)
 
+    def test_refuses_what_is_no_number_of_its_range(self):
+        numbers = {"--speed": 1e8, "--pitch": -91, "--duration": 604801, "--sse": 0.4, "--fps": 241, "--fov": 171, "--timeout": 0,
+                   "--first-view-limit": 3601}
+        for flag, outside in numbers.items():
+            for value in ("nan", "inf", "fast", outside):
+                with self.subTest(flag=flag, value=value):
+                    done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *WAY[:4], f"{flag}={value}"], capture_output=True,
+                                          text=True, timeout=60, check=False)
+                    self.assertEqual((done.returncode, done.stdout), (2, ""))
+                    self.assertRegex(done.stderr, rf'^terrace: {flag}: must be a number [^"]*from \S+ to \d+, not "{value}"\n')
+        done = subprocess.run([BINARY, "fly", f"http://{UPSTREAM}/jacksboro", *WAY, "--clients", "1.5"], capture_output=True, text=True,
+                              timeout=60, check=False)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn('--clients: must be a whole number from 1 to 1000, not "1.5"', done.stderr)
+
     def test_says_before_the_flight_that_a_report_cannot_be_written(self):
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "path.csv"

@@ -78,6 +78,25 @@ TEST(Summary, CountsWhatHappened) {
   EXPECT_NE(text.find("refused (429, 503)"), std::string::npos) << text;
 }
 
+// A server that dies is not a fast one.
+TEST(Requirements, CountTheSecondsInWhichNoTileArrivedThoughSomeWereWanted) {
+  Statistics statistics(1);
+  for (int i = 0; i < 12; ++i) statistics.AddRequest(0.5, {});
+  for (const double now_s : {1.5, 2.5}) {
+    FrameRecord waiting;
+    waiting.wanted = 5;
+    statistics.AddFrame(now_s, waiting);
+  }
+  FrameRecord asking;
+  asking.in_flight = 3;
+  statistics.AddFrame(3.5, asking);
+  statistics.AddFrame(4.5, {});  // nothing to load
+  const Summary summary = Summarize(SomeOptions(), statistics.record());
+  EXPECT_EQ(summary.tiles_per_second, 3);
+  EXPECT_TRUE(Judge(*ParseRequirements("tiles=3"), summary).AllHold());
+  EXPECT_FALSE(Judge(*ParseRequirements("tiles=3.1"), summary).AllHold());
+}
+
 TEST(Requirements, HoldOrFail) {
   Statistics statistics(1);
   Fill(statistics);

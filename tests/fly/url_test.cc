@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
 namespace terrace::fly {
 namespace {
 
@@ -19,6 +21,32 @@ TEST(Url, IsReadAndWritten) {
        {"maui", "ftp://a/", "http://", "http://a:b/", "http://user:x@a/", "http://a/b c", "http://[::1/"}) {
     EXPECT_FALSE(ParseUrl(text)) << text;
   }
+}
+
+TEST(Url, HasAPortFrom1To65535) {
+  EXPECT_EQ(ParseUrl("http://a:1/")->origin.port, "1");
+  EXPECT_EQ(ParseUrl("http://a:65535/")->origin.port, "65535");
+  EXPECT_EQ(ParseUrl("https://a:0443/")->Text(), "https://a/");
+  EXPECT_EQ(ParseUrl("http://a:/")->origin.port, "80");  // RFC 3986 allows it
+  for (const char* port : {"0", "65536", "74236", "-1", "+1", "8080x", " 80", "18446744073709551617"}) {
+    for (const std::string host : {"a", "[::1]"}) {
+      const Result<Url> url = ParseUrl("http://" + host + ":" + port + "/maui");
+      ASSERT_FALSE(url) << port;
+      const std::string& message = url.error().message;
+      EXPECT_NE(message.find(std::string("the port ") + port + " is no number from 1 to 65535; give a URL"),
+                std::string::npos)
+          << message;
+    }
+  }
+}
+
+TEST(Url, HasAColonInTheHostOnlyInBrackets) {
+  for (const char* text : {"http://h:8700:1/x", "http://::1/x", "http://::1:8080/x"}) {
+    const Result<Url> url = ParseUrl(text);
+    ASSERT_FALSE(url) << text;
+    EXPECT_NE(url.error().message.find("in brackets"), std::string::npos) << url.error().message;
+  }
+  EXPECT_FALSE(ParseUrl("http://[::1]x:80/"));
 }
 
 TEST(Url, IsResolvedAgainstADocument) {

@@ -12,6 +12,7 @@
 #include "server/cli/bake/bake_run.h"
 #include "server/cli/bake/bake_status.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/number_check.h"
 #include "server/cli/common/option_flags.h"
 
 namespace terrace::cli {
@@ -131,13 +132,8 @@ void AddStatus(CLI::App& bake, int& exit_code) {
 }
 
 void AddHow(CLI::App& command, BakeArguments& arguments) {
-  const auto whole = [](const std::string& text) {
-    unsigned number = 0;
-    const bool valid = CLI::detail::lexical_cast(text, number) && number >= 1 && number <= 1024;
-    return valid ? std::string() : fmt::format("must be a number from 1 to 1024, not \"{}\"", text);
-  };
   command.add_option("--threads", arguments.threads, "By default one for each processor; the files are the same")
-      ->check(CLI::Validator(whole, ""))
+      ->check(NumberFrom<unsigned>(1, 1024, "a number from 1 to 1024"))
       ->type_name("N")
       ->group(kHow);
   command

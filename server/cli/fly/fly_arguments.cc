@@ -1,5 +1,7 @@
 #include "server/cli/fly/fly_arguments.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
@@ -8,7 +10,10 @@
 #include <fstream>
 #include <optional>
 #include <sstream>
+#include <type_traits>
 #include <utility>
+
+#include "server/cli/common/number_check.h"
 
 namespace terrace::cli {
 namespace {
@@ -135,7 +140,8 @@ template <typename T>
 void AddNumber(CLI::App& command, const char* name, T& value, const char* type, T low, T high, const char* text) {
   command.add_option(name, value, text)
       ->type_name(type)
-      ->check(CLI::Range(low, high).description(""))
+      ->check(NumberFrom(low, high,
+                         fmt::format("a {}number from {} to {}", std::is_integral_v<T> ? "whole " : "", low, high)))
       ->capture_default_str();
 }
 
@@ -156,7 +162,7 @@ void AddPathFlags(CLI::App& command, FlyArguments& a) {
             "Pitch of the camera if the path has none: 0 is the horizon, -90 straight down");
   command.add_option("--duration", a.duration, "Seconds of the flight; default: once along the path, at least 10")
       ->type_name("S")
-      ->check(CLI::Range(0.0, 7 * 86400.0).description(""));
+      ->check(NumberFrom<double>(0, 7 * 86400, "a number of seconds from 0 to 604800"));
 }
 
 void AddClientFlags(CLI::App& command, FlyArguments& a) {

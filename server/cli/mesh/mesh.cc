@@ -33,6 +33,7 @@
 #include "engine/tin/mesh_error.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/number_check.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_area.h"
 #include "server/cli/mesh/mesh_color.h"
@@ -203,17 +204,7 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
       PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
-// Checks of arguments. Their messages follow the name of the option. Their descriptions are not part of the help.
-CLI::Validator NumberFrom(double min, double max, const std::string& what) {
-  const auto check = [=](const std::string& text) {
-    double number = 0;
-    const bool valid = CLI::detail::lexical_cast(text, number) && number >= min && number <= max;
-    return valid ? std::string() : fmt::format("must be {}, not \"{}\"", what, text);
-  };
-  return CLI::Validator(check, "");
-}
-
-CLI::Validator Metres() { return NumberFrom(0, 1e6, "a number of metres from 0 to 1000000"); }
+CLI::Validator Metres() { return NumberFrom<double>(0, 1e6, "a number of metres from 0 to 1000000"); }
 
 CLI::Validator OneOf(const std::vector<std::string>& words) {
   const auto check = [=](const std::string& text) {
@@ -294,7 +285,7 @@ void AddCriterionOptions(CLI::App& command, MeshArguments& arguments) {
           "--qthresh", arguments.qthresh,
           "With data-dependent: when the shape of triangles decides instead of their fit: 0 never, 1 whenever the "
           "shapes differ; by default 0.5")
-      ->check(NumberFrom(0, 1, "a number from 0 to 1"))
+      ->check(NumberFrom<double>(0, 1, "a number from 0 to 1"))
       ->type_name("SHARE");
 }
 
@@ -325,7 +316,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->group(kGoal);
   command->add_option("--points", arguments->points, "Number of vertices, the four corners included")
       ->type_name("N")
-      ->check(NumberFrom(4, 1e9, "a whole number from 4 (the corners of the raster) to 1000000000"))
+      ->check(NumberFrom<double>(4, 1e9, "a whole number from 4 (the corners of the raster) to 1000000000"))
       ->group(kGoal);
   command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
       ->type_name("METRES")
@@ -342,7 +333,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->type_name("NAME");
   AddCriterionOptions(*command, *arguments);
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh is the same with any number")
-      ->check(NumberFrom(1, 256, "a number from 1 to 256"))
+      ->check(NumberFrom<double>(1, 256, "a number from 1 to 256"))
       ->type_name("N")
       ->capture_default_str();
   command->add_flag("--compact", arguments->compact,

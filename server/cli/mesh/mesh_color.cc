@@ -20,6 +20,7 @@
 #include "engine/tin/extended/extended_field.h"
 #include "proto/gltf/mesh_file.h"
 #include "server/cli/common/command.h"
+#include "server/cli/common/number_check.h"
 #include "server/cli/common/progress.h"
 #include "server/cli/mesh/mesh_input.h"
 #include "server/cli/mesh/mesh_output.h"
@@ -175,11 +176,6 @@ int MeshColored(const ColoredMeshArguments& arguments) {
 
 void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
   constexpr const char* kGroup = "Colours";
-  const auto is_weight = [](const std::string& text) {
-    double number = 0;
-    const bool valid = CLI::detail::lexical_cast(text, number) && number >= 0 && number <= 1;
-    return valid ? std::string() : fmt::format("must be a number from 0 to 1, not \"{}\"", text);
-  };
   CLI::Option* const image =
       command
           .add_option(
@@ -193,7 +189,7 @@ void AddColorOptions(CLI::App& command, ColorArguments& arguments) {
                   "Weight of colours against heights, 0 to 1. The error of a sample is (1 - W) dz + W M/3 (dr + dg + "
                   "db): dz metres of height, dr, dg, db shares of the range of colours, M the range of the heights. So "
                   "--max-error E keeps heights within E / (1 - W); with W = 0 triangles follow heights alone")
-      ->check(CLI::Validator(is_weight, ""))
+      ->check(NumberFrom<double>(0, 1, "a number from 0 to 1"))
       ->type_name("W")
       ->capture_default_str()
       ->needs(image)
