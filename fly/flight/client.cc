@@ -6,6 +6,7 @@
 #include <boost/asio/post.hpp>
 #include <charconv>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "fly/content/glb.h"
@@ -43,9 +44,23 @@ bool IsTransient(const HttpReply& reply, Outcome outcome) {
   }
 }
 
+// What the server says in a problem document (RFC 9457); empty: nothing.
+std::string DetailOf(const std::string& body) {
+  constexpr std::size_t kMaxDetailBytes = 500;
+  const auto problem = nlohmann::json::parse(body, nullptr, /*allow_exceptions=*/false);
+  const auto detail = problem.is_object() ? problem.find("detail") : problem.end();
+  if (detail == problem.end() || !detail->is_string()) return {};
+  const auto& text = detail->get_ref<const std::string&>();
+  const bool is_line = std::none_of(text.begin(), text.end(), [](unsigned char c) { return c < ' ' || c == 0x7F; });
+  return is_line && text.size() <= kMaxDetailBytes ? text : std::string();
+}
+
 std::string Describe(const HttpReply& reply, Outcome outcome) {
   if (reply.failure != Failure::kNone) return fmt::format("{}: {}", NameOf(outcome), reply.detail);
-  return fmt::format("status {}", reply.status);
+  std::string text = fmt::format("status {}", reply.status);
+  if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
+  if (reply.status == 401) text += "; send a token with --header \"Authorization: Bearer TOKEN\"";
+  return text;
 }
 
 }  // namespace
@@ -76,10 +91,6 @@ Outcome Client::OutcomeOf(const HttpReply& reply) {
 
 void Client::Decode(Format format, DecodedReply& decoded) {
   decoded.outcome = OutcomeOf(decoded.reply);
-  if (decoded.outcome != Outcome::kOk) {
-    decoded.message = terrace::fly::Describe(decoded.reply, decoded.outcome);
-    return;
-  }
   const auto damaged = [&decoded](const Error& error) {
     decoded.outcome = Outcome::kDamaged;
     decoded.message = error.message;
@@ -88,8 +99,15 @@ void Client::Decode(Format format, DecodedReply& decoded) {
   // Some servers omit Content-Encoding: the first bytes identify gzip as well.
   if (decoded.reply.is_gzip || IsGzip(body)) {
     Result<std::string> plain = Gunzip(body);
-    if (!plain) return damaged(plain.error());
-    body = *std::move(plain);
+    if (plain) {
+      body = *std::move(plain);
+    } else if (decoded.outcome == Outcome::kOk) {
+      return damaged(plain.error());
+    }
+  }
+  if (decoded.outcome != Outcome::kOk) {
+    decoded.message = terrace::fly::Describe(decoded.reply, decoded.outcome);
+    return;
   }
   if (decoded.resource != Resource::kTile) {
     decoded.text = std::move(body);
@@ -180,11 +198,11 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
   if (decoded.outcome != Outcome::kOk) {
     document_due_s_ = now_s + PauseFor(decoded, ++document_attempts_);
     document_problem_ = decoded.message;
-    if (!tree_ && (!IsTransient(decoded.reply, decoded.outcome) ||
-                   (decoded.outcome != Outcome::kRefused && document_attempts_ >= options_.max_attempts))) {
-      GiveUp(fmt::format("{}: {}", options_.document.Text(), decoded.message));
-    }
-    return;
+    if (tree_) return;
+    const bool asks_again = IsTransient(decoded.reply, decoded.outcome) &&
+                            (decoded.outcome == Outcome::kRefused || document_attempts_ < options_.max_attempts);
+    if (asks_again) return statistics_.AddRetry();
+    return GiveUp(fmt::format("{}: {}", options_.document.Text(), decoded.message));
   }
   if (tree_) {
     const std::string before = tree_->version();

@@ -1,4 +1,6 @@
 """terrace fly against the real server, sound and with faults between: fly_test.py BINARY SOURCE_DIR."""
+import gzip
+import hashlib
 import json
 import os
 import pathlib
@@ -123,10 +125,23 @@ class SoundServer(unittest.TestCase):
                 self.assertIn(f"terrace: {part.format(file)}", done.stderr)
             self.assertTrue(path.read_text().startswith("-84.3"))
 
-    def test_says_that_there_is_no_dataset(self):
-        status, report = fly(UPSTREAM, path="nothing")
-        self.assertEqual(status, 1)
-        self.assertIn("status 404", " ".join(report["summary"]["findings"]))
+    def test_says_why_there_is_no_document(self):
+        for path, part in (("nothing", "/nothing/layer.json: status 404: no such dataset; /datasets lists them"),
+                           ("jacksboro?error=bad", "/jacksboro/layer.json?error=bad: status 400: error must be a finite number above 0")):
+            status, report = fly(UPSTREAM, path=path)
+            self.assertEqual((status, report["summary"]["retries"]), (1, 0))
+            self.assertIn(part, " ".join(report["summary"]["findings"]))
+
+    def test_says_how_to_send_a_token(self):
+        with tempfile.TemporaryDirectory() as folder:
+            token = "a token of at least 32 characters"
+            with Configured(folder, {"datasets": [{"name": "jacksboro", "sources": [str(DEM)]}],
+                                     "tokens": [{"name": "pilot", "sha256": hashlib.sha256(token.encode()).hexdigest(), "datasets": ["jacksboro"]}]}) as server:
+                url = f"http://127.0.0.1:{server.port}/jacksboro"
+                status, summary = fly_to(url)
+                self.assertEqual(status, 1)
+                self.assertRegex(" ".join(summary["findings"]), r'status 401: a token is needed: .*; send a token with --header "Authorization: Bearer')
+                self.assertEqual(fly_to(url, "--header", f"Authorization: Bearer {token}")[0], 0)
 
 
 class Faults(unittest.TestCase):
@@ -163,6 +178,20 @@ class Faults(unittest.TestCase):
             status, report = fly(proxy.address)
         self.assertEqual(status, 0)
         self.assertEqual(report["summary"]["outcomes"]["refused"], 2)
+        self.assertEqual(report["summary"]["retries"], 2)
+
+    def test_repeats_what_a_problem_document_says(self):
+        def answer(status, body):
+            return lambda path, *_: (status, {"Content-Type": "application/problem+json"}, body)
+
+        for status, body, part in ((403, b'{"detail":"not yours"}', "status 403: not yours"), (418, b'{"detail":7}', "status 418"),
+                                   (418, b"[1]", "status 418"), (418, b'{"detail":"\\u001b[2J"}', "status 418"), (418, b"<html>", "status 418"),
+                                   (403, gzip.compress(b'{"detail":"not yours"}'), "status 403: not yours"),
+                                   (403, b"\x1f\x8b no gzip", "status 403")):
+            with self.subTest(body=body), fault_proxy.FaultProxy(UPSTREAM, rewrite=answer(status, body)) as proxy:
+                code, report = fly(proxy.address)
+                self.assertEqual(code, 1)
+                self.assertEqual(report["summary"]["messages"], {"document: " + part: 1})
 
     def test_counts_faults_and_flies_on(self):
         def every(period, fault):
@@ -209,6 +238,7 @@ class Faults(unittest.TestCase):
         status, report = fly("127.0.0.1:1", "--first-view-limit", "2")
         self.assertEqual(status, 1)
         self.assertGreater(report["summary"]["outcomes"]["no_connection"], 0)
+        self.assertGreaterEqual(report["summary"]["retries"], report["summary"]["outcomes"]["no_connection"] - 1)
         self.assertEqual(report["summary"]["clients_without_document"], 1)
 
     def test_refuses_a_document_that_is_none(self):
