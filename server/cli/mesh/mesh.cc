@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -204,7 +205,9 @@ void Print(const MeshArguments& arguments, const tin::HeightField& field, const 
       PlainNumber(error.max, 4), PlainNumber(error.rms, 4), seconds.read, seconds.triangulate, seconds.write);
 }
 
-CLI::Validator Metres() { return NumberFrom<double>(0, 1e6, "a number of metres from 0 to 1000000"); }
+std::function<std::string(const std::string&)> Metres() {
+  return NumberFrom<double>(0, 1e6, "a number of metres from 0 to 1000000");
+}
 
 CLI::Validator OneOf(const std::vector<std::string>& words) {
   const auto check = [=](const std::string& text) {
