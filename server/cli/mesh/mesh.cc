@@ -9,12 +9,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
-#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
