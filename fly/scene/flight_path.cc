@@ -94,8 +94,8 @@ Result<void> AddPoint(const std::vector<double>& n, std::string_view where, Flig
     point.pose.heading = n[first + 3];
     point.pose.pitch = n[first + 4];
   }
-  if (std::abs(point.pose.position.latitude) > 90 || std::abs(point.pose.position.longitude) > 360) {
-    return MakeError(ErrorCode::kInvalidArgument, "{}: no longitude and latitude in degrees, in this order", where);
+  if (const Result<void> checked = CheckPosition(point.pose.position); !checked) {
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {}", where, checked.error().message);
   }
   if (first == 1 && !path.points.empty() && point.seconds <= path.points.back().seconds) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: the seconds do not ascend", where);
@@ -168,6 +168,17 @@ Pose FlightPath::PoseAt(double seconds) const {
   return pose;
 }
 
+Result<void> CheckPosition(const GeodeticPoint& point) {
+  if (!(std::abs(point.longitude) <= 360 && std::abs(point.latitude) <= 90)) {
+    return MakeError(ErrorCode::kInvalidArgument, "no longitude and latitude in degrees, in this order");
+  }
+  if (!(point.height_m >= kMinCameraHeight && point.height_m <= kMaxCameraHeight)) {
+    return MakeError(ErrorCode::kInvalidArgument, "the height must be a number from {:.0f} to {:.0f} m",
+                     kMinCameraHeight, kMaxCameraHeight);
+  }
+  return {};
+}
+
 bool AreOpposite(const GeodeticPoint& from, const GeodeticPoint& to) {
   constexpr double kNearest = 1e-4;  // radians, 640 m
   const geo::Vec3 u = geo::SurfaceNormal(from.longitude, from.latitude);
@@ -217,6 +228,9 @@ FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const Flight
 }
 
 Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed) {
+  if (constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF"; text.starts_with(kByteOrderMark)) {
+    text.remove_prefix(kByteOrderMark.size());
+  }
   const std::size_t first = text.find_first_not_of(" \t\r\n");
   if (first != std::string_view::npos && text[first] == '{') return ParseGeoJson(text, speed);
   FlightPath path;

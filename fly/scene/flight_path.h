@@ -30,6 +30,13 @@ struct FlightSpeed {
   double pitch = -20;              // degrees, for paths that state none
 };
 
+// Metres above the ellipsoid: from below the deepest ground of the Earth to beyond the geostationary orbit.
+inline constexpr double kMinCameraHeight = -12'000, kMaxCameraHeight = 100'000'000;
+
+// kInvalidArgument unless the longitude is -360 to 360, the latitude -90 to 90, and the height within these bounds. The
+// message names the coordinate, not the place.
+Result<void> CheckPosition(const GeodeticPoint& point);
+
 // Whether two places are within 640 m of being antipodes: then no path between them is the shortest.
 bool AreOpposite(const GeodeticPoint& from, const GeodeticPoint& to);
 
@@ -37,11 +44,15 @@ bool AreOpposite(const GeodeticPoint& from, const GeodeticPoint& to);
 // looks north. Precondition: the ends are not opposite.
 FlightPath MakeStraightPath(const GeodeticPoint& from, const GeodeticPoint& to, const FlightSpeed& speed);
 
-// Around `center` at its height, clockwise from the north; the heading is along the circle. 0 < radius_m < 5,000,000.
+inline constexpr double kMaxCircleRadius = 5'000'000;  // metres
+
+// Around `center` at its height, clockwise from the north; the heading is along the circle. 0 < radius_m <
+// kMaxCircleRadius.
 FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const FlightSpeed& speed);
 
 // Lines of "lon,lat,height", "lon,lat,height,heading,pitch" or "seconds,lon,lat,height,heading,pitch"; # begins a
-// comment; or a GeoJSON document whose first LineString has three coordinates a point. kInvalidArgument names the line.
+// comment; or a GeoJSON document whose first LineString has three coordinates a point. Skips a byte order mark.
+// kInvalidArgument names the line.
 Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed);
 
 }  // namespace terrace::fly

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "fly/tree/json_reason.h"
 #include "fly/tree/tile_tree.h"
 
 namespace terrace::fly {
@@ -56,6 +57,11 @@ struct Layer {
 Result<Layer> ParseLayer(std::string_view text) {
   try {
     const Json json = Json::parse(text);
+    if (!json.contains("tiles")) {
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "this is no layer.json: it has no \"tiles\"; give the URL of a layer.json, or fly over a "
+                       "tileset with --format 3dtiles");
+    }
     if (json.value("projection", "EPSG:4326") != "EPSG:4326") {
       return MakeError(ErrorCode::kInvalidArgument,
                        "layer.json: \"projection\" is {}; only EPSG:4326 can be flown over",
@@ -79,7 +85,7 @@ Result<Layer> ParseLayer(std::string_view text) {
     }
     return layer;
   } catch (const std::exception& error) {
-    return MakeError(ErrorCode::kInvalidArgument, "layer.json cannot be read: {}", error.what());
+    return MakeError(ErrorCode::kInvalidArgument, "layer.json cannot be read: {}", JsonReason(error));
   }
 }
 

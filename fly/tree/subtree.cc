@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "engine/core/bytes.h"
+#include "fly/tree/json_reason.h"
 
 namespace terrace::fly {
 namespace {
@@ -72,7 +73,7 @@ Result<Subtree3d> Subtree3d::Parse(std::string_view bytes, int levels) {
     subtree.subtrees_ = *subtrees;
     return subtree;
   } catch (const std::exception& error) {
-    return Damaged(error.what());
+    return Damaged(JsonReason(error));
   }
 }
 

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "fly/tree/json_reason.h"
 #include "fly/tree/subtree.h"
 #include "fly/tree/tile_tree.h"
 
@@ -200,7 +201,7 @@ class TilesetTree : public TileTree {
       version_ = VersionOf(Json::parse(text));
       return {};
     } catch (const std::exception& error) {
-      return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", error.what());
+      return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", JsonReason(error));
     }
   }
 
@@ -235,9 +236,17 @@ class TilesetTree : public TileTree {
 
 Result<std::unique_ptr<TileTree>> MakeTilesetTree(std::string_view tileset_json) {
   try {
-    return std::make_unique<TilesetTree>(Json::parse(tileset_json));
+    const Json json = Json::parse(tileset_json);
+    for (const char* member : {"asset", "root"}) {
+      if (json.contains(member)) continue;
+      return MakeError(ErrorCode::kInvalidArgument,
+                       "this is no tileset.json: it has no \"{}\"; give the URL of a tileset.json, or fly over a "
+                       "layer.json without --format 3dtiles",
+                       member);
+    }
+    return std::make_unique<TilesetTree>(json);
   } catch (const std::exception& error) {
-    return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", error.what());
+    return MakeError(ErrorCode::kInvalidArgument, "tileset.json cannot be read: {}", JsonReason(error));
   }
 }
 

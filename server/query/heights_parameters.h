@@ -46,6 +46,7 @@ class HeightsParameters final : public ParameterSink {
   Result<void> EndName() override;
   Result<void> AddToValue(std::string_view part) override;
   Result<void> EndValue() override;
+  std::string_view JsonExample() const override { return R"({"locations": "46.5,8.1|46.6,8.2"})"; }
 
   // The points of `locations` or the corners of `path`; never both. TakePoints may be called once.
   bool has_points() const { return points_of_ != nullptr; }

@@ -26,7 +26,8 @@ class ObjectHandler {
   bool on_document_begin(error_code&) { return true; }
   bool on_document_end(error_code&) { return true; }
   bool on_object_begin(error_code& error) {
-    if (std::exchange(is_in_object_, true)) return Refuse(kValues, error);
+    if (is_in_object_) return RefuseValue(error);
+    is_in_object_ = true;
     return true;
   }
   bool on_object_end(std::size_t, error_code&) { return true; }
@@ -50,19 +51,18 @@ class ObjectHandler {
   bool on_comment(boost::json::string_view, error_code&) { return true; }
 
  private:
-  static constexpr const char* kValues =
-      "values must be texts or numbers, such as {\"locations\": \"46.5,8.1|46.6,8.2\"}";
-
   bool Take(Result<void> result, error_code& error) {
     if (result) return true;
     result_ = std::move(result);
     error = boost::system::errc::make_error_code(boost::system::errc::operation_canceled);
     return false;
   }
-  bool Refuse(const char* why, error_code& error) {
-    return Take(MakeError(ErrorCode::kInvalidArgument, "{}", why), error);
+  bool RefuseValue(error_code& error) {
+    if (!is_in_object_) return Take(MakeError(ErrorCode::kInvalidArgument, "this is not a JSON object"), error);
+    return Take(
+        MakeError(ErrorCode::kInvalidArgument, "values must be texts or numbers, such as {}", sink_.JsonExample()),
+        error);
   }
-  bool RefuseValue(error_code& error) { return Refuse(is_in_object_ ? kValues : "this is not a JSON object", error); }
   bool Add(boost::json::string_view part, error_code& error) {
     if (!is_in_object_) return RefuseValue(error);
     return Take(sink_.AddToValue({part.data(), part.size()}), error);

@@ -29,6 +29,8 @@ class ParameterSink {
   virtual Result<void> EndName() = 0;
   virtual Result<void> AddToValue(std::string_view part) = 0;
   virtual Result<void> EndValue() = 0;
+  // A JSON object with the sink's parameters, for messages.
+  virtual std::string_view JsonExample() const = 0;
 };
 
 enum class PlusSign { kIsPlus, kIsBlank };

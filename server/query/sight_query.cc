@@ -66,9 +66,8 @@ Result<void> Check(const dem::SightRay& ray, const std::string& from, const std:
   if (const Result<void> checked = CheckPoint(ray.to, to); !checked) return checked;
   const double length_m = dem::LengthOf(ray);
   if (length_m > dem::kMaxSightLength) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{}: {:.0f} km long, the most is {:.0f} km; the Earth itself is between such points", whole,
-                     length_m / 1000, dem::kMaxSightLength / 1000);
+    return MakeError(ErrorCode::kInvalidArgument, "{}: {:.0f} km long, the most is {:.0f} km", whole, length_m / 1000,
+                     dem::kMaxSightLength / 1000);
   }
   return {};
 }
@@ -109,6 +108,7 @@ class SightParameters final : public ParameterSink {
     return Add(part);
   }
   Result<void> EndValue() override { return current_ == kRays ? EndRay() : Result<void>(); }
+  std::string_view JsonExample() const override { return R"({"rays": "46.5,8.1,2000,46.6,8.2,1500"})"; }
 
   const std::optional<std::string>& text(Name name) const { return texts_[name]; }
   std::vector<dem::SightRay> TakeRays() { return std::move(rays_); }

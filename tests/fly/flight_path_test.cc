@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 namespace terrace::fly {
 namespace {
@@ -64,6 +65,32 @@ TEST(FlightPath, ReadsLinesAndGeoJson) {
       R"({"type":"Feature","geometry":{"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]}})", kSpeed);
   ASSERT_TRUE(json) << json.error().message;
   EXPECT_DOUBLE_EQ(json->length_m(), line->length_m());
+}
+
+TEST(FlightPath, SkipsAByteOrderMark) {
+  for (const char* text :
+       {"7 46 3000\n8 46 3000", R"({"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]})"}) {
+    const Result<FlightPath> path = ParsePath(std::string("\xEF\xBB\xBF") + text, kSpeed);
+    ASSERT_TRUE(path) << path.error().message;
+    EXPECT_EQ(path->points.size(), 2U);
+  }
+}
+
+TEST(FlightPath, HasHeightsFromBelowTheOceansToAboveTheSatellites) {
+  for (const char* height : {"-12000", "0", "1e7", "1e8"})
+    EXPECT_TRUE(ParsePath(std::string("7,46,") + height, kSpeed));
+  for (const std::string height : {"-6400000", "-12001", "100000001", "1e300"}) {
+    for (const std::string& text : {"7,46,1\n7,46," + height, "0,7,46,1,0,0\n1,7,46," + height + ",0,0",
+                                    R"({"type":"LineString","coordinates":[[7,46,1],[7,46,)" + height + "]]}"}) {
+      const Result<FlightPath> path = ParsePath(text, kSpeed);
+      ASSERT_FALSE(path) << text;
+      EXPECT_NE(path.error().message.find(" 2: the height must be a number from -12000 to 100000000 m"),
+                std::string::npos)
+          << path.error().message;
+    }
+  }
+  EXPECT_FALSE(CheckPosition({7, 46, std::nan("")}));
+  EXPECT_FALSE(CheckPosition({std::nan(""), 46, 0}));
 }
 
 TEST(FlightPath, NamesTheLineThatIsWrong) {

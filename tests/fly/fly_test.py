@@ -89,6 +89,10 @@ class SoundServer(unittest.TestCase):
 
     def test_explains_wrong_arguments(self):
         for options, part in ((["--from", "1,2,3"], "exactly one path"), (["--circle", "1,2,3"], "--circle 1,2,3: give"),
+                              (["--circle", "1,2,-6400000,3000"], "--circle 1,2,-6400000,3000: the height must be a number from -12000 to 100000000 m; give"),
+                              (["--circle", "1,2,1e300,3000"], "the height must be"), (["--circle", "1,91,3,3000"], "no longitude and latitude"),
+                              (["--circle", "1,2,3,5e6"], "the radius must be above 0 and below 5000000 m"),
+                              (["--from", "1,2,3", "--to", "1,2,1e9"], "--to 1,2,1e9: the height must be"),
                               (["--path", "/nowhere"], "cannot be read"), ([*WAY, "--require", "p98=1s"], "p98=1s"),
                               ([*WAY, "--header", "x"], "Name: value")):
             with self.subTest(options=options):

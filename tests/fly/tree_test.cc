@@ -9,6 +9,12 @@
 namespace terrace::fly {
 namespace {
 
+constexpr const char* kTileset = R"({"asset":{"version":"1.1","tilesetVersion":"aaaa"},"geometricError":1e7,"root":{
+  "boundingVolume":{"sphere":[0,0,0,7e6]},"geometricError":1e7,"refine":"REPLACE","children":[
+  {"boundingVolume":{"region":[0,0,0.7853981633974483,0.7853981633974483,-10,900]},"geometricError":1000,
+   "content":{"uri":"t/{level}/{x}/{y}.glb?v=aaaa"},
+   "implicitTiling":{"subdivisionScheme":"QUADTREE","availableLevels":3,"subtreeLevels":2,"subtrees":{"uri":"t/{level}.{x}.{y}.subtree?v=aaaa"}}}]}})";
+
 TEST(LayerTree, MakesAllFourChildrenWhereTheServerHasOne) {
   const auto tree = MakeLayerTree(R"({"version":"ab12","tiles":["{z}/{x}/{y}.terrain?v={version}&error=5"],"available":[
     [{"startX":0,"startY":0,"endX":1,"endY":0}],[{"startX":2,"startY":1,"endX":2,"endY":1}]]})");
@@ -52,14 +58,15 @@ TEST(LayerTree, SaysWhatItCannotRead) {
   const auto message = [](std::string_view text) { return MakeLayerTree(text).error().message; };
   EXPECT_NE(message("<html>").find("layer.json cannot be read"), std::string::npos);
   EXPECT_NE(message(R"({"tiles":["x"]})").find("no \"available\""), std::string::npos);
-  EXPECT_NE(message(R"({"projection":"EPSG:3857","available":[]})").find("EPSG:3857"), std::string::npos);
+  EXPECT_NE(message(R"({"projection":"EPSG:3857","tiles":["x"],"available":[]})").find("EPSG:3857"), std::string::npos);
+  for (const std::string_view other : {std::string_view(kTileset), std::string_view("[1]"), std::string_view("{}")}) {
+    EXPECT_EQ(message(other),
+              "this is no layer.json: it has no \"tiles\"; give the URL of a layer.json, or fly over a tileset with "
+              "--format 3dtiles");
+  }
+  EXPECT_EQ(message(R"({"tiles":["x"],"available":[[{"startX":0}]]})"),
+            "layer.json cannot be read: key 'startY' not found");
 }
-
-constexpr const char* kTileset = R"({"asset":{"version":"1.1","tilesetVersion":"aaaa"},"geometricError":1e7,"root":{
-  "boundingVolume":{"sphere":[0,0,0,7e6]},"geometricError":1e7,"refine":"REPLACE","children":[
-  {"boundingVolume":{"region":[0,0,0.7853981633974483,0.7853981633974483,-10,900]},"geometricError":1000,
-   "content":{"uri":"t/{level}/{x}/{y}.glb?v=aaaa"},
-   "implicitTiling":{"subdivisionScheme":"QUADTREE","availableLevels":3,"subtreeLevels":2,"subtrees":{"uri":"t/{level}.{x}.{y}.subtree?v=aaaa"}}}]}})";
 
 std::string SubtreeBytes(int levels, std::vector<std::vector<geo::TileRange>> tiles) {
   proto::Subtree subtree;
@@ -109,7 +116,14 @@ TEST(TilesetTree, FollowsTheVersionOfItsDocument) {
 }
 
 TEST(TilesetTree, SaysWhatItCannotRead) {
-  EXPECT_FALSE(MakeTilesetTree("{}"));
+  for (const char* other : {"{}", "[1]", R"({"tiles":["x"],"available":[]})"}) {
+    EXPECT_EQ(MakeTilesetTree(other).error().message,
+              "this is no tileset.json: it has no \"asset\"; give the URL of a tileset.json, or fly over a layer.json "
+              "without --format 3dtiles");
+  }
+  EXPECT_NE(MakeTilesetTree(R"({"asset":{}})").error().message.find("it has no \"root\"; give"), std::string::npos);
+  EXPECT_EQ(MakeTilesetTree(R"({"asset":{},"root":{}})").error().message,
+            "tileset.json cannot be read: key 'boundingVolume' not found");
   std::string added = kTileset;
   added.replace(added.find("REPLACE"), 7, "ADD");
   EXPECT_NE(MakeTilesetTree(added).error().message.find("does not REPLACE"), std::string::npos);

@@ -34,13 +34,24 @@ std::optional<std::vector<double>> ParseNumbers(const std::string& text, std::si
   return numbers.size() == count ? std::optional(numbers) : std::nullopt;
 }
 
-Result<fly::GeodeticPoint> ParsePoint(const char* option, const std::string& text) {
-  const std::optional<std::vector<double>> n = ParseNumbers(text, 3);
-  if (!n || std::abs((*n)[0]) > 360 || std::abs((*n)[1]) > 90) {
-    return MakeError(ErrorCode::kInvalidArgument,
-                     "{} {}: give longitude and latitude in degrees and a height in metres, such as -156.6,20.9,3000",
-                     option, text);
+// Longitude, latitude, height and further numbers, `count` in all. `what`: names them in the message.
+Result<std::vector<double>> ParsePlace(const char* option, const std::string& text, std::size_t count,
+                                       const char* what) {
+  const auto wrong = [&](const std::string& why) {
+    return MakeError(ErrorCode::kInvalidArgument, "{} {}: {}", option, text, why);
+  };
+  const std::optional<std::vector<double>> n = ParseNumbers(text, count);
+  if (!n) return wrong(std::string("give ") + what);
+  if (const Result<void> checked = fly::CheckPosition({(*n)[0], (*n)[1], (*n)[2]}); !checked) {
+    return wrong(checked.error().message + "; give " + what);
   }
+  return *n;
+}
+
+Result<fly::GeodeticPoint> ParsePoint(const char* option, const std::string& text) {
+  const Result<std::vector<double>> n =
+      ParsePlace(option, text, 3, "longitude and latitude in degrees and a height in metres, such as -156.6,20.9,3000");
+  if (!n) return tl::unexpected(n.error());
   return fly::GeodeticPoint{(*n)[0], (*n)[1], (*n)[2]};
 }
 
@@ -62,13 +73,15 @@ Result<fly::FlightPath> PathOf(const FlyArguments& arguments) {
     return path;
   }
   if (!arguments.circle.empty()) {
-    const std::optional<std::vector<double>> n = ParseNumbers(arguments.circle, 4);
-    if (!n || std::abs((*n)[0]) > 360 || std::abs((*n)[1]) > 90 || (*n)[3] <= 0 || (*n)[3] >= 5e6) {
-      return MakeError(ErrorCode::kInvalidArgument,
-                       "--circle {}: give longitude, latitude, height and radius, such as -156.6,20.9,3000,20000",
-                       arguments.circle);
+    const Result<std::vector<double>> n = ParsePlace(
+        "--circle", arguments.circle, 4, "longitude, latitude, height and radius, such as -156.6,20.9,3000,20000");
+    if (!n) return tl::unexpected(n.error());
+    const double radius_m = (*n)[3];
+    if (radius_m <= 0 || radius_m >= fly::kMaxCircleRadius) {
+      return MakeError(ErrorCode::kInvalidArgument, "--circle {}: the radius must be above 0 and below {:.0f} m",
+                       arguments.circle, fly::kMaxCircleRadius);
     }
-    return fly::MakeCircle({(*n)[0], (*n)[1], (*n)[2]}, (*n)[3], speed);
+    return fly::MakeCircle({(*n)[0], (*n)[1], (*n)[2]}, radius_m, speed);
   }
   const Result<fly::GeodeticPoint> from = ParsePoint("--from", arguments.from), to = ParsePoint("--to", arguments.to);
   if (!from) return tl::unexpected(from.error());

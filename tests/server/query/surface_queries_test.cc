@@ -274,6 +274,36 @@ TEST(SightQuery, ReadsOneRayAndMany) {
   EXPECT_EQ(binary->rays[0].to.longitude, 7.5);
 }
 
+// A ray between two high places may be too long although nothing is in between.
+TEST(SightQuery, SaysOnlyThatALongRayIsTooLong) {
+  const auto query = ParseSight({"from=0,0,1000000&to=0,30,1000000", {}, {}}, 2);
+  ASSERT_FALSE(query);
+  EXPECT_EQ(query.error().message, "the ray: 3819 km long, the most is 3000 km");
+}
+
+// What the message about a wrong body proposes.
+template <typename T>
+std::string ExampleOf(const Result<T>& parsed) {
+  EXPECT_FALSE(parsed);
+  const std::string& message = parsed.error().message;
+  const std::size_t at = message.find("such as ");
+  return at == std::string::npos ? message : message.substr(at + 8);
+}
+
+TEST(JsonBodies, AreProposedInTheFormOfTheirEndpoint) {
+  constexpr const char* kJson = "application/json";
+  for (const char* body : {R"({"rays":[1]})", R"({"from":{"lat":1}})", R"({"v":null})"}) {
+    const std::string example = ExampleOf(ParseSight({{}, kJson, body}, 2));
+    const auto query = ParseSight({{}, kJson, example}, 2);
+    ASSERT_TRUE(query) << example;
+    EXPECT_EQ(query->rays.size(), 1U);
+  }
+  const std::string example = ExampleOf(ParseHeights({{}, kJson, R"({"locations":[[1,2]]})"}, 2));
+  const auto query = ParseHeights({{}, kJson, example}, 2);
+  ASSERT_TRUE(query) << example;
+  EXPECT_EQ(query->points.size(), 2U);
+}
+
 TEST(SightQuery, SaysWhatIsWrong) {
   const struct {
     const char* query;
