@@ -128,6 +128,15 @@ describe('edits in the viewer', () => {
     assert.equal(await page.locator('.overlay .line.edit').count(), 0);
   });
 
+  it('are part of the ground below a line of sight', async () => {
+    const { clearance, lowest } = await page.evaluate(async () => {
+      const { access } = await import('/viewer/early.js');
+      const corners = [-84.26, -84.24].map((longitude) => ({ longitude, latitude: 36.3 }));
+      return access.sight(terrace.state.dataset, corners, { eye: 2, target: 2, refraction: 0.13 });
+    });
+    assert.ok(clearance > 1 && clearance <= 2 && Math.abs(lowest.height - 402) < 2, `${clearance} m, ${lowest.height} m: the flat ground is at 400 m`);
+  });
+
   it('are drawn, downloaded, and taken by terrace', async () => {
     await page.locator('#tool-draft').click();
     await page.waitForFunction(() => terrace.state.draft?.isOpen, undefined, kWait);
