@@ -84,7 +84,11 @@ class RunningServer final : public Server {
         signals_(io_.first()) {}
 
   ~RunningServer() override {
-    if (!stopper_.joinable()) return;  // never started
+    if (!stopper_.joinable()) {  // never started
+      io_.Stop();
+      workers_.Shutdown();
+      return;
+    }
     RequestStop();
     stopper_.join();
   }

@@ -96,7 +96,10 @@ bool ConnectionSet::EvictOne(const std::string& newcomer) {
   return true;
 }
 
+// Connections are told before draining() is true, so that whoever has seen it gets no reply that keeps a connection
+// open; and then those that were added meanwhile.
 void ConnectionSet::Drain() {
+  for (const auto& connection : Snapshot()) connection->Drain();
   {
     const std::lock_guard lock(mutex_);
     draining_ = true;

@@ -94,6 +94,7 @@ function partsBeside(ring, meridian, side) {
   };
   // Pieces of the outline on this side, from crossing to crossing.
   const first = ring.findIndex((b, i) => beyond(ring.at(i - 1)) < 0 && beyond(b) > 0);
+  if (first < 0) return ring.every((corner) => beyond(corner) > 0) ? [ring] : [];
   const chains = [];
   for (let i = first; i < first + ring.length; ++i) {
     const [a, b] = [ring.at((i - 1) % ring.length), ring[i % ring.length]];

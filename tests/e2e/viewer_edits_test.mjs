@@ -78,6 +78,8 @@ describe('a shape across 180 degrees', () => {
   it('is one polygon if only a corner is at 180 degrees', () => {
     const [{ geometry }] = flattenGeoJson([at(-180, 0), at(-180, 0.4), at(179.8, 0.4)], 100, 0).features;
     assert.deepEqual(geometry, { type: 'Polygon', coordinates: [[[180, 0.4], [179.8, 0.4], [180, 0], [180, 0.4]]] });
+    const [{ geometry: east }] = flattenGeoJson([at(180, 0), at(-179, 0), at(-179, 1)], 100, 0).features;
+    assert.deepEqual(east, { type: 'Polygon', coordinates: [[[-180, 0], [-179, 0], [-179, 1], [-180, 0]]] });
   });
 });
 

@@ -319,7 +319,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->group(kGoal);
   command->add_option("--points", arguments->points, "Number of vertices, the four corners included")
       ->type_name("N")
-      ->check(NumberFrom<double>(4, 1e9, "a whole number from 4 (the corners of the raster) to 1000000000"))
+      ->check(NumberFrom<unsigned>(4, 1'000'000'000, "a whole number from 4 (the corners of the raster) to 1000000000"))
       ->group(kGoal);
   command->add_option("--rms", arguments->rms, "Root mean square error over all samples")
       ->type_name("METRES")
