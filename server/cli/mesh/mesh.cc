@@ -336,7 +336,7 @@ void AddMesh(CLI::App& app, int& exit_code) {
       ->type_name("NAME");
   AddCriterionOptions(*command, *arguments);
   command->add_option("--threads", arguments->threads, "Threads to use at most; the mesh is the same with any number")
-      ->check(NumberFrom<double>(1, 256, "a number from 1 to 256"))
+      ->check(NumberFrom(1, 256, "a whole number from 1 to 256"))
       ->type_name("N")
       ->capture_default_str();
   command->add_flag("--compact", arguments->compact,
