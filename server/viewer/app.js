@@ -174,9 +174,9 @@ function follow(wasLost) {
 function missTile(problem) {
   if (state.hasFailed) return;
   state.hasFailed = true;
-  const detail = traffic.problem;
   watch.check().then(() => {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
+    const detail = traffic.problem;  // read late: CesiumJS reports a failure before `traffic` has seen the reply
     complain(detail ? `Tiles of ${state.dataset.name} cannot be read: ${detail}. The page tries again.` : problem);
     setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
   });

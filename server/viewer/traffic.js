@@ -16,7 +16,7 @@ function detailOf({ status, response }) {
 }
 
 export class Traffic {
-  // `problem`: what the server said was wrong with the last terrain tile, if anything.
+  // `problem`: what the server said is wrong with the first terrain tile that failed since the last reset, if anything.
   constructor() {
     this.reset();
     const observer = new PerformanceObserver((list) => list.getEntries().forEach((entry) => this.#add(entry)));
@@ -72,7 +72,7 @@ export class Traffic {
       const request = load(url, ...rest);
       request?.addEventListener?.("load", () => {
         note(url, request.getResponseHeader("Terrain-Max-Error"));
-        if (/\.terrain(\?|$)/.test(url)) this.problem = detailOf(request);
+        if (/\.terrain(\?|$)/.test(url)) this.problem ??= detailOf(request);
       });
       return request;
     };
