@@ -42,7 +42,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
       : application_(application), peer_(Canonical(peer)) {}
 
   Admission Admit(Request& request, std::chrono::milliseconds longest_wait) override {
-    AdmissionControl& admission_control = application_.parts_.access.admission_control;
+    AdmissionControl& admission_control = application_.parts_.limits.admission_control;
     context_.request = &request;
     client_ = admission_control.Identify(request, peer_, context_);
     Result<Route> route = Routes().Match(request.target);
@@ -97,7 +97,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
   std::optional<Response> Refuse() const {
     std::optional<Response> refusal = RefuseMethod(context_.route.row->takes_post());
     if (refusal) return refusal;
-    refusal = application_.parts_.access.admission_control.Refuse(context_);
+    refusal = application_.parts_.limits.admission_control.Refuse(context_);
     if (refusal) refusal->labels.route = context_.route.row->label;
     return refusal;
   }
@@ -184,7 +184,7 @@ std::unique_ptr<ConnectionHandler> TerrainApplication::Connect(const asio::ip::a
 
 std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
   const asio::ip::address address = Canonical(peer);
-  return parts_.access.admission_control.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
+  return parts_.limits.admission_control.proxies().trusted.Contains(address) ? "" : ClientBlock(address);
 }
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {
@@ -255,7 +255,7 @@ asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
   co_return true;
 }
 
-// Returns false if none comes in time.
+// Returns false if none comes in time, if the dataset has a lasting problem, or if the server stops.
 asio::awaitable<bool> TerrainApplication::NextCatalog(HandlerStatePtr now, std::string dataset,
                                                       Clock::time_point give_up) const {
   while (Current() == now) {

@@ -13,7 +13,7 @@
 #include <string>
 
 #include "server/access/admission_control.h"
-#include "server/access/client_access.h"
+#include "server/access/client_limits.h"
 #include "server/api/request_context.h"
 #include "server/handlers/handlers.h"
 #include "server/http/application.h"
@@ -27,7 +27,7 @@ namespace terrace::server {
 
 // What the application uses to answer and report requests; outlives it.
 struct ApplicationParts {
-  ClientAccess& access;
+  ClientLimits& limits;
   WorkerPool& workers;
   TileService& tiles;
   DocumentFlights& document_flights;
@@ -69,7 +69,7 @@ class TerrainApplication final : public Application, public ProcessState {
   class Handler;
   using HandlerStatePtr = std::shared_ptr<const HandlerState>;
 
-  bool draining() const override { return parts_.access.connections.draining(); }
+  bool draining() const override { return parts_.limits.connections.draining(); }
   asio::awaitable<std::shared_ptr<const std::string>> MetricsText() const override { return parts_.metrics_page.Get(); }
 
   HandlerStatePtr Make(CatalogPtr catalog, config::Config config) const;

@@ -17,7 +17,7 @@
 #include <thread>
 #include <utility>
 
-#include "server/access/client_access.h"
+#include "server/access/client_limits.h"
 #include "server/admin.h"
 #include "server/api/tile_formats.h"
 #include "server/application.h"
@@ -65,16 +65,16 @@ Result<void> CheckNames(const std::vector<DatasetView>& datasets) {
 // before everything a session refers to.
 class RunningServer final : public Server {
  public:
-  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<ClientAccess> access,
+  RunningServer(CatalogPtr catalog, StaticFiles viewer, AccessLog access_log, std::unique_ptr<ClientLimits> limits,
                 ServerOptions options)
       : options_(std::move(options)),
         access_log_(std::move(access_log)),
-        access_(std::move(access)),
+        limits_(std::move(limits)),
         workers_(options_.config.worker_threads, options_.config.queue_length),
         tiles_(workers_, {options_.config.cache_bytes, options_.tile_stores, MakeTileHeaders},
                std::bind_front(&Metrics::CountBuild, &metrics_)),
         metrics_page_([this] { return metrics_.Text(CurrentState()); }, options_.metrics_age),
-        application_({*access_, workers_, tiles_, document_flights_, metrics_, metrics_page_, access_log_,
+        application_({*limits_, workers_, tiles_, document_flights_, metrics_, metrics_page_, access_log_,
                       std::make_shared<const StaticFiles>(std::move(viewer)), options_.on_source_changed,
                       options_.cache_problem, options_.progress_of},
                      std::move(catalog), options_.config),
@@ -105,7 +105,7 @@ class RunningServer final : public Server {
     // On an inherited socket, connections wait in its queue until there is something to serve: a stop before that loses
     // none.
     if (!application_.opening() || options_.listen_socket < 0) listener_->Start();
-    if (access_->tls) asio::co_spawn(io_.first(), WatchCertificate(access_->tls.get()), asio::detached);
+    if (limits_->tls) asio::co_spawn(io_.first(), WatchCertificate(limits_->tls.get()), asio::detached);
     io_.Start();
     stopper_ = std::thread([this] { StopWhenAsked(); });
     return {};
@@ -128,7 +128,7 @@ class RunningServer final : public Server {
   void ReopenAccessLog() override { access_log_.Reopen(); }
 
   std::uint16_t port() const override { return listener_->port(); }
-  std::string url() const override { return UrlOf(*listener_, access_->tls != nullptr); }
+  std::string url() const override { return UrlOf(*listener_, limits_->tls != nullptr); }
 
   void RequestStop() override {
     const std::lock_guard lock(mutex_);
@@ -171,23 +171,23 @@ class RunningServer final : public Server {
   }
 
   bool Stop() {
-    access_->connections.Drain();
+    limits_->connections.Drain();
     // Waits in full, also while no connection is open: balancers send requests until they have seen /readyz.
     std::this_thread::sleep_for(DrainDelay());
     const auto until = std::chrono::steady_clock::now() + options_.config.drain_timeout;
-    access_->connections.WaitUntilEmpty(DrainGrace());
+    limits_->connections.WaitUntilEmpty(DrainGrace());
     listener_->Close();
-    const bool drained = access_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
+    const bool drained = limits_->connections.WaitUntilEmpty(std::chrono::duration_cast<std::chrono::milliseconds>(
         std::max(until - std::chrono::steady_clock::now(), std::chrono::steady_clock::duration(0))));
     workers_.Cancel();
     // The time beyond the drain timeout is too short to wait for the disk.
     if (!drained) {
       for (tiler::StoreBase* store : Stores()) store->Abandon();
     }
-    if (!drained && !access_->connections.WaitUntilEmpty(kLastWords)) {
-      spdlog::warn("{} connections are cut off: the drain timeout has passed", access_->connections.size());
-      access_->connections.AbortAll();
-      access_->connections.WaitUntilEmpty(kLastWords);
+    if (!drained && !limits_->connections.WaitUntilEmpty(kLastWords)) {
+      spdlog::warn("{} connections are cut off: the drain timeout has passed", limits_->connections.size());
+      limits_->connections.AbortAll();
+      limits_->connections.WaitUntilEmpty(kLastWords);
     }
     CloseAdminListener();
     io_.Stop();
@@ -265,9 +265,9 @@ class RunningServer final : public Server {
     if (options_.refinements) state.refinements = options_.refinements->stats();
     state.stores = Stores();
     state.tile_stores = options_.tile_stores.size();
-    state.connections = access_->connections.size();
-    state.refused_connections = access_->connections.refused();
-    state.transfers = access_->transfers.stats();
+    state.connections = limits_->connections.size();
+    state.refused_connections = limits_->connections.refused();
+    state.transfers = limits_->transfers.stats();
     state.catalog = application_.catalog();
     const auto pending = application_.PendingOf(*state.catalog);
     state.problems = application_.problems().size();
@@ -284,11 +284,11 @@ class RunningServer final : public Server {
     context->options.min_rate = config.min_read_rate;
     context->options.drain_grace = config.drain_delay + DrainGrace();
     context->application = &application_;
-    context->connections = &access_->connections;
-    context->transfers = &access_->transfers;
+    context->connections = &limits_->connections;
+    context->transfers = &limits_->transfers;
     context->deadline = &application_.deadline();
-    context->cors = access_->cors;
-    context->tls = access_->tls.get();
+    context->cors = limits_->cors;
+    context->tls = limits_->tls.get();
     return context;
   }
 
@@ -306,7 +306,7 @@ class RunningServer final : public Server {
   const ServerOptions options_;
   AccessLog access_log_;
   Metrics metrics_;
-  const std::unique_ptr<ClientAccess> access_;  // jobs of workers hold bodies that count in it
+  const std::unique_ptr<ClientLimits> limits_;  // jobs of workers hold bodies that count in it
   WorkerPool workers_;
   TileService tiles_;
   DocumentFlights document_flights_{workers_};
@@ -335,7 +335,7 @@ std::vector<Error> Server::CheckStartFiles(const config::Config& config) {
   };
   note(StaticFiles::Load(config.viewer.directory));
   note(AccessLog::Try(config.access_log, config.access_log_file));
-  note(ClientAccess::Open(config));
+  note(ClientLimits::Open(config));
   return errors;
 }
 
@@ -357,10 +357,10 @@ Result<std::unique_ptr<Server>> Server::Start(CatalogPtr catalog, ServerOptions 
   if (!viewer) return tl::unexpected(viewer.error());
   Result<AccessLog> access_log = AccessLog::Open(config.access_log, config.access_log_file);
   if (!access_log) return tl::unexpected(access_log.error());
-  Result<std::unique_ptr<ClientAccess>> access = ClientAccess::Open(config);
-  if (!access) return tl::unexpected(access.error());
+  Result<std::unique_ptr<ClientLimits>> limits = ClientLimits::Open(config);
+  if (!limits) return tl::unexpected(limits.error());
   auto server = std::make_unique<RunningServer>(std::move(catalog), std::move(*viewer), std::move(*access_log),
-                                                *std::move(access), std::move(options));
+                                                *std::move(limits), std::move(options));
   if (const Result<void> started = server->Run(); !started) return tl::unexpected(started.error());
   return server;
 }

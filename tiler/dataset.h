@@ -31,7 +31,7 @@ struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;                   // null: none
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
   int side = 512;                                              // pixels along a tile's edge, at most
-  int quality = 80;                                            // of EncodePicture
+  int quality = 80;                                            // of JPEG and lossy WebP: 1 .. 100
   std::string attribution;
 };
 

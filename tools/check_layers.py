@@ -21,7 +21,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 # itself combine the modules, and the command line is above all: net <- http, which do not depend on terrain; jobs; store,
 # jobs <- tiles; http <- query <- api; {http, tiles} <- {telemetry, api}; {telemetry, api} <- access; api <- documents
 # <- handlers; {access, handlers} <- server <- cli, and tiles <- reload <- cli. In the command line common <- {serve,
-# mesh, info, bake} <- cli, and bake <- cli/bake.
+# mesh, info, bake, fly} <- cli, bake <- cli/bake, and fly <- cli/fly.
 TIN = ["engine/tin/mesh", "engine/tin/scan", "engine/tin", "engine/tin/extended", "engine/tin/decimate"]
 GEOMETRY = ["engine/core", "engine/geo"] + TIN
 PROTO = ["proto", "proto/mesh", "proto/error", "proto/gltf", "proto/documents"]

@@ -22,7 +22,7 @@ struct SourceOptions {
   // The vertical datum: "crs" (as the file states it), "unknown", "ellipsoid", "egm96", "egm2008", a vertical reference
   // system ("EPSG:5703"), or the path of a geoid grid.
   std::string vertical = "crs";
-  bool find_voids = true;           // detects undeclared nodata values (undeclared_nodata.h)
+  bool find_voids = true;           // detects undeclared nodata values
   std::vector<double> nodata = {};  // further raw values that mean void
 
   friend bool operator==(const SourceOptions&, const SourceOptions&) = default;
@@ -129,8 +129,8 @@ struct RasterInfo {
   std::string vertical_datum;                // as stated by the CRS; empty: not stated
   std::string datum_in_use;                  // the vertical datum in use; empty: unknown
   std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
-  std::string height_unit;                   // as stated by the band; empty: metres assumed
-  bool knows_height_unit = true;             // false: metres assumed
+  std::string height_unit;                   // as stated by the band; empty: none, metres assumed
+  bool knows_height_unit = true;             // false: the stated unit is not known, metres assumed
   std::string picture_color;                 // colour interpretation of a picture's band, "red"; empty: none
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
@@ -160,7 +160,7 @@ struct DemInfo {
   HeightRange heights;  // contains all valid samples, metres above the ellipsoid
   double floor = 0;
   int max_level = 0;
-  int max_source_level = 0;  // the deepest one without edits, which may add levels (edits/deeper_tiles.h)
+  int max_source_level = 0;  // the deepest one without edits, which may add levels
   int max_mercator_depth = 1;
   std::size_t edits = 0;  // features
   // Files of folders that look like rasters and are not used, each with the reason.

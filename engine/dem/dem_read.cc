@@ -403,6 +403,7 @@ Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const 
                                                                 const std::stop_token& stop,
                                                                 std::span<std::uint8_t> filled) const {
   TERRACE_CHECK(filled.empty() || filled.size() == points.size());
+  std::ranges::fill(filled, std::uint8_t{0});
   std::vector<float> heights(points.size(), SampleRules::kVoid), hole_heights = heights;
   const auto take_from_holes = [&] {
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -414,7 +415,6 @@ Result<std::vector<float>> ElevationModel::Impl::PointsUnedited(std::span<const 
   if (grids.size() == 1) {
     std::vector<std::uint8_t> own(filled.empty() ? points.size() : 0);
     const std::span<std::uint8_t> marks = filled.empty() ? std::span(own) : filled;
-    std::ranges::fill(marks, std::uint8_t{0});
     const auto read = grids.front().FillPoints(points, datum, {heights, {}, &hole_heights}, marks, stop);
     if (!read) return tl::unexpected(read.error());
     take_from_holes();

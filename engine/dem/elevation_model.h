@@ -40,15 +40,15 @@ class ElevationModel {
   const DemInfo& info() const;
 
   // The deepest level served: the first whose default error is at most `finest_error`; without that option, at most a
-  // tenth of the finest source's spacing. Deeper, if an edit asks for more precision (edits/deeper_tiles.h).
+  // tenth of the finest source's spacing. Deeper, if an edit asks for more precision.
   int max_level() const;
   // The deepest level without edits. Levels below it have tiles only around edits.
   int max_source_level() const;
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
-  // fine enough for the level or that edits add, their ancestors, and the siblings of both. Level 0 has both roots
-  // (mosaic/availability.h).
+  // fine enough for the level, tiles that edits add, the ancestors of these, and the siblings of all of them. A level
+  // with too many ranges gets fewer and larger ones, which also have tiles outside all sources. Level 0 has both roots.
   const std::vector<geo::TileRange>& Available(int level) const;
   // Available() of all levels, from 0.
   const std::vector<std::vector<geo::TileRange>>& Availability() const;
@@ -86,9 +86,10 @@ class ElevationModel {
 
   // Heights at the sources' full resolution, bilinear between samples, in the order of `points`. NaN outside the
   // sources, in collars, and in holes that are not filled. Voids are filled as in tiles; a feather has no effect.
-  // `filled` has one element for each point, or none; an element becomes 1 where the point lies in the pixel of a void
-  // sample. Edits apply: NaN also in holes that they cut; above the ellipsoid, also the heights that they set outside
-  // the sources. A height does not depend on the other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is void in the
+  // source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the sources,
+  // heights that they set count if `datum` is kEllipsoid; in other datums they are NaN. A height does not depend on the
+  // other points. Precondition: finite longitudes, latitudes in -90 .. 90.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;
@@ -112,7 +113,9 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for the edges of other tiles that end at this tile's corners (corner_edges.h).
+  // The same for edges of other tiles: those that end at a corner of this tile and are not its own edges. By corner
+  // (south-west, south-east, north-east, north-west), with one element for each such edge, without the ends of the
+  // edge.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

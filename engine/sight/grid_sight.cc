@@ -57,16 +57,16 @@ struct GridSight::Scan {
   const PieceOnGrid& on_grid;
   SightSurface surface;
   SightSearch& search;
-  std::vector<RayPart>& open;
+  std::vector<RayPart>& without_height;  // the result of Search
   const std::stop_token& stop;
 
   double ShareOf(double s) const { return Lerp(piece.start, piece.end, s); }
-  void Open(double first, double last) {
+  void AddWithoutHeight(double first, double last) {
     const double start = ShareOf(first), end = ShareOf(last);
-    if (!open.empty() && open.back().end >= start) {
-      open.back().end = std::max(open.back().end, end);
+    if (!without_height.empty() && without_height.back().end >= start) {
+      without_height.back().end = std::max(without_height.back().end, end);
     } else {
-      open.push_back({start, end});
+      without_height.push_back({start, end});
     }
   }
   // Measures a short part with heights, whose clearance is no polynomial but has one lowest place at most.
@@ -114,12 +114,12 @@ SightAnswer SightSearch::Answer(bool has_gaps) const {
 Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> pieces, std::span<const RayPart> parts,
                                                SightSurface surface, SightSearch& search, const std::stop_token& stop) {
   const std::vector<PieceOnGrid> on_grid = OnGrid(pieces, grid_.georeference());
-  std::vector<RayPart> open;
+  std::vector<RayPart> without_height;
   // If no raster grid comes before this one, all of its heights count.
   const bool is_first = parts.size() == 1 && parts[0].start == 0 && parts[0].end == 1;
   if (is_first) {
     for (const PieceOnGrid& piece : on_grid) {
-      Scan scan{piece.track, piece, surface, search, open, stop};
+      Scan scan{piece.track, piece, surface, search, without_height, stop};
       if (const Result<void> done = Probe(scan); !done) return tl::unexpected(done.error());
     }
   }
@@ -127,7 +127,7 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
   for (const PieceOnGrid& piece_on_grid : on_grid) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "looking along a ray was stopped");
     const TrackPiece& piece = piece_on_grid.track;
-    Scan scan{piece, piece_on_grid, surface, search, open, stop};
+    Scan scan{piece, piece_on_grid, surface, search, without_height, stop};
     const double length = piece.end - piece.start;
     while (part != parts.end() && part->end <= piece.start && part + 1 != parts.end()) ++part;
     for (auto p = part; p != parts.end() && p->start <= piece.end; ++p) {
@@ -137,7 +137,7 @@ Result<std::vector<RayPart>> GridSight::Search(std::span<const TrackPiece> piece
       if (const Result<void> done = Halve(scan, first, last); !done) return tl::unexpected(done.error());
     }
   }
-  return open;
+  return without_height;
 }
 
 std::int64_t GridSight::WrappedColumn(std::int64_t column) const {
@@ -203,7 +203,7 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
                          y.min > grid_.rows() - 1 + kRim;
   // A position that the CRS does not have is not on the grid either.
   if (is_beside || !(x.min <= x.max) || !(y.min <= y.max)) {
-    scan.Open(first, last);
+    scan.AddWithoutHeight(first, last);
     return {};
   }
   const double height_m = scan.piece.height_m.Over(first, last).min;
@@ -232,7 +232,7 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
       (!grid_.wraps() && (x.min < -0.5 || x.max > grid_.columns() - 0.5)) || y.min < -0.5 || y.max > grid_.rows() - 0.5;
   if (!bound.has_voids && scan.search.IsSettled(height_m - bound.max - slack_m, scan.ShareOf(first))) return {};
   if (is_in_block && bound.max == -std::numeric_limits<float>::infinity()) {
-    scan.Open(first, last);
+    scan.AddWithoutHeight(first, last);
     return {};
   }
   const bool is_between = x.min >= 0 && y.min >= 0 && x.max <= grid_.columns() - 1 && y.max <= grid_.rows() - 1;
@@ -266,12 +266,12 @@ Result<void> GridSight::Halve(Scan& scan, double first, double last) {
 // columns from it to the part.
 Result<void> GridSight::Walk(Scan& scan, const SightBlock& block, const CellRange& cells, double turn, double first,
                              double last, double size) {
-  // With A = |curvature| (last - first)^2, a step is at most (size + A) / count long, and its polynomial at most
+  // With A = factor (last - first)^2, a step is at most (size + A) / count long, and its polynomial at most
   // A / (4 count^2) beside its chord.
-  const double curvature = std::max(std::abs(scan.on_grid.x.curvature()), std::abs(scan.on_grid.y.curvature()));
-  const int count = static_cast<int>((size + 4 * curvature * (last - first) * (last - first)) * 1.125) + 1;
+  const double factor = std::max(std::abs(scan.on_grid.x.square_factor()), std::abs(scan.on_grid.y.square_factor()));
+  const int count = static_cast<int>((size + 4 * factor * (last - first) * (last - first)) * 1.125) + 1;
   const double step = (last - first) / count;
-  const auto bulge = [step](const Quadratic& q) { return std::abs(q.curvature()) * step * step / 4; };
+  const auto bulge = [step](const Quadratic& q) { return std::abs(q.square_factor()) * step * step / 4; };
   const Quadratic on_x = scan.on_grid.x, on_y = scan.on_grid.y, height_m = scan.piece.height_m;
   const GridWindow& window = block.window();
   const double west = static_cast<double>(window.column) + turn + bulge(on_x) + kSlack;
@@ -386,7 +386,7 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
                           : 0.0);
   // The lowest place of a ray in a cell may lie below both ends of its part. None of the surface lies above the largest
   // corner.
-  const double length = last - first, sag_m = std::abs(scan.piece.height_m.curvature()) * length * length / 4;
+  const double length = last - first, sag_m = std::abs(scan.piece.height_m.square_factor()) * length * length / 4;
   const double slack_m = sag_m + (blocks_.includes_undulations() ? kSlack : SightBlocks::kMaxUndulation);
   const double lowest_m = std::min(scan.piece.height_m.At(first), scan.piece.height_m.At(last));
   const double highest_m = std::fmax(std::fmax(nw, ne), std::fmax(sw, se));  // without voids
@@ -412,7 +412,7 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   scan.search.Add(at_last, scan.ShareOf(last));
   // Not by values: rounding may make one of the polynomial lower than both ends where it has no lowest place between.
   const bool is_lowest_between = over.Slope(0) < 0 && over.Slope(1) > 0;
-  const double lowest = is_lowest_between ? std::clamp(-over.Slope(0) / (2 * over.curvature()), 0.0, 1.0) : 1;
+  const double lowest = is_lowest_between ? std::clamp(-over.Slope(0) / (2 * over.square_factor()), 0.0, 1.0) : 1;
   if (is_lowest_between) scan.search.Add(over.At(lowest), scan.ShareOf(Lerp(first, last, lowest)));
   const bool is_blocked = std::min({at_first, at_last, over.At(lowest)}) < -kSightTolerance;
   if (!is_blocked || scan.search.IsBlockedBefore(scan.ShareOf(first))) return {};
@@ -461,12 +461,12 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
       if (!is_settled) scan.MeasureSmooth(clearance, before, s);
     } else if (is_known) {
       if (!is_settled) scan.MeasureSmooth(clearance, before, with);
-      if (!is_place) scan.Open(without, s);
+      if (!is_place) scan.AddWithoutHeight(without, s);
     } else if (is_next_known) {
-      if (!is_place) scan.Open(before, without);
+      if (!is_place) scan.AddWithoutHeight(before, without);
       if (!is_settled) scan.MeasureSmooth(clearance, with, s);
     } else {
-      scan.Open(before, s);
+      scan.AddWithoutHeight(before, s);
     }
     is_known = is_next_known;
     before = s;

@@ -1,9 +1,10 @@
 // Measures the clearance of rays above the surface that is bilinear between the samples of a raster grid.
 //
 // Branch and bound. A part of a ray is skipped if its clearance above the largest height below it is not less than the
-// smallest clearance found so far. Other parts are halved until they are short. Then the cells along them are compared
-// one by one, first with their largest corners, then with their surface. Within a cell that may have the minimum, the
-// clearance between lines of the grid is a polynomial of the second degree, so its minimum is exact.
+// smallest clearance found so far. Other parts are halved. A part within one block and without voids is walked in runs
+// of eight and of four steps, then step by step: runs are compared with the largest corners of the cells around them,
+// steps also with the surface. Within a cell that may have the minimum, the clearance between lines of the grid is a
+// polynomial of the second degree, so its minimum is exact.
 #pragma once
 
 #include <map>
@@ -47,7 +48,7 @@ class SightSearch {
 // Which heights of a raster grid count.
 enum class SightSurface : std::uint8_t {
   kAll,       // measured, filled, and smooth ones in holes
-  kNotHoles,  // only cells with a measured height or a filled narrow void; other raster grids precede holes
+  kNotHoles,  // without the smooth heights in holes, because a height of another raster grid comes before these
 };
 
 // One raster grid and the rays over it. For one thread.

@@ -12,7 +12,7 @@ class Quadratic {
 
   double At(double s) const { return (a_ * s + b_) * s + c_; }
   double Slope(double s) const { return 2 * a_ * s + b_; }
-  double curvature() const { return a_; }
+  double square_factor() const { return a_; }  // of s^2: half the second derivative
 
   struct Range {
     double min, max;

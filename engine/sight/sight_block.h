@@ -32,7 +32,8 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // metres; NaN: void
-  // The samples before holes were filled, to be tested for NaN: undulations may be missing. Narrow voids are filled.
+  // The samples before holes were filled; narrow voids are filled. Use it only to test for NaN: the values may lack the
+  // undulations that heights() includes.
   const std::vector<float>& unfilled() const { return unfilled_.empty() ? heights_ : unfilled_; }
 
   // A bound over the cells between two cells of the block, inclusive; possibly over more cells.

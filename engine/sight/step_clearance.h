@@ -20,7 +20,7 @@ struct RayPlace {
   double height_m;
 };
 
-// At least the clearance of a straight step of less than a sample. In a cell it is a polynomial of the second degree,
+// A lower bound of the clearance along a straight step of less than a sample. In a cell the clearance is a polynomial,
 // a t^2 + b t + c for t = 0 .. 1, which lies nowhere more than |a| / 4 below both of its ends; a is the cell's twist
 // times the way on both axes. The surface has no steps between cells, so each place is read in one of the two.
 double LeastClearance(const SampleView& samples, const RayPlace& from, const RayPlace& to);

@@ -1,4 +1,4 @@
-// Memory budget for averages that are not in a cache folder (memory_averages.h).
+// Memory budget for averages that are not in a cache folder.
 #pragma once
 
 #include <atomic>

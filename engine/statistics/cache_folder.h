@@ -1,4 +1,4 @@
-// A folder of statistics files (statistics_cache.h) with a limited total size.
+// A folder of files with statistics and averages of rasters, with a limited total size.
 // Several processes may share it. Before a file grows, the least recently used files are removed until it fits. Loading
 // a file counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's
 // modification time. Files in use by this process are not removed. Files that terrace did not write are neither counted
@@ -78,7 +78,7 @@ class CacheFolder {
   const std::string path_;
   const std::uint64_t max_bytes_;
   mutable std::mutex mutex_;
-  std::multiset<std::string> in_use_;           // names; guarded by mutex_, as are these
+  std::multiset<std::string> in_use_;           // names; mutex_ guards this and all members below
   std::map<const Use*, std::string> problems_;  // reasons
   std::uint64_t bytes_ = 0, since_scan_ = 0;    // known size of all files; bytes reserved since the last scan
   std::optional<std::chrono::steady_clock::time_point> scanned_at_;

@@ -1,10 +1,10 @@
 // The recorded order of a greedy run. It yields every coarser mesh of the field without reading samples.
 //
-// Greedy insertion is progressive: the mesh for an error is the state before the first insertion made at or below that
-// error. All meshes of a field are therefore one list of insertions. An insertion is recorded with its sample, the
-// error before it, the ring of vertices that the sample was joined to, and, for each triangle it made, the later
-// insertion that removed this triangle. The mesh after n insertions consists of the triangles made by one of the first
-// n insertions and removed by none of them. Finding them takes no geometry.
+// Greedy insertion is progressive: the mesh for an error E is the state before the first insertion that was made when
+// the largest error was at most E. All meshes of a field are therefore one list of insertions. An insertion is recorded
+// with its sample, the error before it, the ring of vertices that the sample was joined to, and, for each triangle it
+// made, the later insertion that removed this triangle. The mesh after n insertions consists of the triangles made by
+// one of the first n insertions and removed by none of them. Finding them takes no geometry.
 //
 // Immutable; safe to read from many threads at once.
 #pragma once

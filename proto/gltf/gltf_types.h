@@ -8,12 +8,13 @@
 
 namespace terrace::proto {
 
-// How the mesh of a GLB tile is stored. Every form decodes to the positions of the GridMesh, bit for bit.
+// How the mesh of a GLB tile is stored. Positions are whole numbers of steps of a grid that depends on level and error;
+// every form decodes to them, bit for bit.
 enum class GlbCompression : std::uint8_t {
   kDraco,      // KHR_draco_mesh_compression
   kNone,       // 32-bit floats
-  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 steps or
-               // more
+  kQuantized,  // KHR_mesh_quantization: 16-bit positions and 8-bit normals; floats where a tile spans 2^16 of these
+               // steps or more
   kMeshopt,    // EXT_meshopt_compression of what kQuantized holds
 };
 
@@ -22,7 +23,7 @@ inline constexpr Names<GlbCompression, 4> kGlbCompressionNames = {{{"draco", Glb
                                                                    {"quantized", GlbCompression::kQuantized},
                                                                    {"meshopt", GlbCompression::kMeshopt}}};
 
-// The width of positions for a form (GridMesh).
+// The width of positions for a form.
 constexpr PositionWidth WidthOf(GlbCompression compression) {
   const bool narrow = compression == GlbCompression::kQuantized || compression == GlbCompression::kMeshopt;
   return narrow ? PositionWidth::k16Bits : PositionWidth::kFloat;

@@ -64,7 +64,7 @@ struct ClientIdentity {
 struct AdmissionOptions {
   Proxies proxies;
   AccessPolicy access;
-  RateLimiter::Rate rate;  // of each token, and of each client without one
+  RateLimiter::Rate rate;  // of each token without a rate of its own, and of each client without a token
 };
 
 class AdmissionControl {

@@ -1,5 +1,5 @@
 // The tile formats, one row for each suffix of their URLs: parameters, and headers of replies. A format for pictures
-// has several suffixes. Also what all formats share: codings and errors. tiler/encoders.h has the encoders.
+// has several suffixes. Also what all formats share: the coding of a reply. tiler/encoders.h has the encoders.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,5 @@
-// One HTTP request. Heads from the network come from ParseHead, or from TakeRepeated, which repeats one of ParseHead.
+// One HTTP request. Requests from the network are made by ParseHead, or by TakeRepeated, which takes over the header
+// fields of the request before.
 //
 // Parsing is stricter than RFC 9112 wherever two readers could disagree about the end of a message: only a POST may
 // announce a body, by a single Content-Length in plain decimals. Any other message that announces a body is refused

@@ -12,7 +12,7 @@
 namespace terrace::server {
 namespace {
 
-// How often a waiter checks for late holders, and whether it could not be woken because memory was exhausted.
+// How often a waiter looks for late holders. This also helps a waiter that could not be woken for want of memory.
 constexpr std::chrono::milliseconds kCheckPeriod{250};
 
 // Parts of the memory.
@@ -144,7 +144,7 @@ bool TransferBudget::MayTake(const HoldRequest& request, Clock::time_point now, 
   return Claim(request.client, pool, now) < Claim(next->request.client, pool, now);
 }
 
-// Any waiter.
+// Whether the memory suffices for the request, whoever else waits.
 bool TransferBudget::HasRoom(const HoldRequest& request) const {
   const std::size_t number = PoolOf(request);
   const Pool& pool = pools_[number];

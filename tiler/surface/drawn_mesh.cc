@@ -62,7 +62,7 @@ std::size_t DrawnMesh::bytes() const {
 }
 
 // Sorts triangles into buckets by their boxes in the tile. The edges of flat triangles are not straight in degrees, so
-// boxes grow by the distance of a chord from the straight line. Where that is not enough, AtBucket finds nothing. On
+// boxes grow by the distance of a chord from the straight line. Where that is not enough, InOwnBucket finds nothing. On
 // shallow levels and near the poles a box covers many buckets; then buckets are larger, so that their memory stays
 // proportional to that of the triangles.
 void DrawnMesh::FillBuckets(const std::vector<std::array<double, 2>>& places) {
@@ -175,7 +175,7 @@ DrawnPoint DrawnMesh::PointOf(const Meeting& met) const {
           is_beside};
 }
 
-std::optional<DrawnPoint> DrawnMesh::AtBucket(const dem::GeoPosition& point) const {
+std::optional<DrawnPoint> DrawnMesh::InOwnBucket(const dem::GeoPosition& point) const {
   const PlumbLine line = LineAt(point);
   Meeting best;
   for (const std::uint32_t triangle : BucketAt(point).triangles) Meet(line, triangle, best);

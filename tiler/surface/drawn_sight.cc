@@ -28,7 +28,7 @@ class Clearances {
  public:
   void Add(const dem::Quadratic& over, double from, double to, double start, double length) {
     const auto share = [&](double s) { return start + s * length; };
-    const double a = over.curvature();
+    const double a = over.square_factor();
     const double vertex = a > 0 ? std::clamp(-over.Slope(0) / (2 * a), from, to) : from;
     for (const double s : {from, vertex, to}) {
       const double clearance_m = over.At(s);

@@ -69,7 +69,7 @@ Result<DrawnTiles::Reading> DrawnTiles::ReadAt(const dem::GeoPosition& point, st
   const auto read = [&](std::uint32_t tile) -> Result<Reading> {
     const Result<const DrawnMesh*> mesh = MeshOf(tile);
     if (!mesh) return tl::unexpected(mesh.error());
-    if (const std::optional<DrawnPoint> met = (*mesh)->AtBucket(point)) return Reading{*met, tile};
+    if (const std::optional<DrawnPoint> met = (*mesh)->InOwnBucket(point)) return Reading{*met, tile};
     // On shallow levels all triangles are examined.
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the heights any more");
     return Reading{(*mesh)->Nearest(point), tile};

@@ -49,8 +49,8 @@ class TileNumbers {
   // Number of the deepest tile that contains a point. kInvalidArgument, with a message for the client: the tile would
   // be one more than kMaxTilesRead.
   Result<std::uint32_t> NumberAt(const dem::GeoPosition& point);
-  // Number of a tile beside one of these; nothing if it does not exist, or if this function has added kMaxTilesRead
-  // already. Tiles that are added here do not count for NumberAt.
+  // Number of a tile beside a numbered one. It gets a number if it has none. Nothing if the tile does not exist, or if
+  // this function has already added kMaxTilesRead. Tiles that are added here do not count for NumberAt.
   std::optional<std::uint32_t> NumberBeside(const geo::TileKey& key);
 
   const std::vector<geo::TileKey>& keys() const { return keys_; }  // by number

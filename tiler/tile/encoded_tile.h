@@ -16,8 +16,13 @@ struct StageTimes {
   std::chrono::microseconds read{0}, refine{0}, encode{0}, compress{0};
 };
 
-// How a build used the refinement cache. kNone: the format has no mesh.
-enum class RefinementUse : std::uint8_t { kMade, kContinued, kReplayed, kNone };
+// How a build used the cache of refinements.
+enum class RefinementUse : std::uint8_t {
+  kMade,       // there was none: samples were inserted from the beginning
+  kContinued,  // there was one for a larger error: its run was continued
+  kReplayed,   // there was one for this error or a smaller one: no insertion
+  kNone,       // not used: formats without a mesh, meshes of areas
+};
 
 // Header lines of a response that depend on the tile and its TileRequest alone, not on the rest of the HTTP request or
 // on the configuration. Each ends with CR LF.

@@ -1,4 +1,4 @@
-#include "server/access/client_access.h"
+#include "server/access/client_limits.h"
 
 #include <spdlog/spdlog.h>
 
@@ -9,13 +9,13 @@
 
 namespace terrace::server {
 
-ClientAccess::ClientAccess(const config::Config& config, AdmissionOptions admission)
+ClientLimits::ClientLimits(const config::Config& config, AdmissionOptions admission)
     : connections(config.max_connections, config.max_connections_per_client),
       transfers(config.transfer_bytes),
       admission_control(std::move(admission)),
       cors(config.cors_origins) {}
 
-Result<std::unique_ptr<ClientAccess>> ClientAccess::Open(const config::Config& config) {
+Result<std::unique_ptr<ClientLimits>> ClientLimits::Open(const config::Config& config) {
   AdmissionOptions admission;
   Result<AddressRanges> trusted = AddressRanges::Parse(config.trusted_proxies);
   if (!trusted) return tl::unexpected(std::move(trusted.error()));
@@ -36,7 +36,7 @@ Result<std::unique_ptr<ClientAccess>> ClientAccess::Open(const config::Config& c
     if (!opened) return tl::unexpected(std::move(opened.error()));
     tls = *std::move(opened);
   }
-  auto opened = std::make_unique<ClientAccess>(config, std::move(admission));
+  auto opened = std::make_unique<ClientLimits>(config, std::move(admission));
   opened->tls = std::move(tls);
   return opened;
 }

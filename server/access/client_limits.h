@@ -15,11 +15,11 @@
 
 namespace terrace::server {
 
-struct ClientAccess {
+struct ClientLimits {
   // Errors quote the option's value, or name the file.
-  static Result<std::unique_ptr<ClientAccess>> Open(const config::Config& config);
+  static Result<std::unique_ptr<ClientLimits>> Open(const config::Config& config);
 
-  ClientAccess(const config::Config& config, AdmissionOptions admission);
+  ClientLimits(const config::Config& config, AdmissionOptions admission);
 
   ConnectionSet connections;
   TransferBudget transfers;
