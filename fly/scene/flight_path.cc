@@ -97,6 +97,11 @@ Result<void> AddPoint(const std::vector<double>& n, std::string_view where, Flig
   if (const Result<void> checked = CheckPosition(point.pose.position); !checked) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: {}", where, checked.error().message);
   }
+  if (std::abs(point.pose.heading) > 360 || std::abs(point.pose.pitch) > 90) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "{}: heading {} and pitch {} are not within -360 .. 360 and -90 .. 90 degrees", where,
+                     point.pose.heading, point.pose.pitch);
+  }
   if (first == 1 && !path.points.empty() && point.seconds <= path.points.back().seconds) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: the seconds do not ascend", where);
   }

@@ -281,7 +281,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
   if (!read && !displaced_ && read.error().status > 0) co_await RefuseMessage(read.error());
   if (!read || displaced_) co_return false;
   phase_.store(Phase::kServes, std::memory_order_relaxed);
-  body->room.Settle();  // the upload is complete
+  body->room.EndUpload();
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
 }
@@ -443,7 +443,7 @@ asio::awaitable<bool> Session::Reply(Response& response, bool can_respond_again)
 // only have buffered them.
 asio::awaitable<bool> Session::WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room) {
   const SessionOptions& options = context_->options;
-  room.AddTaken(0);  // begins the client's time
+  room.BeginReply();
   const auto begun = Clock::now();
   while (asio::buffer_size(left) > 0) {
     auto deadline = Clock::now() + options.write_timeout;

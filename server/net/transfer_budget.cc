@@ -300,7 +300,7 @@ void TransferBudget::AddTaken(Entries::iterator entry, std::size_t bytes) {
   }
 }
 
-void TransferBudget::Settle(Entries::iterator entry) {
+void TransferBudget::EndUpload(Entries::iterator entry) {
   const std::lock_guard lock(mutex_);
   entry->late_at = Clock::time_point::max();
 }

@@ -138,7 +138,7 @@ class TransferBudget {
 
   void Release(Entries::iterator entry);
   void AddTaken(Entries::iterator entry, std::size_t bytes);
-  void Settle(Entries::iterator entry);
+  void EndUpload(Entries::iterator entry);
 
   const std::function<Clock::time_point()> now_;
   mutable std::mutex mutex_;
@@ -165,15 +165,15 @@ class TransferBudget::Hold {
     if (budget_) budget_->Release(entry_);
   }
 
-  // Call this when the client has taken further bytes of the reply. Its time begins with the first call: before that
-  // the reply is being made.
+  // Call this when the reply is made and the client can take it. It cannot be late before.
+  void BeginReply() { AddTaken(0); }
+  // Call this when the client has taken further bytes of the reply.
   void AddTaken(std::size_t bytes) {
     if (budget_) budget_->AddTaken(entry_, bytes);
   }
-
   // Call this when the upload is complete. It still counts until the hold is destroyed, but can no longer be late.
-  void Settle() {
-    if (budget_) budget_->Settle(entry_);
+  void EndUpload() {
+    if (budget_) budget_->EndUpload(entry_);
   }
 
   // Keeps `body` alive as long as the hold. For holds without a body.

@@ -103,7 +103,7 @@ export class Measure {
     byId("dock-text").textContent = `${formatMetres(length)} straight, ` + (isKnown ?
       `${formatMetres(along)} along the ground, ${formatHeight(up)} up, ${formatHeight(down)} down, between ${formatHeight(min)} and ${formatHeight(max)}` :
       "no heights there");
-    this.globe.overlay.setLine("measured", [{ className: "path", points: this.#onGround(points) }]);
+    this.globe.overlay.setLine("measured", [{ className: "path", points }]);
     this.plot.show(points);
   }
 
@@ -140,7 +140,6 @@ export class Measure {
     return `${verdict}. ${formatMetres(this.points.at(-1).distance)} away; ${share} % of the ground between is seen.${remark}`;
   }
 
-  // Ground without a height is not drawn.
   #drawSeen(seen) {
     const { points } = this;
     const pieces = [];
@@ -154,12 +153,7 @@ export class Measure {
     this.globe.overlay.setLine("measured", pieces);
   }
 
-  #onGround(points) {
-    return points.map((point) => ({ ...point, height: point.height ?? 0 }));
-  }
-
   #showPlace(index) {
-    const point = this.points[index];
-    this.globe.overlay.setMarker("place", point && this.#onGround([point])[0]);
+    this.globe.overlay.setMarker("place", this.points[index]);
   }
 }

@@ -1,5 +1,6 @@
 // Markers, lines and labels above the globe, as SVG: sharp, styled by the page, and drawn over everything. Ground is
-// {longitude, latitude, height}: degrees, metres above the ellipsoid without exaggeration.
+// {longitude, latitude, height}: degrees, metres above the ellipsoid without exaggeration. Ground whose height is undefined
+// is not drawn.
 import { Cartesian2, Cartesian3, EllipsoidalOccluder, SceneTransforms } from "/viewer/cesium/index.js";
 
 const kSvg = "http://www.w3.org/2000/svg";
@@ -60,8 +61,9 @@ export class Overlay {
     return Cartesian3.fromDegrees(longitude, latitude, height * this.scene.verticalExaggeration);
   }
 
-  // Window coordinates; undefined behind the camera or beyond the horizon.
+  // Window coordinates; undefined without a height, behind the camera or beyond the horizon.
   #place(ground) {
+    if (ground.height === undefined) return undefined;
     const world = this.#worldOf(ground);
     if (!this.occluder.isPointVisible(Cartesian3.multiplyByScalar(world, 1.0005, new Cartesian3()))) return undefined;
     return SceneTransforms.worldToWindowCoordinates(this.scene, world, new Cartesian2());

@@ -54,7 +54,8 @@ export class ProfilePlot {
     const [low, high] = [Math.min(...known, ...ends), Math.max(...known, ...ends)];
     const air = Math.max(1, 0.08 * (high - low));
     const [bottom, top] = [low - air, high + air];
-    this.x = (distance) => kMargin.left + (distance / points.at(-1).distance) * (width - kMargin.left - kMargin.right);
+    const length = points.at(-1).distance || 1;  // 0 between equal points
+    this.x = (distance) => kMargin.left + (distance / length) * (width - kMargin.left - kMargin.right);
     this.y = (value) => kMargin.top + ((top - value) / (top - bottom)) * (height - kMargin.top - kMargin.bottom);
 
     const root = svg("svg", { width, height, "aria-hidden": "true" });

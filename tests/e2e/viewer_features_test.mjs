@@ -92,6 +92,19 @@ describe('features of the viewer', () => {
     assert.match(await page.locator('#plot').getAttribute('aria-valuetext'), /^8,982 m: [\d,]+ m$/);
     await page.locator('.marker.place').waitFor({ state: 'attached' });
     await assertAccessible(page, 'a profile');
+    const measure = (longitudes) => page.evaluate((degrees) => {
+      while (terrace.state.measure.corners.length > 0) terrace.state.measure.undo();
+      return degrees.map((longitude) => terrace.state.measure.add({ longitude, latitude: 36.3, height: 400 })).at(-1);
+    }, longitudes);
+    await measure([-84.3, -84.3]);
+    await says(/^0 m straight/);
+    assert.doesNotMatch(await page.locator('#plot').innerHTML(), /NaN/);
+    await measure([-84.01, -83.9]);  // ends beside the data
+    await says(/straight/);
+    await page.locator('#plot').focus();
+    await page.keyboard.press('End');
+    assert.match(await page.locator('#plot').getAttribute('aria-valuetext'), /no height$/);
+    await page.waitForFunction(() => document.querySelector('.marker.place').hasAttribute('hidden'), undefined, kWait);
   });
 
   it('tell what hides a place', async () => {

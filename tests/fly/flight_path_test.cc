@@ -100,6 +100,8 @@ TEST(FlightPath, NamesTheLineThatIsWrong) {
   EXPECT_NE(message("7,46").find("2 numbers"), std::string::npos);
   EXPECT_NE(message("1,7,46,1,0,0\n1,8,46,1,0,0").find("ascend"), std::string::npos);
   EXPECT_NE(message("nan,46,1").find("line 1"), std::string::npos);
+  EXPECT_NE(message("7,46,1,1e9,0").find("line 1: heading"), std::string::npos);
+  EXPECT_NE(message("7,46,1,0,-91").find("line 1: heading"), std::string::npos);
   EXPECT_NE(message("").find("no points"), std::string::npos);
   EXPECT_NE(message(R"({"type":"Point"})").find("no LineString"), std::string::npos);
 }

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "engine/tin/insert_samples.h"
+#include "engine/tin/sample_inserter.h"
 #include "proto/mesh/grid_mesh.h"
 #include "proto/mesh/quantize_tile.h"
 #include "proto/mesh/tile_geometry.h"

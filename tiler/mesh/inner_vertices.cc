@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "engine/geo/ellipsoid.h"
-#include "engine/tin/insert_samples.h"
+#include "engine/tin/sample_inserter.h"
 #include "proto/mesh/tile_normals.h"
 
 namespace terrace::tiler {

@@ -1,6 +1,6 @@
 #include "tiler/mesh/restore_error_bound.h"
 
-#include "engine/tin/insert_samples.h"
+#include "engine/tin/sample_inserter.h"
 #include "tiler/mesh/tile_mesher.h"
 
 namespace terrace::tiler {

@@ -15,10 +15,10 @@
 
 #include "engine/core/check.h"
 #include "engine/tin/greedy.h"
-#include "engine/tin/insert_samples.h"
 #include "engine/tin/mesh/predicates.h"
 #include "engine/tin/mesh_error.h"
 #include "engine/tin/sagitta.h"
+#include "engine/tin/sample_inserter.h"
 #include "engine/tin/scan/triangle_spans.h"
 #include "tests/engine/tin/mesh_laws.h"
 #include "tests/engine/tin/test_fields.h"

@@ -72,7 +72,7 @@ class TransferBudgetTest : public testing::Test {
   std::optional<Hold> Offer(std::size_t bytes, std::uint64_t client, std::shared_ptr<FakeTransfer>& connection) {
     connection_ = connection = std::make_shared<FakeTransfer>();
     auto hold = Try(BodyOf(bytes), client);
-    if (hold) hold->AddTaken(0);
+    if (hold) hold->BeginReply();
     return hold;
   }
 
@@ -363,7 +363,7 @@ TEST_F(TransferBudgetTest, AnUploadTakesFromWhoHoldsMost) {
     uploaders.push_back(connection_);
     auto hold = TryUpload(kMb / 10, 1);
     ASSERT_TRUE(hold);
-    hold->Settle();
+    hold->EndUpload();
     holds.push_back(*std::move(hold));
   }
   Wait(1, AskFor(kMb / 10, 1));
@@ -382,7 +382,7 @@ TEST_F(TransferBudgetTest, UploadsThatDoNotArriveMakeRoomForThoseOfOthers) {
   connection_ = whole;
   auto waiting = TryUpload(kMb, 2);
   ASSERT_TRUE(unfinished && waiting);
-  waiting->Settle();
+  waiting->EndUpload();
   now_ += 60s;
   Wait(1, AskFor(kMb, 3));
   EXPECT_EQ(slow->displaced, 1) << "nobody holds more than the one who waits would, but this has had its time";

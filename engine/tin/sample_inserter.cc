@@ -1,4 +1,4 @@
-#include "engine/tin/insert_samples.h"
+#include "engine/tin/sample_inserter.h"
 
 #include <vector>
 
