@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "engine/core/plain_number.h"
 #include "engine/crs/projector.h"
@@ -65,6 +66,8 @@ Result<std::int64_t> NodesAlong(double length, const std::optional<std::int64_t>
   if (nodes < 2) return Invalid(fmt::format("{}: a grid has at least 2 nodes on each side", name));
   return static_cast<std::int64_t>(std::min(nodes, 1e15));
 }
+
+Position CentreOf(const OutputGrid& grid) { return {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2}; }
 
 // Finds the positions of nodes. A node has one if it comes back from there. So does a node just beyond the edge of the
 // CRS, because the boxes of worlds are rounded: it gets the position of a place nearer to the centre of the grid.
@@ -150,8 +153,20 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
   return grid;
 }
 
-Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
-                                             const std::stop_token& stop) {
+Result<GridPositions> GridPositions::Make(OutputGrid grid) {
+  GridPositions positions;
+  if (grid.epsg != kWgs84) {
+    auto projector = Projector::Make(grid.wkt, CentreOf(grid));
+    if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
+    positions.projector_ = *std::move(projector);
+  }
+  positions.grid_ = std::move(grid);
+  return positions;
+}
+
+Result<std::vector<GeoPosition>> GridPositions::OfRows(std::int64_t first_row, std::int64_t rows,
+                                                       const std::stop_token& stop) const {
+  const OutputGrid& grid = grid_;
   std::vector<Position> nodes;
   nodes.reserve(Area(grid.columns, rows));
   for (std::int64_t row = first_row; row < first_row + rows; ++row) {
@@ -161,11 +176,8 @@ Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_
           {column == grid.columns - 1 ? grid.east : grid.west + static_cast<double>(column) * grid.step_x(), y});
     }
   }
-  if (grid.epsg != kWgs84) {
-    const Position centre{(grid.west + grid.east) / 2, (grid.south + grid.north) / 2};
-    const auto projector = Projector::Make(grid.wkt, centre);
-    if (!projector) return Invalid(fmt::format("crs: EPSG:{}: {}", grid.epsg, projector.error().message));
-    const Placement placement(grid, **projector);
+  if (projector_) {
+    const Placement placement(grid, *projector_);
     constexpr std::size_t kBatch = 4096;
     for (std::size_t done = 0; done < nodes.size(); done += kBatch) {
       if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "placing a grid was stopped");
@@ -197,7 +209,7 @@ std::optional<GeoBounds> BoundsInCrs(const OutputGrid& grid, const GeoBounds& ar
       edge.push_back(on_edge);
     }
   }
-  const auto projector = Projector::Make(grid.wkt, {(grid.west + grid.east) / 2, (grid.south + grid.north) / 2});
+  const auto projector = Projector::Make(grid.wkt, CentreOf(grid));
   if (!projector) return std::nullopt;
   std::vector<Position> placed = edge;
   (*projector)->Forward(placed);

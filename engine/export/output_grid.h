@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <stop_token>
@@ -42,10 +43,24 @@ struct GridRequest {
 // count in grads; the box is empty; a side has fewer than 2 nodes; there are more than `max_nodes`.
 Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_nodes);
 
-// Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS
-// has no position on Earth at a node. kCancelled: stopped.
-Result<std::vector<GeoPosition>> PositionsOf(const OutputGrid& grid, std::int64_t first_row, std::int64_t rows,
-                                             const std::stop_token& stop);
+class Projector;
+
+// Converts the nodes of a grid to longitudes and latitudes. Thread-safe.
+class GridPositions {
+ public:
+  // kInvalidArgument, with a message for clients: PROJ has no transformation from the CRS to WGS 84.
+  static Result<GridPositions> Make(OutputGrid grid);
+
+  // Positions of the nodes of some rows, longitudes -180 .. 180. kInvalidArgument, with a message for clients: the CRS
+  // has no position on Earth at a node. kCancelled: stopped.
+  Result<std::vector<GeoPosition>> OfRows(std::int64_t first_row, std::int64_t rows, const std::stop_token& stop) const;
+
+ private:
+  GridPositions() = default;
+
+  OutputGrid grid_;
+  std::shared_ptr<const Projector> projector_;  // null: the grid is in EPSG:4326
+};
 
 // A box around `area` in the CRS of the grid, for messages. Geographic CRS: `area` itself, without shifts between
 // datums. Projected CRS: the box around 33 points on each side of the area; nothing if one of them has no position

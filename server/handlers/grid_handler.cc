@@ -59,11 +59,13 @@ struct Steps {
 
 Result<std::vector<float>> ReadNodes(const tiler::TilePipeline& pipeline, std::uint32_t dataset, const GridQuery& query,
                                      const dem::OutputGrid& grid, const std::stop_token& stop) {
+  const Result<dem::GridPositions> positions = dem::GridPositions::Make(grid);
+  if (!positions) return tl::unexpected(positions.error());
   std::vector<float> heights;
   heights.reserve(dem::Area(grid.columns, grid.rows));
   const std::int64_t strip = std::max<std::int64_t>(1, kBatch / grid.columns);
   for (std::int64_t row = 0; row < grid.rows; row += strip) {
-    const auto points = dem::PositionsOf(grid, row, std::min(strip, grid.rows - row), stop);
+    const auto points = positions->OfRows(row, std::min(strip, grid.rows - row), stop);
     if (!points) return tl::unexpected(points.error());
     const Result<tiler::PointHeights> read =
         query.drawn ? pipeline.ReadDrawnPoints(dataset, *query.drawn, *points, /*normals=*/false, stop)

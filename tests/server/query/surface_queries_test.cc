@@ -159,11 +159,18 @@ TEST(GridQuery, SaysWhatIsWrong) {
   for (const auto& [query, says] : cases) ExpectSays(ParseGrid(query), says);
 }
 
+// Of all nodes of a grid with this many rows.
+Result<std::vector<dem::GeoPosition>> PositionsOf(const dem::OutputGrid& grid, std::int64_t rows) {
+  const auto positions = dem::GridPositions::Make(grid);
+  if (!positions) return tl::unexpected(positions.error());
+  return positions->OfRows(0, rows, {});
+}
+
 TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   dem::GridRequest request{.west = 7, .south = 46, .east = 8, .north = 47, .columns = 3, .rows = 5};
   const auto plan = dem::PlanOutputGrid(request, 100);
   ASSERT_TRUE(plan) << plan.error().message;
-  const auto positions = dem::PositionsOf(*plan, 0, 5, {});
+  const auto positions = PositionsOf(*plan, 5);
   ASSERT_TRUE(positions);
   EXPECT_EQ(positions->front().latitude, 47);
   EXPECT_EQ(positions->front().longitude, 7);
@@ -202,11 +209,11 @@ TEST(GridPlan, NamesLimitsAndReferenceSystems) {
   // The north-eastern node lies beside the map of the Earth.
   const auto beside = dem::PlanOutputGrid({8857, 0, 0, 1.7e7, 8e6, 3, 3, {}}, 100);
   ASSERT_TRUE(beside) << beside.error().message;
-  ExpectSays(dem::PositionsOf(*beside, 0, 3, {}), "no place on Earth for column 2, row 0");
+  ExpectSays(PositionsOf(*beside, 3), "no place on Earth for column 2, row 0");
   // Half a million kilometres east of zone 11.
   const auto far = dem::PlanOutputGrid({32611, 5e8, 0, 6e8, 1e6, 10, 10, {}}, 100);
   ASSERT_TRUE(far) << far.error().message;
-  ExpectSays(dem::PositionsOf(*far, 0, 10, {}), "EPSG:32611 has no place on Earth for column 0, row 0");
+  ExpectSays(PositionsOf(*far, 10), "EPSG:32611 has no place on Earth for column 0, row 0");
 }
 
 // The half circumference is 20037508.342789: usual roundings of the box of the world reach beyond it.
@@ -214,7 +221,7 @@ TEST(GridPlan, HasTheRoundedWorldOfWebMercator) {
   for (const double half : {20037508.34, 20037508.3428, 20037508.35, 20037509.0}) {
     const auto world = dem::PlanOutputGrid({3857, -half, -half, half, half, 3, 3, {}}, 100);
     ASSERT_TRUE(world) << world.error().message;
-    const auto positions = dem::PositionsOf(*world, 0, 3, {});
+    const auto positions = PositionsOf(*world, 3);
     ASSERT_TRUE(positions) << positions.error().message;
     EXPECT_NEAR(positions->front().longitude, -180, 2e-5);
     EXPECT_NEAR(positions->front().latitude, 85.0511288, 1e-5);
@@ -224,7 +231,7 @@ TEST(GridPlan, HasTheRoundedWorldOfWebMercator) {
   }
   const auto beyond = dem::PlanOutputGrid({3857, -20037512, 0, 0, 100, 3, 3, {}}, 100);
   ASSERT_TRUE(beyond);
-  ExpectSays(dem::PositionsOf(*beyond, 0, 3, {}), "no place on Earth for column 0, row 0");
+  ExpectSays(PositionsOf(*beyond, 3), "no place on Earth for column 0, row 0");
 }
 
 TEST(GridPlan, TellsWhereAnAreaIsInItsReferenceSystem) {
