@@ -59,7 +59,8 @@ class Server {
   // Checks that the addresses are free.
   static Result<void> CheckAddress(const config::Config& config);
 
-  // Answers new requests from `catalog`; requests that have begun keep their catalog. Tiles stay cached if their
+  // Answers new requests from `catalog`. Answers that have begun keep their catalog; a request whose source was
+  // replaced, or whose reply waits for memory, is answered anew from the current one. Tiles stay cached if their
   // dataset stays in the same generation. Applies cache_bytes, cache_control, max_mesh_samples and
   // request_deadline of `config`. Datasets that are pending answer 503. kInvalidArgument: a name is not valid, as in
   // Start; nothing changes. May be called on any thread, but not concurrently.

@@ -68,8 +68,8 @@ class TilePipeline {
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
-  // rays cross too many samples; or, over the sources' surface, an edit changes the ground below a ray. Other errors:
-  // those of ReadPoints and ReadDrawnPoints.
+  // rays cross too many samples; or, over the sources' surface, an edit changes the ground below a ray or near it
+  // (ElevationModel::LookAlong). Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

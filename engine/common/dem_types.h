@@ -84,8 +84,8 @@ struct DemFile {
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
-// Metres. Heights are above the ellipsoid unless a datum is named, or as the source has them if its vertical datum is
-// unknown. Also used for undulations.
+// Metres above the ellipsoid, unless the member names another datum. Heights of a source with an unknown vertical datum
+// are as the source has them. Also used for undulations.
 struct HeightRange {
   double min = 0;
   double max = 0;

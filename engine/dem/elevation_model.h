@@ -97,7 +97,7 @@ class ElevationModel {
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
   // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit that changes heights or cuts a hole lies
-  // below a ray.
+  // below a ray or near it (in the box of degrees around 8 km of the ray).
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 
@@ -113,9 +113,8 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for edges of other tiles: those that end at a corner of this tile and are not its own edges. By corner
-  // (south-west, south-east, north-east, north-west), with one element for each such edge, without the ends of the
-  // edge.
+  // The same for the edges of other tiles that meet at this tile's corners, without this tile's own edges. By corner
+  // (south-west, south-east, north-east, north-west); one element for each such edge, for the nodes between its ends.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

@@ -9,7 +9,7 @@
 //   NeededStep(T) = smallest 2^k >= range(T) / 16384      half of the format's 32767 steps; the rest is for rounding up
 //   edge step     = max(largest 2^k <= error / 8, NeededStep of both tiles)
 //   corner step   = the same over the four tiles that meet
-//   on a pole     : the NeededStep of the whole dataset, for the edge and its corners
+//   on a pole     : the same with the NeededStep of the whole dataset, for the edge and its corners
 //
 // Proof that a tile's own step divides: it is a power of two, so it only has to be at most every edge's step. Let w be
 // the step requested for the error, m the tile's NeededStep, S the coarsest step of its edges. Rounding widens the
@@ -38,8 +38,8 @@ struct EdgeSteps {
 
 // The strictest bound on the errors of samples: on each side, and on the four edges that meet at each corner. It is the
 // tile's error unless local limits (engine/tin/sample_limits.h) are smaller. Neighbours have equal errors on shared
-// edges and corners. MakeEdgeSteps makes no edge's step smaller than an 8192nd of the step for the tile's error, so
-// that in the proof above S <= 8192 M, and 16384 M + S < 32767 M holds.
+// edges and corners. With limits, the least step M of the tile's edges may be below w in the proof above, but
+// MakeEdgeSteps keeps it at least w / 8192. So S <= 8192 M holds also if S = w, and 16384 M + S < 32767 M.
 struct EdgeErrors {
   explicit EdgeErrors(double error_m) : tile(error_m) {
     side.fill(error_m);

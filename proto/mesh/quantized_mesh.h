@@ -16,8 +16,8 @@
 namespace terrace::proto {
 
 inline constexpr int kQuantizedMax = 32767;  // u, v and heights have 15 bits
-// Indices then have 16 bits for every client: in the format they have 32 bits from 65537 vertices on, but CesiumJS
-// reads 32 bits at 65536 already. The limit is one less than necessary.
+// With at most this many vertices every client reads indices of 16 bits: in the format they have 32 bits from 65537
+// vertices on, but CesiumJS reads 32 bits at 65536 already. The limit is one less than necessary.
 inline constexpr std::size_t kMaxTileVertices = 65534;
 
 // A quantized tile: integers, and the two heights of the header that scale them.

@@ -17,8 +17,8 @@
 namespace terrace::server {
 
 struct ReadTimeouts {
-  // For a head, from its first byte to its empty line. For a body, the longest time between two bytes, and the time
-  // before min_rate applies.
+  // For a head, from its first byte to its empty line; also for the first byte of a new connection. For a body, the
+  // longest time between two bytes, and the time before min_rate applies.
   std::chrono::milliseconds message{5'000};
   std::chrono::milliseconds idle{30'000};  // between a reply and the next request
   std::size_t min_rate = 4096;             // average bytes per second of a body; 0: any

@@ -1,6 +1,6 @@
 // Everything that is served at one moment: the datasets, and the pipeline that makes their tiles, heights and meshes.
 //
-// Immutable, so any thread reads it without a lock. A request uses the catalog it began with until its end, and so does
+// Immutable, so any thread reads it without a lock. An answer uses the catalog it began with until its end, and so does
 // a build that it starts: answers never mix two catalogs.
 #pragma once
 

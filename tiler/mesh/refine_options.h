@@ -1,7 +1,7 @@
 // Options of a tile's refinement. With them the tile keeps every error bound, and its edges match those of its
-// neighbours. They depend on the level and row of the tile, its border samples, the height ranges of the
-// neighbours, the dataset's criterion, and the edits on the tile. They do not depend on the error: a refinement serves
-// every error (engine/tin/refinement.h).
+// neighbours. They depend on the level and row of the tile, its border samples, the range bounds of the
+// tile and its neighbours (at a pole, of the whole dataset), the dataset's criterion, and the edits on the tile. They
+// do not depend on the error: a refinement serves every error (engine/tin/refinement.h).
 #pragma once
 
 #include "engine/dem/elevation_model.h"

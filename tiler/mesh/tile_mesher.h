@@ -40,9 +40,9 @@ tl::unexpected<Error> Cancelled();
 tin::HeightField FieldOf(const proto::TileSamples& samples);
 
 // Makes the mesh for the error: replays the refinement or, if that mesh has more vertices than the format allows,
-// inserts anew with a larger error inside the tile but not on its edges. Then the drop pass, if the options ask for it,
-// and WithInnerVertices (inner_vertices.h). The mesh is not quantized yet. `refinement` as for MeshTile. kCancelled:
-// stopped.
+// inserts anew with a larger error inside the tile but not on its edges. Then the drop pass (tin::DropVertices) if
+// MeshOptions::compact is set, and WithInnerVertices (inner_vertices.h). The mesh is not quantized yet. `refinement` as
+// for MeshTile. kCancelled: stopped.
 Result<ReplayedMesh> ReplayMesh(const dem::ElevationModel& model, const proto::TileSamples& samples,
                                 const tin::Refinement& refinement, const MeshOptions& mesh_options,
                                 double wanted_error_m, const std::stop_token& stop);

@@ -33,7 +33,7 @@ struct BakedExtent {
   std::optional<proto::TextureFormat> texture;         // of GLB tiles
 };
 
-// Thread-safe. Functions block on a disk or a network.
+// Thread-safe. Find and RangeBound may block on a disk or a network; the others return at once.
 class BakedTiles {
  public:
   virtual ~BakedTiles() = default;
@@ -50,7 +50,6 @@ class BakedTiles {
   virtual Result<dem::HeightRange> RangeBound(const geo::TileKey& key) const = 0;
 
   // Whether files are known to be missing, of another bake, or not readable: the archive has to be opened again.
-  // Thread-safe.
   virtual bool is_outdated() const = 0;
 
   // Why Find finds nothing for a request: kNotFound.

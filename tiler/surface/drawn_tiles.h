@@ -83,8 +83,9 @@ class DrawnTiles {
     DrawnPoint point;
     std::uint32_t tile = 0;  // number
   };
-  // The surface at a point in tile `own`. Beside an edge where only the neighbour has triangles, it is the neighbour's.
-  // kCancelled: a stop was requested.
+  // The surface at a point in the tile with the number `own`. Near its northern or southern edge the plumb line may
+  // meet no triangle of this tile. If it meets one of the neighbour there, the surface is the neighbour's. kCancelled:
+  // a stop was requested.
   Result<Reading> ReadAt(const dem::GeoPosition& point, std::uint32_t own, const std::stop_token& stop);
 
  private:

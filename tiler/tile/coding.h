@@ -15,7 +15,7 @@ enum class Coding : std::uint8_t { kIdentity, kGzip, kBrotli, kZstd };
 // the size in 0.39 ms, gzip 65.8 % in 0.30 ms, zstd 66.0 % in 0.26 ms.
 inline constexpr std::array<Coding, 3> kCodings = {Coding::kBrotli, Coding::kGzip, Coding::kZstd};
 
-// Codings of bodies that are compressed once at start.
+// Codings of JSON documents and of the files of the viewer.
 inline constexpr std::array<Coding, 1> kGzipOnly = {Coding::kGzip};
 
 // The name in Content-Encoding, such as "br"; empty for identity.
