@@ -3,26 +3,34 @@
 #
 #   CONFIG=terrace.json DATASET=europe OUT=/scratch/europe deploy/slurm/bake.sh
 #
-# Slurm starts the script again for each task of the array. A shard that was ended goes on where it was: sbatch it again.
+# Slurm starts the script again for each task of the array. A shard that was ended goes on where it was. To hand in some of
+# the 64 again, and then the finish (with the variables above):
+#
+#   SHARDS=64 sbatch --array=5,17 deploy/slurm/bake.sh
+#   FINISH=1 sbatch --array=0 deploy/slurm/bake.sh
 #SBATCH --job-name=terrace-bake
 #SBATCH --array=0-63
 #SBATCH --cpus-per-task=8
 #SBATCH --mem=12G
 #SBATCH --time=12:00:00
 #SBATCH --requeue
-#SBATCH --signal=TERM@60
+#SBATCH --signal=B:TERM@60
 set -euo pipefail
 : "${CONFIG:?the configuration with the dataset}" "${DATASET:?its name}" "${OUT:?where the archive goes: a file system of all nodes}"
 terrace=${TERRACE:-terrace}
 
-if [[ -z ${SLURM_JOB_ID:-} ]]; then  # on the login node
+if [[ -z ${SLURM_ARRAY_TASK_ID:-} ]]; then  # on the login node
   job=$(sbatch --parsable --export=ALL "$0")
   exec sbatch --dependency="afterok:$job" --array=0 --export=ALL,FINISH=1 "$0"
 fi
 if [[ -n ${FINISH:-} ]]; then
   exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --finish
 fi
-shard=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN)) count=$SLURM_ARRAY_TASK_COUNT
+if [[ -n ${SHARDS:-} ]]; then
+  shard=$SLURM_ARRAY_TASK_ID count=$SHARDS
+else
+  shard=$((SLURM_ARRAY_TASK_ID - SLURM_ARRAY_TASK_MIN)) count=$SLURM_ARRAY_TASK_COUNT
+fi
 # A task runs once at a time, so a lock is of a run that was ended on another node.
 rm -f "$OUT/bake-$shard-of-$count.lock"
 exec "$terrace" bake --config "$CONFIG" --dataset "$DATASET" --out "$OUT" --threads "${SLURM_CPUS_PER_TASK:-1}" --shard "$shard/$count"

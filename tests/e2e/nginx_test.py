@@ -170,7 +170,7 @@ class Proxied(unittest.TestCase):
 
     def test_documents_come_from_terrace_each_time(self):
         for target in ("/earth/layer.json", "/earth/layer.json?error=50", "/earth/tileset.json?error=50&compression=meshopt",
-                       "/earth/tiles.json", "/datasets", "/", "/viewer/app.js"):
+                       "/earth/tiles.json", "/earth/hillshade/tiles.json", "/openapi.json", "/datasets", "/", "/viewer/app.js"):
             tag = self.get(target, headers=["Accept-Encoding: gzip"]).fields["etag"]
             before = self.count_unchanged()
             again = self.get(target, headers=["Accept-Encoding: gzip", f"If-None-Match: {tag}"])
@@ -265,6 +265,15 @@ class Proxied(unittest.TestCase):
     def test_heights_by_post(self):
         reply = self.get("/earth/heights", "--data-binary", '{"locations": "1,2"}', headers=["Content-Type: application/json"])
         self.assertEqual((reply.status, len(json.loads(reply.body)["results"])), (200, 1))
+
+    def test_the_most_rays_of_a_request(self):
+        end = "46.12345678901234,-122.12345678901234,1234.12345678901234"
+        body = self.folder / "rays.json"
+        body.write_text(json.dumps({"rays": "|".join([f"{end},{end}"] * 9999)}))
+        self.assertGreater(body.stat().st_size, 2**20)
+        direct = self.get("/earth/sight", "--data-binary", f"@{body}", headers=["Content-Type: application/json"], port=self.terrace_port, scheme="http")
+        reply = self.get("/earth/sight", "--data-binary", f"@{body}", headers=["Content-Type: application/json"])
+        self.assertEqual((reply.status, reply.body), (direct.status, direct.body), reply.body[:200])
 
     def test_metrics_are_not_for_everybody(self):
         self.assertEqual(self.get("/metrics").status, 404)

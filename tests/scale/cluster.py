@@ -108,9 +108,9 @@ def sum_of(metrics, name, labels=""):
 
 class Nginx:
     """The configuration that is shipped, on free ports. `nodes`: in the order of the file; more are added to it. Without TLS for clients
-    that take only certificates of the system."""
+    that take only certificates of the system. `changes`: texts of the template to replace."""
 
-    def __init__(self, folder, nodes, is_tls=True):
+    def __init__(self, folder, nodes, is_tls=True, changes=()):
         self.folder = pathlib.Path(tempfile.mkdtemp(dir=folder))
         self.folder.chmod(0o755)  # nginx's workers run as another user
         self.port = free_port()
@@ -122,7 +122,12 @@ class Nginx:
         self.write_nodes(nodes)
         values = {"TERRACE_NODES": self.folder / "nodes.conf", "TERRACE_HTTP_PORT": free_port(), "TERRACE_HTTPS_PORT": self.port,
                   "TERRACE_CERTIFICATES": certificates, "TERRACE_CACHE": self.folder / "cache"}
-        filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: str(values[match[1]]), TEMPLATE.read_text())
+        template = TEMPLATE.read_text()
+        for old, new in changes:
+            if old not in template:
+                raise ValueError(f"the template has no {old!r}")
+            template = template.replace(old, new)
+        filled = re.sub(r"\$\{(TERRACE_\w+)\}", lambda match: str(values[match[1]]), template)
         filled = filled.replace("/dev/stdout", str(self.folder / "access.log")).replace("/dev/stderr", str(self.folder / "error.log"))
         if not is_tls:
             filled = re.sub(r" ssl http2;|^  ssl_.*$", lambda match: ";" if match[0].startswith(" ssl ") else "", filled, flags=re.MULTILINE)

@@ -194,7 +194,11 @@ class Deploy(unittest.TestCase):
         runs = [subprocess.Popen(["bash", script], env={**environment, "SLURM_ARRAY_TASK_ID": str(i)}, stdout=subprocess.DEVNULL,
                                  stderr=subprocess.DEVNULL) for i in range(3)]
         self.assertEqual([run.wait(120) for run in runs], [0, 0, 0])
-        subprocess.run(["bash", script], env={**environment, "FINISH": "1"}, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        # One shard again, as an array of its own.
+        subprocess.run(["bash", script], env={**environment, "SHARDS": "3", "SLURM_ARRAY_TASK_ID": "1", "SLURM_ARRAY_TASK_MIN": "1",
+                                              "SLURM_ARRAY_TASK_COUNT": "1"}, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.assertFalse((out / "manifest.json").exists())
+        subprocess.run(["bash", script], env={**environment, "FINISH": "1", "SLURM_ARRAY_TASK_ID": "0"}, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         subprocess.run([BINARY, "bake", "--config", config, "--dataset", "jacksboro", "--out", one], check=True, stdout=subprocess.DEVNULL,
                        stderr=subprocess.DEVNULL)
         self.assert_equal_folders(out, one)
@@ -215,7 +219,8 @@ class Deploy(unittest.TestCase):
         sbatch.write_text(f"#!/bin/sh\necho \"$@\" >> {self.folder}/calls\necho 4711\n")
         sbatch.chmod(0o755)
         subprocess.run(["bash", ROOT / "deploy/slurm/bake.sh"], check=True, stdout=subprocess.DEVNULL,
-                       env={"PATH": f"{self.folder}:{os.environ['PATH']}", "CONFIG": "c", "DATASET": "d", "OUT": "o"})
+                       env={"PATH": f"{self.folder}:{os.environ['PATH']}", "CONFIG": "c", "DATASET": "d", "OUT": "o",
+                            "SLURM_JOB_ID": "1"})  # of an interactive job
         first, second = (self.folder / "calls").read_text().splitlines()
         self.assertIn("--parsable", first)
         self.assertIn("--dependency=afterok:4711 --array=0 --export=ALL,FINISH=1", second)

@@ -40,8 +40,8 @@ class Ring(unittest.TestCase):
         self.stack.callback(node.stop, signal.SIGKILL)
         return node.start()
 
-    def ring(self, nodes):
-        nginx = cluster.Nginx(self.folder, nodes).start()
+    def ring(self, nodes, changes=()):
+        nginx = cluster.Nginx(self.folder, nodes, changes=changes).start()
         self.stack.callback(nginx.stop)
         return nginx
 
@@ -144,6 +144,16 @@ class Ring(unittest.TestCase):
         self.draw(nginx, cluster.tiles(TILES, query="?error=3000"), seen)
         self.assert_all_good(seen)
         self.check_moves(before, nginx.node_of(), lost=f"127.0.0.1:{nodes[1].port}", gained=None, share=1 / 3)
+
+    def test_a_node_that_hangs_costs_no_reply(self):
+        nodes = [self.node(cluster.earth()) for _ in range(3)]
+        # In less time than 35 and 80 s.
+        nginx, seen = self.ring(nodes, [("proxy_read_timeout 35s", "proxy_read_timeout 2s"),
+                                        ("proxy_next_upstream_timeout 80s", "proxy_next_upstream_timeout 5s")]), cluster.Seen()
+        nodes[1].process.send_signal(signal.SIGSTOP)
+        self.draw(nginx, cluster.tiles(60), seen)
+        self.assert_all_good(seen)
+        self.assertEqual(seen.replies, 60)
 
     def test_an_added_node_costs_no_reply_and_takes_keys_alone(self):
         nodes = [self.node(cluster.earth()) for _ in range(3)]
