@@ -46,7 +46,7 @@ struct WatchedFile {
 struct Dataset {
   std::string name;
   std::string attribution;
-  double error_fraction = 0.5;  // that of the model's DemOptions
+  double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
   proto::GlbOptions glb;                             // compression: for GLB requests that name none
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null

@@ -1,6 +1,7 @@
 #include "tiler/tile_pipeline.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <utility>
 
@@ -17,6 +18,7 @@
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/quantized_mesh_triangles.h"
 #include "tiler/surface/source_normals.h"
+#include "tiler/tile/check_request.h"
 #include "tiler/tile/strong_etag.h"
 
 namespace terrace::tiler {
@@ -121,9 +123,23 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   return RefinedTilePtr(std::move(refined));
 }
 
+Result<const Dataset*> TilePipeline::Find(std::uint32_t dataset) const {
+  if (dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "there is no dataset {}", dataset);
+  return &datasets_[dataset];
+}
+
+Result<const dem::ElevationModel*> TilePipeline::FindModel(std::uint32_t dataset) const {
+  const Result<const Dataset*> found = Find(dataset);
+  if (!found) return tl::unexpected(found.error());
+  if (!(*found)->model) return NoSources();
+  return (*found)->model.get();
+}
+
 Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_token stop) const {
-  if (request.dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "no such dataset");
-  const Dataset& dataset = datasets_[request.dataset];
+  const Result<const Dataset*> found = Find(request.dataset);
+  if (!found) return tl::unexpected(found.error());
+  if (const Result<void> valid = CheckRequest(request); !valid) return tl::unexpected(valid.error());
+  const Dataset& dataset = **found;
   if (!dataset.model) return TakeBaked(dataset, request);
   const auto* const encoder = std::ranges::find(kEncoders, request.format, &Encoder::format);
   TERRACE_CHECK(encoder != std::end(kEncoders));
@@ -154,9 +170,10 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
 
 Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                               dem::HeightDatum datum, std::stop_token stop) const {
-  if (!datasets_[dataset].model) return NoSources();
+  const Result<const dem::ElevationModel*> model = FindModel(dataset);
+  if (!model) return tl::unexpected(model.error());
   std::vector<std::uint8_t> filled(points.size());
-  Result<std::vector<float>> heights = datasets_[dataset].model->ReadPoints(points, datum, std::move(stop), filled);
+  Result<std::vector<float>> heights = (*model)->ReadPoints(points, datum, std::move(stop), filled);
   if (!heights) return tl::unexpected(std::move(heights).error());
   return PointHeights{*std::move(heights), std::move(filled)};
 }
@@ -164,8 +181,9 @@ Result<PointHeights> TilePipeline::ReadPoints(std::uint32_t dataset, std::span<c
 Result<std::vector<std::array<float, 3>>> TilePipeline::ReadNormals(std::uint32_t dataset,
                                                                     std::span<const dem::GeoPosition> points,
                                                                     std::stop_token stop) const {
-  if (!datasets_[dataset].model) return NoSources();
-  return SourceNormals(*datasets_[dataset].model, points, stop);
+  const Result<const dem::ElevationModel*> model = FindModel(dataset);
+  if (!model) return tl::unexpected(model.error());
+  return SourceNormals(**model, points, stop);
 }
 
 Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dataset, const TileRequest& request,
@@ -213,11 +231,17 @@ FindMesh TilePipeline::MeshFinder(std::uint32_t dataset, const DrawnSurface& sur
 Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                    std::span<const dem::GeoPosition> points, bool normals,
                                                    std::stop_token stop) const {
-  const Dataset& of = datasets_[dataset];
+  const Result<const Dataset*> found = Find(dataset);
+  if (!found) return tl::unexpected(found.error());
+  const Dataset& of = **found;
   if (const Result<void> has = CheckHasSurface(of, surface); !has) return tl::unexpected(has.error());
   const Result<int> level = LevelOf(surface, DeepestOf(of), of.error_fraction);
   if (!level) return tl::unexpected(level.error());
-  return tiler::ReadDrawnPoints(TilesOf(of), *level, points, normals, MeshFinder(dataset, surface, stop), stop);
+  std::vector<dem::GeoPosition> wrapped(points.begin(), points.end());
+  for (dem::GeoPosition& point : wrapped) {
+    if (std::abs(point.longitude) > 180) point.longitude = std::remainder(point.longitude, 360);
+  }
+  return tiler::ReadDrawnPoints(TilesOf(of), *level, wrapped, normals, MeshFinder(dataset, surface, stop), stop);
 }
 
 Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
@@ -225,7 +249,9 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
                                                               std::span<const dem::SightRay> rays,
                                                               const dem::SightOptions& options,
                                                               std::stop_token stop) const {
-  const Dataset& of = datasets_[dataset];
+  const Result<const Dataset*> found = Find(dataset);
+  if (!found) return tl::unexpected(found.error());
+  const Dataset& of = **found;
   if (!of.model && !surface) return NoSources();
   if (of.model) {
     if (const Result<void> bounded = CheckSamplesAlong(*of.model, rays); !bounded)
@@ -242,14 +268,16 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {
-  if (!datasets_[dataset].model) return NoSources();
-  return tiler::PlanArea(*datasets_[dataset].model, datasets_[dataset].error_fraction, area, max_samples);
+  const Result<const dem::ElevationModel*> model = FindModel(dataset);
+  if (!model) return tl::unexpected(model.error());
+  return tiler::PlanArea(**model, datasets_[dataset].error_fraction, area, max_samples);
 }
 
 Result<EncodedTile> TilePipeline::BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                             std::stop_token stop) const {
-  if (!datasets_[dataset].model) return NoSources();
-  return BuildAreaMesh(*datasets_[dataset].model, plan, area, std::move(stop));
+  const Result<const dem::ElevationModel*> model = FindModel(dataset);
+  if (!model) return tl::unexpected(model.error());
+  return BuildAreaMesh(**model, plan, area, std::move(stop));
 }
 
 }  // namespace terrace::tiler

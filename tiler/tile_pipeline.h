@@ -47,11 +47,12 @@ class TilePipeline {
   // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; heights, a hillshade, slopes or
   // contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset without sources, a
   // tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced,
-  // so the dataset has to be opened again. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // so the dataset has to be opened again. kInvalidArgument: a member of the request has a value that TileRequest does
+  // not permit. kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // ElevationModel::ReadPoints. kNotFound, here and in ReadNormals, PlanArea and BuildArea: the dataset has no
-  // sources.
+  // ElevationModel::ReadPoints, with its preconditions, as for all points below. kNotFound, here and in ReadNormals,
+  // PlanArea and BuildArea: there is no such dataset, or it has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
@@ -67,7 +68,8 @@ class TilePipeline {
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
 
-  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. kInvalidArgument: together the
+  // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
+  // ElevationModel::LookAlong. kInvalidArgument: together the
   // rays cross too many samples; or, over the sources' surface, an edit changes the ground below a ray or near it
   // (ElevationModel::LookAlong). Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
@@ -84,6 +86,10 @@ class TilePipeline {
   ByteCacheStats refinements() const { return refinements_->stats(); }
 
  private:
+  // kNotFound: there is no such dataset, or it has no sources.
+  Result<const Dataset*> Find(std::uint32_t dataset) const;
+  Result<const dem::ElevationModel*> FindModel(std::uint32_t dataset) const;
+
   Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
                                 const std::stop_token& stop) const;
 

@@ -40,6 +40,9 @@ RULES += [(re.compile(pattern), f"is a word of our own: the field says {word}") 
 # For the product's code. Headers and documents that proto writes may have exponents, as in JSON.
 EXPONENT = re.compile(r"^(?!proto/|tests/).*\.(?:cc|h)$"), re.compile(r"\{\w*:[^{}\" ]*[eg]\}")
 
+# For the libraries: a program that embeds them may have set a locale with decimal commas.
+LOCALE = re.compile(r"^(?:engine|proto|tiler|archive|bake)/.*\.(?:cc|h)$"), re.compile(r"\b(?:ato" r"f|str" r"to(?:d|f|ld)|sto" r"(?:d|f|ld))\(")
+
 
 def files():
     """Files that git tracks or would track; without git all files that were not built or downloaded."""
@@ -61,6 +64,8 @@ def findings(name, text):
                 yield f"{name}:{number}: '{match[0].strip()}' {message}"
         if EXPONENT[0].match(name) and (match := EXPONENT[1].search(line)):
             yield f"{name}:{number}: '{match[0]}' prints exponents such as 1e+06: use PlainNumber"
+        if LOCALE[0].match(name) and (match := LOCALE[1].search(line)):
+            yield f"{name}:{number}: '{match[0]}' depends on the locale of the program: use std::from_chars"
     if name.endswith("-inl.h"):  # included once for each instruction set
         if "HWY_TARGET_TOGGLE" not in text:
             yield f"{name}:1: a header of instruction sets without the guard of HWY_TARGET_TOGGLE"
@@ -78,6 +83,8 @@ class SelfTest(unittest.TestCase):
                 self.assertEqual(len(list(findings("a.cc", text))), 1)
         for text in ('Format("{:.3g} m", error_m);\n', 'Format("{0:g}", x);\n'):
             self.assertEqual([len(list(findings(name, text))) for name in ("server/a.cc", "proto/a.cc", "a.md")], [1, 0, 0], text)
+        text = "double x = std::sto" "d(text);\n"
+        self.assertEqual([len(list(findings(name, text))) for name in ("engine/core/a.cc", "server/a.cc")], [1, 0])
         self.assertEqual(len(list(findings("a.h", "int a;\n"))), 1)
         self.assertEqual(len(list(findings("a-inl.h", "#pragma once\n"))), 1)
 

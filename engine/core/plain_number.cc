@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 
 namespace terrace {
 namespace {
@@ -31,7 +31,8 @@ std::string PlainNumber(double value, int digits) { return WithDecimals(value, D
 std::string PlainNumberUp(double value, int digits) {
   const int decimals = DecimalsFor(value, digits);
   const std::string text = WithDecimals(value, decimals);
-  const double printed = std::strtod(text.c_str(), nullptr);
+  double printed = 0;
+  std::from_chars(text.data(), text.data() + text.size(), printed);  // strtod depends on the program's locale
   return printed < value ? WithDecimals(printed + std::pow(10.0, -decimals), decimals) : text;
 }
 

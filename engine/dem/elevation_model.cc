@@ -233,7 +233,7 @@ Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenFromCache(std::vecto
 
 Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFile> files, const DemOptions& options,
                                                                bool only_cached) {
-  TERRACE_CHECK(!files.empty());
+  if (files.empty()) return MakeError(ErrorCode::kInvalidArgument, "an elevation model needs a source");
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   std::vector<std::string> left_out;

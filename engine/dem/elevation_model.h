@@ -29,7 +29,8 @@ class ElevationModel {
  public:
   // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
   // raster; a raster that may have undeclared voids takes up to four passes. Errors name the file, the fault and the
-  // remedy.
+  // remedy. Relative paths are resolved at each use: the working directory must not change. The first call sets up GDAL
+  // for the whole process (docs/embedding.md).
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks the statistics of a

@@ -19,7 +19,7 @@ struct SightRay {
 };
 
 struct SightOptions {
-  // The share of the Earth's curvature that light in the air follows: 0 for straight lines, 0.13 for surveying.
+  // The share of the Earth's curvature that light in the air follows: 0 for straight lines, 0.13 for surveying. Finite.
   double refraction = 0;
 };
 

@@ -336,7 +336,8 @@ double ChordDeviation(const Ground& ground, double steps) {
   return kCurvatureMargin * (0.75 * diagonal * diagonal / geo::kSmallestRadius + span * span / 8 * diagonal);
 }
 
-// The larger of `known_m` and the largest difference along edges from the lattice surface, with ChordDeviation.
+// The larger of `known_m`, at samples, and the largest difference along edges from the lattice surface, plus
+// ChordDeviation.
 // `heights`: by vertex, of the surface that is linear in longitude and latitude; empty: it is not measured. `ecef`: by
 // vertex, of the flat triangles, which lie `beside_m` beside their places at most. In metres.
 //
@@ -360,7 +361,7 @@ double MeasureEdges(const TileSamples& samples, const std::vector<LatticePoint>&
   const LatticePoint step = ground.WidestStep(), narrowest = ground.NarrowestStep();
   const double deviation =
       ChordDeviation(ground, span) + meter.LargestChange({beside_m / narrowest.x, beside_m / narrowest.y});
-  double largest = std::max(deviation, known_m);
+  double largest = known_m + deviation;  // between the samples, inside of pieces
   ForEachEdge(triangles, places, meter, [&](std::uint32_t a, std::uint32_t b) {
     const double x = (places[a].x - places[b].x) * step.x, y = (places[a].y - places[b].y) * step.y;
     const double sagitta = kCurvatureMargin * (x * x + y * y) / (8 * geo::kSmallestRadius);

@@ -16,7 +16,8 @@ namespace terrace::proto {
 
 // Returns a bound on the distance between the two surfaces in metres, everywhere in the tile, both for the height
 // interpolated in longitude and latitude and for the flat triangles in ECEF. It is the larger of `at_samples_m`
-// (TileError::max_m) and a bound along the edges of all triangles; docs/decisions/0011-certified-error.md has the
+// (TileError::max_m) and a bound along the edges of all triangles, plus a bound on how far flat triangles leave the
+// lines between these positions; docs/decisions/0011-certified-error.md has the
 // proof.
 //
 // `positions`: of the tile's vertices, DecodePositions.

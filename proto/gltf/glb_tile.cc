@@ -1,8 +1,8 @@
 #include "proto/gltf/glb_tile.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -191,9 +191,11 @@ GltfMesh Describe(const GlbOptions& options) {
   if (!options.texture) gltf.material->color = kGroundColor;
   gltf.copyright = options.copyright;
   const auto add = [&gltf](std::string_view name, const std::optional<double>& error_m) {
-    if (error_m && std::isfinite(*error_m)) {
-      gltf.scene_extras.emplace_back(name, std::strtod(FormatErrorUp(*error_m).c_str(), nullptr));
-    }
+    if (!error_m || !std::isfinite(*error_m)) return;
+    const std::string text = FormatErrorUp(*error_m);
+    double printed = 0;
+    std::from_chars(text.data(), text.data() + text.size(), printed);  // strtod depends on the program's locale
+    gltf.scene_extras.emplace_back(name, printed);
   };
   add("maxError", options.max_error_m);
   add("certifiedError", options.certified_error_m);

@@ -56,6 +56,7 @@ std::optional<TilePipeline> Open(const CertifiedSource& source) {
   dataset.name = "tried";
   dataset.model = *std::move(opened);
   dataset.generation = dataset.model->fingerprint();
+  dataset.mesh_options = source.mesh_options;
   std::vector<Dataset> datasets;
   datasets.push_back(std::move(dataset));
   return std::optional<TilePipeline>(std::in_place, std::move(datasets));
@@ -145,6 +146,24 @@ TEST_P(CertifiedError, IsNeverBelowTheTruthAndNotMuchAboveIt) {
   Tried().tiles += tiles;
   Tried().above += above;
   Tried().ratios.insert(Tried().ratios.end(), ratios.begin(), ratios.end());
+}
+
+// Flat triangles are farthest from the Earth between samples and edges, and these tiles have nothing else.
+TEST(CertifiedErrorOfAFlatWorld, HoldsInsideOfTriangles) {
+  const dem::TempDir dir;
+  CertifiedSource source = FlatWorld(dir);
+  const auto pipeline = Open(source);
+  ASSERT_TRUE(pipeline.has_value());
+  const SampleIndex samples(std::move(source.samples));
+  TileRequest request;
+  for (std::int64_t y = 3; y < 8; ++y) {
+    for (std::int64_t x = 0; x < 16; ++x) {
+      request.key = {3, x, y};
+      const FetchedTile tile = FetchTile(*pipeline, request);
+      EXPECT_GE(tile.encoded.certified_error_m, TileSurface(tile.mesh, request.key).LargestError(samples))
+          << geo::ToString(request.key);
+    }
+  }
 }
 
 std::string NameOf(const testing::TestParamInfo<CertifiedCase>& tried) {

@@ -9,6 +9,7 @@
 #include "engine/dem/elevation_model.h"
 #include "tests/engine/dem/dem_fixture.h"
 #include "tests/tiler/source_samples.h"
+#include "tiler/mesh/mesh_options.h"
 
 namespace terrace::tiler {
 
@@ -16,6 +17,7 @@ struct CertifiedSource {
   std::vector<dem::DemFile> files;
   dem::DemOptions options = {};
   std::vector<Sample> samples = {};  // in the datum of the served heights
+  MeshOptions mesh_options = {};
 };
 
 struct CertifiedCase {
@@ -28,6 +30,9 @@ struct CertifiedCase {
 
 // Real rasters, each alone, and real mosaics.
 std::vector<CertifiedCase> RealCases();
+
+// The Earth as an ellipsoid, in meshes of few vertices.
+CertifiedSource FlatWorld(const dem::TempDir& dir);
 
 // Synthetic rasters.
 std::vector<CertifiedCase> WrittenCases();

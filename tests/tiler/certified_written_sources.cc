@@ -156,6 +156,19 @@ CertifiedCase AtTheSeam(const std::string& name, const dem::RasterSpec& grid, st
 
 }  // namespace
 
+CertifiedSource FlatWorld(const dem::TempDir& dir) {
+  CertifiedSource source;
+  dem::RasterSpec spec;
+  spec.width = 1440;
+  spec.height = 720;
+  spec.geo_transform = {-180, 0.25, 0, 90, 0, -0.25};
+  spec.value = [](int, int) { return 0; };
+  source.files.push_back({dem::WriteRaster(dir, spec, "flat.tif")});
+  source.samples = SamplesOf(source.files.back().path);
+  source.mesh_options = {tin::Criterion::kDataDependent, /*compact=*/true};
+  return source;
+}
+
 std::vector<CertifiedCase> WrittenCases() {
   std::vector<CertifiedCase> cases = {{"sixteen small rasters", ManySmallGrids}};
   for (const double feather : {0.0, 400.0, 3000.0}) {

@@ -225,6 +225,58 @@ TEST(TilePipeline, RefusesWhatIsNotThere) {
   EXPECT_EQ(SamplePipeline().Build(request, {}).error().code, ErrorCode::kNotFound);
 }
 
+TEST(TilePipeline, RefusesValuesThatRequestsMayNotHave) {
+  const auto refusal = [](TileFormat format, auto&& change) {
+    TileRequest request;
+    request.format = format;
+    request.key = {1, 1, 1};
+    change(request);
+    const auto tile = SamplePipeline().Build(request, {});
+    return tile ? "a tile" : std::string(ToString(tile.error().code)) + " " + tile.error().message;
+  };
+  const auto begins = [](const std::string& text, const char* with) { EXPECT_EQ(text.rfind(with, 0), 0u) << text; };
+  for (const TileFormat format : {TileFormat::kQuantizedMesh, TileFormat::kHeightPng, TileFormat::kHillshade,
+                                  TileFormat::kSlope, TileFormat::kContours, TileFormat::kGeodeticImagery}) {
+    for (const geo::TileKey& key : {geo::TileKey{-1, 0, 0}, {1, 4, 0}, {1, 0, 2}, {1, -1, 0}, {64, 0, 0}}) {
+      begins(refusal(format, [&](TileRequest& request) { request.key = key; }), "not_found");
+    }
+  }
+  for (const int step : {-17, 25}) {
+    begins(refusal(TileFormat::kGlb, [&](TileRequest& request) { request.error_step = step; }),
+           "invalid_argument error_step");
+  }
+  for (const int side : {0, -1, 100, 1024}) {
+    begins(refusal(TileFormat::kHeightPng, [&](TileRequest& request) { request.side_px = side; }),
+           "invalid_argument side_px");
+  }
+  begins(refusal(TileFormat::kContours, [](TileRequest&) {}), "invalid_argument interval_cm");
+  begins(
+      refusal(TileFormat::kHillshade, [](TileRequest& request) { request.map.picture = proto::PictureFormat::kJpeg; }),
+      "invalid_argument picture");
+}
+
+TEST(TilePipeline, HasNoOtherDatasets) {
+  const TilePipeline& pipeline = SamplePipeline();
+  const auto number = static_cast<std::uint32_t>(pipeline.datasets().size());
+  EXPECT_EQ(pipeline.ReadPoints(number, {}, dem::HeightDatum::kEllipsoid, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(pipeline.ReadNormals(number, {}, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(pipeline.ReadDrawnPoints(number, {}, {}, false, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(pipeline.LookAlong(number, {}, {}, {}, {}).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(pipeline.PlanArea(number, {}, 1).error().code, ErrorCode::kNotFound);
+  EXPECT_EQ(pipeline.BuildArea(number, {}, {}, {}).error().code, ErrorCode::kNotFound);
+}
+
+TEST(TilePipeline, DrawnPointsMayBeATurnAway) {
+  const DrawnSurface surface;
+  const std::vector<dem::GeoPosition> points = {{-84.2, 36.3}, {275.8, 36.3}, {-444.2, 36.3}};
+  const auto heights = SamplePipeline().ReadDrawnPoints(0, surface, points, false, {});
+  ASSERT_TRUE(heights) << heights.error().message;
+  EXPECT_NEAR(heights->heights[1], heights->heights[0], 1e-3);
+  EXPECT_NEAR(heights->heights[2], heights->heights[0], 1e-3);
+  EXPECT_EQ(SamplePipeline().ReadDrawnPoints(0, {.level = -1}, points, false, {}).error().code,
+            ErrorCode::kInvalidArgument);
+}
+
 TEST(TilePipeline, StopsWhenNobodyWaits) {
   std::stop_source stop;
   stop.request_stop();

@@ -30,6 +30,18 @@ using Clock = std::chrono::steady_clock;
 // Larger distances occur only for triangles that span half of the Earth and collapse into a line.
 constexpr double kMaxSag_m = 1e6;
 
+Result<void> CheckArea(const AreaRequest& area) {
+  const bool has_box = area.west >= -180 && area.west <= 180 && area.west < area.east && area.east <= area.west + 360 &&
+                       area.south >= -90 && area.south < area.north && area.north <= 90;
+  if (!has_box) {
+    return MakeError(ErrorCode::kInvalidArgument,
+                     "bbox: {},{},{},{} is not west,south,east,north in degrees, with west < east <= west + 360",
+                     area.west, area.south, area.east, area.north);
+  }
+  if (std::isfinite(area.error_m) && area.error_m > 0) return {};
+  return MakeError(ErrorCode::kInvalidArgument, "error: {} is not a number of metres above 0", area.error_m);
+}
+
 // The part of the area within the model's bounds. `step`: degrees between nodes of the finest lattice; gaps and parts
 // narrower than that do not count. kInvalidArgument: there is no part, or there are two.
 Result<AreaRequest> Clip(const AreaRequest& area, const dem::GeoBounds& bounds, double step) {
@@ -95,7 +107,7 @@ NodeCounts NodesAt(const geo::Lattice& lattice, const AreaRequest& area) {
 // The limits that a number of nodes exceeds, for a message; empty: none.
 std::string ExceededLimits(const NodeCounts& nodes, std::size_t max_samples) {
   std::string limits;
-  if (nodes.samples() > static_cast<std::int64_t>(max_samples)) {
+  if (static_cast<std::uint64_t>(nodes.samples()) > max_samples) {
     limits = fmt::format("more than max_mesh_samples of this server ({})", max_samples);
   }
   if (std::max(nodes.columns, nodes.rows) > tin::HeightField::kMaxSide) {
@@ -228,6 +240,7 @@ bool IsCovered(const dem::ElevationModel& model, const AreaRequest& area, int le
 
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples) {
+  if (const Result<void> valid = CheckArea(area); !valid) return tl::unexpected(valid.error());
   const Result<AreaRequest> clipped =
       Clip(area, model.info().bounds, model.LatticeOf(model.max_source_level()).StepDegrees());
   if (!clipped) return tl::unexpected(clipped.error());

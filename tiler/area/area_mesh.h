@@ -21,7 +21,7 @@ enum class AreaCoordinates : std::uint8_t {
 // <= 90.
 struct AreaRequest {
   double west = 0, south = 0, east = 0, north = 0;
-  double error_m = 1;
+  double error_m = 1;  // finite, > 0
   proto::MeshFileFormat format = proto::MeshFileFormat::kGlb;
   AreaCoordinates coordinates = AreaCoordinates::kEnu;
 };
@@ -36,8 +36,9 @@ struct AreaPlan {
   dem::GeoPosition centre;  // of the clipped area: the origin of kEnu
 };
 
-// kInvalidArgument, with a message for the client: the area does not intersect the model, or does so in two parts (one
-// east and one west of the antimeridian), or needs more than `max_samples`.
+// kInvalidArgument, with a message for the client: a value that AreaRequest does not permit; the area does not
+// intersect the model, or does so in two parts (one east and one west of the antimeridian), or needs more than
+// `max_samples`.
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 

@@ -5,7 +5,7 @@
 namespace terrace::tiler {
 
 Result<int> LevelOf(const DrawnSurface& surface, int max_level, double error_fraction) {
-  if (surface.level && *surface.level > max_level) {
+  if (surface.level && (*surface.level < 0 || *surface.level > max_level)) {
     return MakeError(ErrorCode::kInvalidArgument, "level: the dataset has levels from 0 to {}", max_level);
   }
   if (surface.level) return *surface.level;

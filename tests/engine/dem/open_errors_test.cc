@@ -25,6 +25,10 @@ void ExpectRefused(const std::string& path, const std::vector<std::string>& part
   }
 }
 
+TEST(OpenErrors, NameThatThereIsNoSource) {
+  EXPECT_EQ(ElevationModel::Open(std::vector<DemFile>{}).error().code, ErrorCode::kInvalidArgument);
+}
+
 TEST(OpenErrors, NameWhatIsNoFile) {
   const TempDir dir;
   ExpectRefused(dir.File("none.tif"), {"No such file"});

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -39,8 +40,7 @@ class AreaMeshTest : public testing::Test {
   }
   std::string Refusal(const AreaRequest& area, std::size_t max_samples = kMany) const {
     const auto plan = PlanArea(*model_, 0.5, area, max_samples);
-    EXPECT_FALSE(plan);
-    if (plan) return {};
+    if (plan) return "no refusal";
     EXPECT_EQ(plan.error().code, ErrorCode::kInvalidArgument);
     return plan.error().message;
   }
@@ -48,6 +48,20 @@ class AreaMeshTest : public testing::Test {
   std::unique_ptr<dem::ElevationModel> model_;
   AreaRequest area_;
 };
+
+TEST_F(AreaMeshTest, RefusesWhatIsNoArea) {
+  for (const auto member : {&AreaRequest::west, &AreaRequest::south, &AreaRequest::east, &AreaRequest::north}) {
+    AreaRequest area = area_;
+    area.*member = NAN;
+    EXPECT_EQ(Refusal(area).rfind("bbox", 0), 0u);
+  }
+  for (const double error_m : {double{NAN}, 0.0, -1.0, HUGE_VAL}) {
+    AreaRequest area = area_;
+    area.error_m = error_m;
+    EXPECT_EQ(Refusal(area).rfind("error", 0), 0u);
+  }
+  EXPECT_TRUE(PlanArea(*model_, 0.5, area_, SIZE_MAX));
+}
 
 struct ObjMesh {
   std::vector<geo::Vec3> vertices;
