@@ -24,15 +24,27 @@ Box BoxAround(std::span<const TrackPiece> pieces) {
   return box;
 }
 
-// Whether an edit changes the ground near a ray.
+// Whether an edit whose box lies below a ray, or within 125 m of it, changes the ground.
 bool IsEdited(const EditSet& edits, std::span<const TrackPiece> pieces) {
-  for (const TrackPiece& piece : pieces) {
-    for (const std::size_t which : edits.Find(BoxAround({&piece, 1}))) {
+  constexpr int kParts = 64;
+  static_assert(TrackPiece::kMaxLength / kParts == 125);
+  const auto are_in = [&edits](const TrackPiece& piece) {
+    return std::ranges::any_of(edits.Find(BoxAround({&piece, 1})), [&edits](std::size_t which) {
       const Edit& edit = edits.edits()[which];
-      if (edit.changes_heights() || edit.op == EditOp::kHole) return true;
+      return edit.changes_heights() || edit.op == EditOp::kHole;
+    });
+  };
+  return std::ranges::any_of(pieces, [&](const TrackPiece& piece) {
+    if (!are_in(piece)) return false;
+    for (int k = 0; k < kParts; ++k) {
+      const double first = double{k} / kParts, last = double{k + 1} / kParts;
+      TrackPiece part;
+      part.longitude = piece.longitude.Part(first, last);
+      part.latitude = piece.latitude.Part(first, last);
+      if (are_in(part)) return true;
     }
-  }
-  return false;
+    return false;
+  });
 }
 
 }  // namespace

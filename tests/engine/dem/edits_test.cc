@@ -114,6 +114,8 @@ TEST_F(TerrainEdits, AreNeverLeftOutOfALineOfSight) {
   EXPECT_TRUE(above_edit.error().message.find("surface=served") != std::string::npos) << above_edit.error().message;
   ASSERT_TRUE(beside.has_value());
   EXPECT_TRUE(beside->front().is_visible);
+  // Past the north-eastern corner, which lies in the box around the ray.
+  EXPECT_TRUE(source->LookAlong(std::array{SightRay{{10.27, 50.24, 1000}, {10.24, 50.27, 1000}}}, {}));
 }
 
 TEST_F(TerrainEdits, ReplaceTakesTheHeightsOfAnotherFile) {
