@@ -39,8 +39,8 @@ struct UnitOptions {
   std::uint64_t key = 0;    // UnitEntry::key; kept in the file
 };
 
-// Creates place/UnitPath(name), and its folders. Tiles wait in a file beside the target; memory holds 80 bytes for
-// each.
+// Creates place/UnitPath(name), and its folders. Tiles wait in an unnamed file in the folder of the target, or in
+// TMPDIR if the place is a bucket (SpoolFile); memory holds 80 bytes for each.
 Result<std::unique_ptr<UnitWriter>> CreateUnit(const std::string& place, const std::string& name,
                                                const UnitOptions& options);
 

@@ -58,8 +58,8 @@ struct Dataset {
   // Identifies the dataset and its contents in caches: a hash of contents, of all options that change bytes, and of the
   // encoders. 0: TilePipeline takes the dataset's number, which suffices if no other pipeline shares its cache.
   std::uint64_t generation = 0;
-  // The same without edits; 0: there are none. Caches of tiles and refinements are keyed by cache_generation() and by
-  // TileEditsHash, so that tiles that no edit touches stay.
+  // The same without edits; 0: there are none. Caches are keyed by cache_generation() and by a hash of the edits, so
+  // that tiles that no edit touches stay: TileEditsHash for tiles, ElevationModel::EditsHash for refinements.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`

@@ -226,8 +226,8 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
                                               double* error_m) const {
   // Heights of a replacement, without its floor, so that its voids show what is below. Features with the same source
   // and datum share them.
-  std::map<std::pair<std::size_t, HeightDatum>, ReplacedHeights> known;
-  const auto replaced = [&](const Edit& edit) -> Result<const ReplacedHeights*> {
+  std::map<std::pair<std::size_t, HeightDatum>, ReplacementHeights> known;
+  const auto replacement = [&](const Edit& edit) -> Result<const ReplacementHeights*> {
     const std::pair wanted(edit.replacement, edit.TargetDatum(datum.datum));
     if (const auto found = known.find(wanted); found != known.end()) return &found->second;
     const Impl& other = *replacements[edit.replacement]->impl_;
@@ -235,7 +235,7 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
     auto read =
         other.ReadGrids(node_grid, window, wanted.second, edit.source, stop, error_m != nullptr ? &readings : nullptr);
     if (!read) return tl::unexpected(std::move(read).error());
-    ReplacedHeights result{*std::move(read), 0};
+    ReplacementHeights result{*std::move(read), 0};
     if constexpr (std::is_same_v<NodeGrid, geo::Lattice>) {
       if (error_m != nullptr) {
         result.void_cells = other.VoidCells(node_grid, window, readings);
@@ -251,7 +251,7 @@ Result<void> ElevationModel::Impl::ApplyEdits(const NodeGrid& node_grid, const N
     }
     return &known.emplace(wanted, std::move(result)).first->second;
   };
-  return edits->Apply(node_grid, window, which, datum, heights, replaced, stop, error_m);
+  return edits->Apply(node_grid, window, which, datum, heights, replacement, stop, error_m);
 }
 
 template std::vector<std::size_t> ElevationModel::Impl::EditsAt(const geo::Lattice&, const NodeWindow&) const;

@@ -114,8 +114,8 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for the edges of other tiles that meet at this tile's corners, without this tile's own edges. By corner
-  // (south-west, south-east, north-east, north-west); one element for each such edge, for the nodes between its ends.
+  // The same for the edges that end at this tile's corners and are not its own. By corner (south-west, south-east,
+  // north-east, north-west); one element for each such edge, for its nodes without the two ends.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

@@ -88,8 +88,8 @@ struct Edit {
   EditDatum datum = EditDatum::kNone;  // of flatten, slope, carve and raise
   // Added to orthometric heights. Null until the sources are known, and for heights above the ellipsoid.
   std::shared_ptr<const EditUndulations> undulations;
-  // Whether the edit's heights, or those of its source, count from the same geoid as heights in kSource or in
-  // kOrthometric do wherever the edit may reach. ElevationModel sets it.
+  // Whether HeightDatum::kSource (or kOrthometric) has, everywhere within the edit's reach, the zero that the edit's
+  // heights, or those of its replacement, are stated from. ElevationModel sets it.
   bool is_in_source_datum = false, is_in_orthometric = false;
   double offset_m = 0;                                       // of offset
   double error_m = std::numeric_limits<double>::infinity();  // of precision
@@ -120,8 +120,8 @@ struct Edit {
     return op == EditOp::kFlatten || op == EditOp::kSlope || op == EditOp::kCarve || op == EditOp::kRaise;
   }
   bool changes_heights() const { return op <= EditOp::kRaise; }
-  // The datum of the edit's target when it changes heights in a datum: the same if the target counts from its zero
-  // wherever the edit may reach, else the ellipsoid, from which the target is then converted.
+  // The datum in which the target is computed when heights in `of_heights` are edited: `of_heights` itself if the edit
+  // is stated in it throughout its reach. Else the ellipsoid; the caller then converts the target to `of_heights`.
   HeightDatum TargetDatum(HeightDatum of_heights) const {
     const bool is_same = op == EditOp::kOffset || (of_heights == HeightDatum::kSource && is_in_source_datum) ||
                          (of_heights == HeightDatum::kOrthometric && is_in_orthometric);

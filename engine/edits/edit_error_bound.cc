@@ -28,7 +28,7 @@ EditErrorBound::EditErrorBound(const NodeWindow& window, double error_m) : windo
 }
 
 void EditErrorBound::Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
-                         const ReplacedHeights* replacement) {
+                         const ReplacementHeights* replacement) {
   const auto stride = static_cast<std::size_t>(part.columns);
   for (int j = 0; j + 1 < part.rows; ++j) {
     for (int i = 0; i + 1 < part.columns; ++i) {

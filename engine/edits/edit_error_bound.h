@@ -6,9 +6,10 @@
 // the target and its bilinear surface,
 //   S' - h' = (1 - w)(S - h) + bilinear((w_node - w)(t - s)) + w (bilinear(t) - t)
 //   |S' - h'| <= (1 - w0) e + (w1 - w0) d + w1 tau.
-// For an offset t - s is constant. For carving and raising max(0, +-(s - t)) takes the place of t - s; where it changes
-// its sign in the cell, w1 d is added, and e is not reduced. Where a replacement has no height at a corner of the cell,
-// or voids in it, w0 is 0, because samples may keep their heights.
+// For offsets, where t - s is constant, for carving and for raising, e is not reduced: the first term is e. For carving
+// and raising max(0, +-(s - t)) takes the place of t - s; where s - t changes its sign in the cell, w1 d is added.
+// Where a replacement has no height at a corner of the cell, or voids in it, w0 is 0, because samples may keep their
+// heights.
 #pragma once
 
 #include <cstdint>
@@ -22,7 +23,7 @@
 namespace terrace::dem {
 
 // Another source's heights at the nodes of a window; NaN where it has none.
-struct ReplacedHeights {
+struct ReplacementHeights {
   std::vector<float> heights;
   double error_m = 0;  // of the surface between them, to that source's samples
   // By cell of the window, row by row from the south: 1 where samples of the source may be voids. Empty: nowhere.
@@ -43,7 +44,7 @@ class EditErrorBound {
 
   // `part`: the nodes, relative to the window. `diagonal_m`: of a cell. `replacement`: of a `replace`, else null.
   void Add(const Edit& edit, const NodeWindow& part, std::span<const EditedNode> nodes, double diagonal_m,
-           const ReplacedHeights* replacement);
+           const ReplacementHeights* replacement);
 
   double bound() const;
 

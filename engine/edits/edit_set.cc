@@ -79,7 +79,7 @@ bool EditSet::Any(const Box& degrees) const {
 
 template <typename NodeGrid>
 Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                            const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replaced,
+                            const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replacement,
                             const std::stop_token& stop, double* error_m) const {
   if (which.empty()) return {};
   const WindowAxes axes(grid, window);
@@ -90,9 +90,9 @@ Result<void> EditSet::Apply(const NodeGrid& grid, const NodeWindow& window, std:
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
     if (!edit.changes_heights()) continue;
-    const ReplacedHeights* other = nullptr;
+    const ReplacementHeights* other = nullptr;
     if (edit.op == EditOp::kReplace) {
-      auto read = replaced(edit);
+      auto read = replacement(edit);
       if (!read) return tl::unexpected(std::move(read).error());
       other = *read;
     }
@@ -143,7 +143,7 @@ template Result<void> EditSet::Apply(const geo::MercatorGrid&, const NodeWindow&
                                      const std::stop_token&, double*) const;
 
 double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, const EditedDatum& datum,
-                        double height, const std::function<double(const Edit&)>& replaced, EditRows& rows) const {
+                        double height, const std::function<double(const Edit&)>& replacement, EditRows& rows) const {
   bool is_in_hole = false;  // as of tiles, whatever other edits say
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
@@ -163,7 +163,7 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
       continue;
     }
     double target = edit.op == EditOp::kOffset    ? edit.offset_m
-                    : edit.op == EditOp::kReplace ? replaced(edit)
+                    : edit.op == EditOp::kReplace ? replacement(edit)
                                                   : row->second.TargetAt(point.x, place, datum.datum);
     if (IsConverted(edit, datum)) target -= datum.undulations.front();
     if (!std::isnan(target)) height = Edited(edit.op, height, target, weight);
@@ -173,7 +173,7 @@ double EditSet::ApplyAt(const GeoPosition& position, std::span<const std::size_t
 }
 
 HeightRange EditSet::Extended(HeightRange range, std::span<const std::size_t> which,
-                              const std::function<HeightRange(const Edit&)>& replaced) const {
+                              const std::function<HeightRange(const Edit&)>& replacement) const {
   for (const std::size_t index : which) {
     const Edit& edit = edits_[index];
     if (!edit.changes_heights()) continue;
@@ -182,7 +182,7 @@ HeightRange EditSet::Extended(HeightRange range, std::span<const std::size_t> wh
       range.max += std::max(edit.offset_m, 0.0);
       continue;
     }
-    const HeightRange target = edit.op == EditOp::kReplace ? replaced(edit) : HeightRange{edit.low_m, edit.high_m};
+    const HeightRange target = edit.op == EditOp::kReplace ? replacement(edit) : HeightRange{edit.low_m, edit.high_m};
     // Carving only lowers, raising only raises.
     if (edit.op != EditOp::kRaise) range.min = std::min(range.min, target.min);
     if (edit.op != EditOp::kCarve) range.max = std::max(range.max, target.max);

@@ -23,9 +23,9 @@
 
 namespace terrace::dem {
 
-struct ReplacedHeights;
+struct ReplacementHeights;
 // The heights that an edit takes from its source. The result stays valid until Apply returns.
-using ReadReplacement = std::function<Result<const ReplacedHeights*>(const Edit&)>;
+using ReadReplacement = std::function<Result<const ReplacementHeights*>(const Edit&)>;
 
 // The row that each edit computed last, by the edit's number. Points on one parallel share it.
 using EditRows = std::unordered_map<std::size_t, EditRow>;
@@ -50,26 +50,26 @@ class EditSet {
   // Whether Find would find any; faster if it would find many.
   bool Any(const Box& degrees) const;
 
-  // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. There an
-  // edit that is stated in the heights' datum leaves the stated height. `NodeGrid`: geo::Lattice or geo::MercatorGrid.
-  // `replaced`: heights in the datum if the edit is stated in it, else above the ellipsoid. `error_m`, unless null: of
-  // heights above the ellipsoid, an upper bound of the distance between the surface through the tile's nodes, all
-  // finite, and the samples of the sources. It is replaced by the bound for the edited surface and the edited samples.
-  // The window then has a halo of one, which does not count. Errors: kCancelled.
+  // Edits heights of nodes. NaN stays NaN except where an edit sets the height itself, with a weight of 1. With
+  // that weight, an edit that is stated in the heights' datum makes the height exactly the stated one. `NodeGrid`:
+  // geo::Lattice or geo::MercatorGrid. `replacement`: heights in the datum if the edit is stated in it, else above the
+  // ellipsoid. `error_m`, unless null: of heights above the ellipsoid, an upper bound of the distance between the
+  // surface through the tile's nodes, all finite, and the samples of the sources. It is replaced by the bound for the
+  // edited surface and the edited samples. The window then has a halo of one, which does not count. Errors: kCancelled.
   template <typename NodeGrid>
   Result<void> Apply(const NodeGrid& grid, const NodeWindow& window, std::span<const std::size_t> which,
-                     const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replaced,
+                     const EditedDatum& datum, std::span<float> heights, const ReadReplacement& replacement,
                      const std::stop_token& stop, double* error_m = nullptr) const;
 
   // The same for one position; `datum` has one undulation or none. `height` and the result: NaN if there is none, as in
-  // holes. `replaced`: the height of a replacement at this position. `rows`: kept from one position to the next, empty
-  // at first.
+  // holes. `replacement`: the height of a replacement at this position. `rows`: kept from one position to the next,
+  // empty at first.
   double ApplyAt(const GeoPosition& position, std::span<const std::size_t> which, const EditedDatum& datum,
-                 double height, const std::function<double(const Edit&)>& replaced, EditRows& rows) const;
+                 double height, const std::function<double(const Edit&)>& replacement, EditRows& rows) const;
 
-  // A range of heights after the edits. `replaced`: the range of a replacement.
+  // A range of heights after the edits. `replacement`: the range of a replacement.
   HeightRange Extended(HeightRange range, std::span<const std::size_t> which,
-                       const std::function<HeightRange(const Edit&)>& replaced) const;
+                       const std::function<HeightRange(const Edit&)>& replacement) const;
 
   // What the edits ask of the mesh of a window of nodes without a halo (engine/common/dem_types.h). Empty members if
   // they ask nothing.

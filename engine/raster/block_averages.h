@@ -1,4 +1,5 @@
-// Averages of blocks of samples, accumulated row by row. The order of summation is fixed, so results are bit-identical.
+// Averages of blocks of samples in memory, accumulated row by row; raster_layout.h reads averages of a raster, and
+// declares GridAxis and GridWindow. The order of summation is fixed, so results are bit-identical.
 #pragma once
 
 #include <algorithm>

@@ -10,8 +10,8 @@
 //                        else the cut with less E^2 / S is taken; if equal, the better shape; if equal too, p-w.
 // Edges that have come into the outline in place of other ones are further out.
 // With FitMeasure::kNormals, S is squared once more, and the thresholds do not depend on how the edge came into the
-// outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. A cut
-// that makes the shape worse rarely saves vertices in the end, and each cut costs two more scans of triangles.
+// outline. With q = 0 the fit alone decides, as in the paper. The paper compares E alone and has one threshold. Taking
+// p-w where it makes the shape worse rarely saves vertices in the end, and costs two more scans of triangles.
 // Therefore u-v is kept more readily than p-w is taken, and most readily at edges further out from p: there are three
 // thresholds. All of this
 // together saves 3 to 6 % of the vertices (docs/decisions/0007).

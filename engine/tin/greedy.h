@@ -37,10 +37,9 @@ enum class Side : std::uint8_t {
 //   m = |(h_a (b - k) + h_b (k - a)) / (b - a) - h_k| + sagitta_m (k - a) (b - k)
 // evaluated in double in exactly this form. Its error is
 //   scale * min(max((m + padding_m) * weight, m + padding_m + step_m), kMaxBorderWeight * m).
-// For samples with a limit (sample_limits.h) it is
-//   scale * W(max((m + p) * weight, m + p + step_m))  with p = rounding * |h_b - h_a| / (b - a)
-// if m > 0, where W is SampleLimits::WeightedError. In a field with limits, a sample without a
-// limit has the error scale * W(min(...)), with the min(...) above; W puts it first if it is forced.
+// In a field with limits (sample_limits.h), let W be SampleLimits::WeightedError. A sample with a limit and m > 0 has
+//   scale * W(max((m + p) * weight, m + p + step_m))  with p = rounding * |h_b - h_a| / (b - a).
+// All other samples have scale * W(the min above). W puts forced samples first.
 // `weight` makes room for rounding that grows with the error, `padding_m` and `step_m` for rounding by fixed amounts,
 // and p for rounding of positions along the sample's own chord.
 // The limit kMaxBorderWeight keeps a border with many cliffs from taking every sample. The error depends on the samples

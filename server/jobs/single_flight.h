@@ -6,9 +6,9 @@
 // Each client that waits for a flight has a job for it in the pool's queue. The first of these jobs whose turn comes
 // does the build: no request waits longer because another client asked before.
 //
-// A flight is stopped when its last waiter leaves, which is at its deadline at the latest, or when the pool is
-// cancelled. Its jobs are then removed from the queue. A stopped flight accepts no further waiters; the next request
-// starts a new one.
+// A flight is stopped when its last waiter leaves, which is at its deadline at the latest; its jobs are then removed
+// from the queue. It is also stopped when the pool is cancelled; its jobs then run and end at once. A stopped flight
+// accepts no further waiters; the next request starts a new one.
 //
 // Thread-safe, with one condition: a coroutine that waits in Join runs on a single thread (or a strand).
 #pragma once
@@ -53,8 +53,9 @@ class SingleFlight {
 
   // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `terms`. `name` is
   // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the
-  // flight's job. kCancelled: the deadline passed, or the awaiting coroutine was cancelled. kUnavailable: the
-  // pool is cancelled. Otherwise the result of `build`.
+  // flight's job. kCancelled: the deadline passed, the awaiting coroutine was cancelled, or the pool
+  // was cancelled before `build` began. kUnavailable: the pool was cancelled before this call. Otherwise the result of
+  // `build`.
   asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobTerms terms);
 
   std::size_t in_flight() const {

@@ -36,8 +36,8 @@ class HeightField {
   const float* Row(int y) const { return heights_.data() + static_cast<std::size_t>(y) * stride_; }
 
   // Distance between rows, in samples. Loads of 16 samples that begin in any row but the last stay inside the memory.
-  // Fields with fewer than 16 columns or 8 rows have padding after the last row, so that loads in up to eight rows
-  // beyond it stay inside, too. The values of the padding are arbitrary.
+  // In fields with fewer than 16 columns or 8 rows they may also begin in the last row, and in up to eight rows after
+  // it: there is padding of arbitrary values.
   int stride() const { return static_cast<int>(stride_); }
 
   // A power of two, in metres; all heights are multiples of it. 0 if none is known. Sums of heights and their products

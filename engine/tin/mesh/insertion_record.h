@@ -13,10 +13,14 @@ struct InsertionRecord {
   static constexpr Index kNever = static_cast<Index>(-1);
   static constexpr Index kOpen = static_cast<Index>(Index{1} << (8 * sizeof(Index) - 1));
 
-  // By insertion: the number of triangles made; with kOpen added if the ring is open and has one vertex more.
+  // By insertion: the number n of triangles made. The ring has n vertices. If the inserted sample lies on the border of
+  // the field, the ring is open and has n + 1 vertices, and kOpen is added.
   std::vector<Index> sizes;
-  std::vector<Index> rings;    // the rings, one after the other; vertex 4 + i is that of insertion i
-  std::vector<Index> removed;  // by triangle, those of the field's corners first: the insertion that removed it
+  // The vertices of all rings, insertion after insertion. Vertices 0 to 3 are the corners of the field, 4 + i is the
+  // sample of insertion i.
+  std::vector<Index> rings;
+  // By triangle in the order made, the two that the field begins with first: the insertion that removed it, or kNever.
+  std::vector<Index> removed;
 
   friend bool operator==(const InsertionRecord&, const InsertionRecord&) = default;
 };

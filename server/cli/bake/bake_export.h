@@ -11,7 +11,8 @@
 
 namespace terrace::cli {
 
-// kInvalidArgument: something is there, or the last part of the path is "." or "..".
+// kInvalidArgument: something is there other than an empty folder for the form `folder`, or the last part of the path
+// is "." or "..".
 Result<void> CheckExportPlace(const std::string& out, const std::string& form);
 
 // Whether the `out` of the arguments was made from `baked` by a process that ended before it had removed `baked`.

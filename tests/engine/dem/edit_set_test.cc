@@ -119,7 +119,7 @@ TEST(EditSet, StopsBetweenRows) {
   const double step = lattice.StepDegrees();
   const NodeWindow window{static_cast<std::int64_t>(190 / step) - 2, static_cast<std::int64_t>(140 / step) - 2, 5, 5};
   const std::vector<std::size_t> which = {0};
-  const ReadReplacement none = [](const Edit&) -> Result<const ReplacedHeights*> { return nullptr; };
+  const ReadReplacement none = [](const Edit&) -> Result<const ReplacementHeights*> { return nullptr; };
   std::vector<float> heights(25, 0);
   std::stop_source stop;
   ASSERT_TRUE(edits.Apply(lattice, window, which, {}, heights, none, stop.get_token()).has_value());
