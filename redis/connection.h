@@ -36,7 +36,7 @@ using Command = std::vector<std::string>;
 class Connection {
  public:
   // Connects, authenticates, selects the database. kUnavailable: there is no server, or it is not a Redis.
-  // kInvalidArgument: the password or the database is refused, or ca_file cannot be read.
+  // kInvalidArgument: as Refusal, or ca_file cannot be read.
   static Result<std::unique_ptr<Connection>> Open(const Address& address, const ConnectionOptions& options);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
@@ -48,12 +48,14 @@ class Connection {
   Result<std::vector<Reply>> CallAll(std::span<const Command> commands);
   // Returns the reply if it is not an error. Errors: as CallAll; an error reply is converted by Refusal.
   Result<Reply> Call(const Command& command);
-  // An error reply to a command as an Error. kInvalidArgument: the password or the user's rights. kOverloaded: Redis is
-  // full. kUnavailable: it is loading, a read-only replica, or anything else.
+  // An error reply to a command as an Error. kInvalidArgument: what the user has to correct: the password, rights, the
+  // database, a Redis in protected or cluster mode or too old, a key of another type. kOverloaded: Redis is full.
+  // kUnavailable: it is loading, a read-only replica, or anything else.
   Error Refusal(const std::string& command, const ReplyView& error) const;
 
   bool is_open() const { return is_open_; }
-  // Whether the server is known to have closed the connection. A peer that vanished without closing it is not noticed.
+  // Whether the connection cannot be used any more: a call failed, the server has closed it or sent something unasked.
+  // A peer that vanished without closing it is not noticed.
   // Does not wait.
   bool HasEnded() { return !is_open_ || socket_.HasEnded(); }
   // From any thread: the current call and all later ones fail at once with kUnavailable.

@@ -21,7 +21,7 @@ class ReplyView {
   Kind kind() const;
   bool is_error() const { return kind() == Kind::kError; }
   bool is_nil() const { return kind() == Kind::kNil; }
-  std::string_view text() const;               // of strings, states and errors; bytes, not text, if those were stored
+  std::string_view text() const;               // of strings, status replies and errors; the bytes that were stored
   std::int64_t integer() const;                // of integers; else 0
   std::size_t size() const;                    // of arrays; else 0
   ReplyView operator[](std::size_t at) const;  // beyond the end: nil

@@ -1,7 +1,8 @@
 // The addresses of a host, looked up within a deadline.
 //
 // The system's resolver has time-outs of its own, of half a minute and more. Therefore a separate thread calls it, and
-// the caller waits only until its deadline. Then it gets the addresses that an earlier look-up found.
+// the caller waits only until its deadline; only half of that time if an earlier look-up found addresses, which it gets
+// then.
 #pragma once
 
 #include <chrono>

@@ -187,7 +187,7 @@ struct TileHeights {
   std::vector<float> heights;  // stride * stride
   // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
   // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
-  // it bounds the distance from the blended heights as well.
+  // it bounds the distance from the blended heights as well. Where edits apply, the samples count after the same edits.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

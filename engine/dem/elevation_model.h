@@ -97,8 +97,8 @@ class ElevationModel {
 
   // Looks along rays over the surface of ReadPoints, but without edits and without rounding; one answer for each ray.
   // Heights of rays are above the ellipsoid. Precondition: finite positions on Earth, rays no longer than
-  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: an edit that changes heights or cuts a hole lies
-  // below a ray or, with the box around it, within 125 m of the ray.
+  // kMaxSightLength. Errors: those of ReadPoints; kInvalidArgument: the box around an edit that changes heights or
+  // cuts a hole lies below a ray or close to it. Boxes more than 125 m from the ray never count.
   Result<std::vector<SightAnswer>> LookAlong(std::span<const SightRay> rays, const SightOptions& options,
                                              std::stop_token stop = {}) const;
 

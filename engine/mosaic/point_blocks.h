@@ -41,8 +41,8 @@ struct PointBlock {
 };
 using PointBlockPtr = std::shared_ptr<const PointBlock>;
 
-// The position of a block in its grid. Column 1 begins at the first column of cells, row 0 at the first row; column 0
-// holds the cells before the first column, which exist where columns wrap.
+// The position of a block in its grid. Rows of blocks count from 0. Columns count from 1: column 0 holds the cells west
+// of the first column, which exist where columns wrap.
 struct PointBlockKey {
   std::uint64_t grid = 0;  // RasterGrid's number in this process
   std::int64_t column = 0, row = 0;

@@ -249,7 +249,7 @@ tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::Enco
   put("Content-Type", row->media_type(request));
   if (request.coding != tiler::Coding::kIdentity) put("Content-Encoding", tiler::NameOf(request.coding));
   put("Content-Length", tile.bytes.size());
-  head.body_bytes = head.text.size();
+  head.body_line_bytes = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
   if (!tiler::IsMapLayer(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {

@@ -21,7 +21,8 @@ namespace {
 constexpr std::chrono::nanoseconds kSettleTime = std::chrono::seconds(1);
 // Delay between attempts at unchanged files; doubled each time.
 constexpr std::chrono::seconds kFirstRetry{1}, kLastRetry{60};
-// Delay between openings for what the cache folder has lost; doubled each time. The loss may recur.
+// Delay between reopenings after data in the cache folder was lost or an archive was replaced; doubled each time,
+// because the loss may recur.
 constexpr std::chrono::minutes kFirstRecovery{1}, kLastRecovery{60};
 // A replacement that takes longer than this is reported as kReopening.
 constexpr std::chrono::seconds kPatience{10};

@@ -52,9 +52,9 @@ class Reloader {
   // Waits for the thread. May be called twice.
   void Stop();
 
-  // Checks at once instead of at the next second. Thread-safe.
+  // Checks the files of datasets at once instead of at the next second, but not the configuration. Thread-safe.
   void CheckNow();
-  // Like CheckNow, and loads the configuration even if its file may still be changing.
+  // Like CheckNow, and also loads the configuration even if its file may still be changing.
   void Reload();
 
  private:

@@ -1,6 +1,7 @@
 // The interface of a cache tier for tiles and refinements. To add a tier, write a class that implements it, and pass an
-// object to TileTiers, or to RefinementCache if it keeps refinements. The server does so with the objects in
-// ServerOptions::tile_stores (server/server.h).
+// object to TileTiers, or to RefinementCache if it keeps refinements. The server passes those in
+// ServerOptions::tile_stores (server/server.h) to TileTiers; server/cli/serve passes the store of refinements to
+// RefinementCache.
 //
 // Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network, and Insert if the tier is
 // told to wait for room. The others return at once.

@@ -28,7 +28,8 @@ enum class RefinementUse : std::uint8_t {
 // on the configuration. Each ends with CR LF.
 struct HeaderLines {
   std::string text;
-  std::size_t body_bytes = 0;  // leading bytes of `text` that describe the body; responses without a body omit them
+  std::size_t body_line_bytes =
+      0;  // leading bytes of `text` that describe the body; responses without a body omit them
 };
 
 struct EncodedTile {
@@ -37,8 +38,8 @@ struct EncodedTile {
   // The Terrain-Max-Error header: of tiles with a mesh, measured on the encoded integers; of height PNGs, the rounding
   // of heights to colours; of area meshes, measured before encoding.
   double max_error_m = 0;
-  // Metres, an upper bound of the distance to every sample of the sources: the Terrain-Certified-Error header. Set
-  // for quantized-mesh and GLB tiles only.
+  // Metres, an upper bound of the distance to every sample of the sources, after the edits that apply to it: the
+  // Terrain-Certified-Error header. Set for quantized-mesh and GLB tiles only.
   std::optional<double> certified_error_m = {};
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;

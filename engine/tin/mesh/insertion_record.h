@@ -19,7 +19,8 @@ struct InsertionRecord {
   // The vertices of all rings, insertion after insertion. Vertices 0 to 3 are the corners of the field, 4 + i is the
   // sample of insertion i.
   std::vector<Index> rings;
-  // By triangle in the order made, the two that the field begins with first: the insertion that removed it, or kNever.
+  // By triangle: the insertion that removed it, or kNever. Triangles are in the order in which they were made; the
+  // first two are those that the field begins with.
   std::vector<Index> removed;
 
   friend bool operator==(const InsertionRecord&, const InsertionRecord&) = default;
