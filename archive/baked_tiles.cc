@@ -111,13 +111,15 @@ class Baked final : public tiler::BakedTiles {
     return std::ranges::any_of(archives_, [](const auto& archive) { return archive->is_outdated(); });
   }
 
+  bool HasKind(const TileRequest& request) const override {
+    return std::ranges::any_of(archives_, [&](const auto& archive) { return IsOfKind(archive->manifest(), request); });
+  }
+
   Error WhyAbsent(const TileRequest& request) const override {
     std::string formats;
     for (const TileFormat format : extent_.formats) formats += (formats.empty() ? "" : ", ") + FolderOf(format);
-    const bool is_of_a_kind =
-        std::ranges::any_of(archives_, [&](const auto& archive) { return IsOfKind(archive->manifest(), request); });
     return {ErrorCode::kNotFound,
-            is_of_a_kind
+            HasKind(request)
                 ? std::string("the dataset comes from an archive, which does not have this tile")
                 : fmt::format("the dataset comes from an archive ({}) with one error and one compression; leave these "
                               "parameters out",

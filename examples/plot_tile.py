@@ -35,12 +35,12 @@ def fetch(url, body=None, kind="application/json"):
 # %% [markdown]
 # ## Which tile
 #
-# Tiles are EPSG:4326: two at level 0, rows from the south. A tile of level z is 180 / 2^z degrees wide. This is the one in the middle of the dataset.
+# Tiles are EPSG:4326: two at level 0, rows from the south. A tile of level z is 180 / 2^z degrees wide. This is the one in the middle of the finest data.
 
 # %%
 server, name = dataset.rsplit("/", 1)
 about = next(entry for entry in json.loads(fetch(f"{server}/datasets")[0])["datasets"] if entry["name"] == name)
-west, south, east, north = about["bounds"]
+west, south, east, north = about.get("finest_bounds", about["bounds"])
 span = 180 / 2**level
 column, row = int(((west + east) / 2 + 180) / span), int(((south + north) / 2 + 90) / span)
 tile, headers = fetch(f"{dataset}/{level}/{column}/{row}.terrain?error={error}")

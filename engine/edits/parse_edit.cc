@@ -100,14 +100,18 @@ std::optional<Edit> Parser::Parse(const json& feature) {
   edit_.feature = feature_;
   first_ = FirstPosition(feature);
   if (!terrain->is_object() || !terrain->contains("op") || !(*terrain)["op"].is_string()) {
-    Fail("properties.terrain needs an \"op\", such as {\"op\": \"flatten\", \"height\": 250}");
+    Fail(fmt::format(
+        "properties.terrain must be an object{} with an \"op\", such as {{\"op\": \"flatten\", \"height\": 250}}",
+        terrain->is_string() ? ", not text," : ""));
     return std::nullopt;
   }
   const std::string op = (*terrain)["op"];
   const auto known =
       std::ranges::find(kEditOpNames, std::string_view(op), [](const char* name) { return std::string_view(name); });
   if (known == kEditOpNames.end()) {
-    Fail(fmt::format("unknown op \"{}\"{}", op, NearestOf(op, kEditOpNames)));
+    const std::string nearest = NearestOf(op, kEditOpNames);
+    Fail(fmt::format("unknown op \"{}\"{}", op,
+                     nearest.empty() ? fmt::format("; ops are {}", fmt::join(kEditOpNames, ", ")) : nearest));
     return std::nullopt;
   }
   edit_.op = static_cast<EditOp>(known - kEditOpNames.begin());
@@ -129,15 +133,19 @@ std::optional<Edit> Parser::Parse(const json& feature) {
 }
 
 void Parser::CheckEditKeys(const json& terrain) {
+  const auto taken = [&] {
+    std::vector<std::string_view> keys;
+    std::ranges::copy_if(kEditKeys, std::back_inserter(keys),
+                         [&](std::string_view own) { return HasProperty(edit_.op, own); });
+    return fmt::format("it has {}", fmt::join(keys, ", "));
+  };
   for (const auto& [key, value] : terrain.items()) {
     // ReadDatum checks "vertical": its message says why an op does not take it.
     if (std::ranges::find(kEditKeys, key) == kEditKeys.end()) {
-      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, NearestOf(key, kEditKeys)));
+      const std::string nearest = NearestOf(key, kEditKeys);
+      Fail(fmt::format("unknown property \"{}\" of terrain{}", key, nearest.empty() ? "; " + taken() : nearest));
     } else if (key != "vertical" && !HasProperty(edit_.op, key)) {
-      std::vector<std::string_view> taken;
-      std::ranges::copy_if(kEditKeys, std::back_inserter(taken),
-                           [&](std::string_view own) { return HasProperty(edit_.op, own); });
-      Fail(fmt::format("{} has no \"{}\"; it has {}", NameOf(edit_.op), key, fmt::join(taken, ", ")));
+      Fail(fmt::format("{} has no \"{}\"; {}", NameOf(edit_.op), key, taken()));
     }
   }
 }
@@ -411,6 +419,8 @@ void Parser::ReadHeights(const json& terrain) {
     if (*height == "mean" || *height == "median") {
       edit_.flat = *height == "mean" ? FlatHeight::kMean : FlatHeight::kMedian;
     } else {
+      if (height->is_string())
+        return Fail(fmt::format("height is {}; it must be metres, \"mean\" or \"median\"", height->dump()));
       edit_.height_m = Number(terrain, "height", -kMaxHeight_m, kMaxHeight_m).value_or(0);
     }
     return;
@@ -419,6 +429,7 @@ void Parser::ReadHeights(const json& terrain) {
   if (edit_.op != EditOp::kCarve && edit_.op != EditOp::kRaise) return;
   for (std::size_t r = 0; r < rings_.size() && !has_failed(); ++r) {
     std::vector<std::optional<double>> heights = HeightsOf(terrain, "height", rings_[r]);
+    if (has_failed()) return;
     Interpolate(heights, edit_.rings[r], false);
     auto& of_line = edit_.heights.emplace_back();
     for (const auto& height : heights) {

@@ -57,13 +57,13 @@ void WarnOfDatum(GDALDataset& dataset, const Georeference& georeference, const V
                  const std::string& wanted_vertical, const RasterLayout& layout, std::vector<std::string>& warnings) {
   if (!vertical.is_known()) {
     const char* const dted = dataset.GetMetadataItem("DTED_VerticalDatum");  // also in files made of DTED
-    warnings.push_back(
-        fmt::format("no vertical datum stated{}: heights are taken as metres above the WGS 84 ellipsoid; if they are "
-                    "above mean sea level, set `vertical`, as in --vertical egm96; otherwise they are off by up to 100 "
-                    "m",
-                    dted == nullptr || *dted == '\0'
-                        ? ""
-                        : fmt::format(" (its DTED header states {}; E96 and MSL are mean sea level)", dted)));
+    warnings.push_back(fmt::format(
+        "no vertical datum stated{}: heights are taken as metres above the WGS 84 ellipsoid; if they are "
+        "above mean sea level, set `vertical`, as in --vertical egm96; otherwise they are off by up to 100 "
+        "m",
+        dted == nullptr || *dted == '\0'
+            ? ""
+            : fmt::format(" (the file states DTED_VerticalDatum={}; E96 and MSL are mean sea level)", dted)));
   }
   if (wanted_vertical != "crs" && !georeference.vertical_crs().empty()) {
     if (const auto depths = NameOfDepths(georeference.vertical_crs())) {

@@ -246,6 +246,10 @@ GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, cons
   const auto is_merged = [&](const Triangle& t) { return HasMergedCorners(t, all); };
   bool merges = std::erase_if(triangles, is_merged) > 0;
   if (triangles.empty()) {
+    // glTF needs a triangle: two grid steps tall, the least that rounding leaves apart, so that it is not seen.
+    for (std::size_t k = 0; k < rim.size(); ++k) {
+      all[first_foot + k] = Snap(placer.Place(mesh.vertices[rim[k]], 2 * step_m), 1 / step_m);
+    }
     HangSkirt(rim, first_foot, FirstEdge(rim, points), triangles);
     merges = std::erase_if(triangles, is_merged) > 0;
   }

@@ -192,6 +192,32 @@ Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format
                    row->folder.empty() ? row->suffix : row->folder);
 }
 
+Result<void> CheckHasKind(const DatasetView& dataset, tiler::TileFormat format, std::string_view query) {
+  if (!dataset.only_archive || query.empty()) return {};
+  const tiler::BakedTiles& baked = *dataset.only_archive;
+  const auto check = [&](const TileRequest& tile) {
+    return baked.HasKind(tile) ? Result<void>() : tl::unexpected(baked.WhyAbsent(tile));
+  };
+  TileRequest tile;
+  tile.format = format;
+  if (format == tiler::TileFormat::kHeightPng) {
+    const Result<HeightTileParameters> parameters = ParseHeightTileParameters(query);
+    if (!parameters) return tl::unexpected(parameters.error());
+    tile.height_encoding = parameters->encoding;
+    tile.side_px = parameters->size;
+    return check(tile);
+  }
+  const auto* const row = std::ranges::find(kFormats, format, &TileFormatRow::format);
+  TERRACE_CHECK(row != std::end(kFormats));
+  int level = 0;
+  for (const std::vector<geo::TileRange>& ranges : baked.extent().available) {
+    tile.key = {level++, ranges.front().start_x, ranges.front().start_y};
+    if (Result<void> read = row->read(query, {}, dataset, tile); !read) return read;
+    if (Result<void> has = check(tile); !has) return has;
+  }
+  return {};
+}
+
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets) {
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     if (datasets[i].name == name) return static_cast<std::uint32_t>(i);

@@ -192,7 +192,9 @@ Answer AnswerGrid(const HandlerState& state, const RequestContext& context) {
     return ClientErrorResponse(datum.error(), request.id);
   }
   // Archives have only the heights of their meshes.
-  if (view.only_archive && query->datum == dem::HeightDatum::kEllipsoid && !query->drawn) query->drawn.emplace();
+  if (view.only_archive && query->datum == dem::HeightDatum::kEllipsoid && !query->drawn && !query->names_source) {
+    query->drawn.emplace();
+  }
   const bool is_image = query->format == GridFormat::kGeoTiff || query->format == GridFormat::kPng16;
   const tiler::Coding coding = is_image ? tiler::Coding::kIdentity : NegotiateCoding(request.fields->accept_encoding);
   Response response;

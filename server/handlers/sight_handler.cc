@@ -118,7 +118,8 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
   const bool is_quick = context.route.query.size() <= kQuickQuery;
   Result<SightQuery> parsed = co_await ParsePoints(state, context, ParseSight, is_quick, deadline);
   if (!parsed) co_return co_await RefuseQuery(parsed.error(), view, request.id);
-  if (view.only_archive && !parsed->drawn) parsed->drawn.emplace();  // archives have only the heights of their meshes
+  // Archives have only the heights of their meshes.
+  if (view.only_archive && !parsed->drawn && !parsed->names_source) parsed->drawn.emplace();
   PointReply reply = StartPointReply(request, parsed->is_binary);
   const tiler::Coding coding = reply.coding;
   Response& response = reply.response;

@@ -52,12 +52,14 @@ Answer AnswerTileJson(const HandlerState& state, const RequestContext& context) 
   if (const auto has = CheckHasFormat(dataset, tiler::TileFormat::kHeightPng); !has) {
     return ClientErrorResponse(has.error(), context.request->id);
   }
+  const std::string tile_query = HeightTileQuery(dataset, *parameters);
+  const auto has_kind = CheckHasKind(dataset, tiler::TileFormat::kHeightPng, tile_query);
+  if (!has_kind) return ClientErrorResponse(has_kind.error(), context.request->id);
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;
   tiles.attribution = dataset.attribution;
-  tiles.tile_template =
-      fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*context.request), PercentEncode(dataset.name),
-                  WithToken(HeightTileQuery(dataset, *parameters), context));
+  tiles.tile_template = fmt::format("{}/{}/{{z}}/{{x}}/{{y}}.png?{}", OriginOf(*context.request),
+                                    PercentEncode(dataset.name), WithToken(tile_query, context));
   tiles.min_zoom = MinHeightTileLevel(dataset, parameters->size);
   tiles.max_zoom = MaxHeightTileLevel(dataset, parameters->size);
   tiles.tile_size = parameters->size;

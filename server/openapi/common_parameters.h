@@ -17,10 +17,10 @@ inline constexpr ParameterNote kErrorNote{"error", "The requested geometric erro
 inline constexpr ParameterNote kFractionNote{
     "fraction", "The error as a fraction of the level error that clients assume, 77,067 m / 2^z. Excludes `error`.",
     kPositiveNumber};
-inline constexpr ParameterNote kAtLeastNote{
-    "atleast",
-    "With `error`. `1`: the larger of `error` and the level's default; at the dataset's deepest level `error` itself.",
-    kFlag};
+inline constexpr ParameterNote kAtLeastNote{"atleast",
+                                            "With `error`. `1`: the larger of `error` and the level's default; from "
+                                            "the sources' deepest level on `error` itself.",
+                                            kFlag};
 inline constexpr ParameterNote kCompressionNote{
     "compression", "Form of the GLB; by default the dataset's `glb_compression`.", kCompressions};
 inline constexpr ParameterNote kTextureNote{

@@ -119,6 +119,7 @@ Result<GridQuery> ParseGrid(std::string_view text) {
                   std::nullopt, std::nullopt});
   if (!drawn) return tl::unexpected(drawn.error());
   query.drawn = *std::move(drawn);
+  query.names_source = texts[kGridSurface].has_value() && !query.drawn;
   if (query.drawn && query.datum != dem::HeightDatum::kEllipsoid) {
     return InvalidGrid("surface=served has ellipsoidal heights alone, as tiles have");
   }

@@ -23,6 +23,7 @@ struct GridQuery {
   dem::HeightDatum datum = dem::HeightDatum::kEllipsoid;
   std::optional<dem::HeightRange> range;     // of the integers; nothing: that of the heights
   std::optional<tiler::DrawnSurface> drawn;  // nothing: the surface of the sources
+  bool names_source = false;                 // surface=source was sent
 };
 
 // `bbox=west,south,east,north` in units of `crs=EPSG:CODE` (4326), `width=N&height=N` or `spacing=S`, `format`,

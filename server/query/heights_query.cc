@@ -16,6 +16,11 @@
 namespace terrace::server {
 namespace {
 
+Result<void> CheckNeedsPath(const HeightsParameters& parameters) {
+  if (!parameters.text(HeightsParameters::kStep) && !parameters.text(HeightsParameters::kSamples)) return {};
+  return MakeError(ErrorCode::kInvalidArgument, "step and samples need path");
+}
+
 // Longitude and latitude of each point as 64-bit floats.
 Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::string_view body, std::size_t max_locations,
                                  const std::stop_token& stop) {
@@ -23,6 +28,7 @@ Result<HeightsQuery> ParseBinary(const HeightsParameters& parameters, std::strin
   if (parameters.has_points()) {
     return MakeError(ErrorCode::kInvalidArgument, "locations and path exclude a body of points");
   }
+  if (const Result<void> checked = CheckNeedsPath(parameters); !checked) return tl::unexpected(checked.error());
   if (body.empty() || body.size() % kPointBytes != 0) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "the body has {} bytes, which is no multiple of 16 above 0: each point is its longitude and its "
@@ -103,9 +109,7 @@ Result<HeightsQuery> ParsePoints(HeightsParameters& parameters, std::size_t max_
     return MakeError(ErrorCode::kInvalidArgument, "either locations or path is needed: latitude,longitude|...");
   }
   if (parameters.is_path()) return ParsePath(parameters, max_locations, stop);
-  if (parameters.text(HeightsParameters::kStep) || parameters.text(HeightsParameters::kSamples)) {
-    return MakeError(ErrorCode::kInvalidArgument, "step and samples need path");
-  }
+  if (const Result<void> checked = CheckNeedsPath(parameters); !checked) return tl::unexpected(checked.error());
   HeightsQuery query;
   query.points = parameters.TakePoints();
   return query;

@@ -237,6 +237,7 @@ Result<SightQuery> ParseSight(const PointsInput& input, std::size_t max_rays, co
        parameters.text(kAtLeast), parameters.text(kFormat), parameters.text(kCompression)});
   if (!drawn) return tl::unexpected(drawn.error());
   query.drawn = *std::move(drawn);
+  query.names_source = parameters.text(kSurface).has_value() && !query.drawn;
   return query;
 }
 

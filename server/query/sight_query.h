@@ -20,6 +20,7 @@ struct SightQuery {
   bool from_ground = false;  // heights of the ends are above the surface; else above the ellipsoid
   bool is_binary = false;    // rays were numbers of 64 bits, and the answers are to be numbers of 32 bits
   std::optional<tiler::DrawnSurface> drawn;  // nothing: the surface of the sources
+  bool names_source = false;                 // surface=source was sent
 };
 
 // `from=lat,lon,height&to=lat,lon,height`, or `rays=lat,lon,height,lat,lon,height|...`; `heights=ellipsoid` or

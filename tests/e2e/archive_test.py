@@ -173,8 +173,13 @@ class ArchiveTest(unittest.TestCase):
             self.assertEqual(both.tier(plain + "?error=3", QUANTIZED), "miss")
             for target, reason in ((plain + "?error=3", "one error"), ("/cell/heights?locations=46.5,7.5", "sources"),
                                    ("/cell/mesh?bbox=7.1,46.1,7.2,46.2&error=50", "sources"),
-                                   ("/cell/5/33/24.glb?compression=none", "compression")):
-                status, _, body = alone.get(target)
+                                   ("/cell/5/33/24.glb?compression=none", "compression"),
+                                   # Documents promise no tile that the archive lacks.
+                                   ("/cell/layer.json?error=3", "one error"), ("/cell/layer.json?fraction=0.1", "one error"),
+                                   ("/cell/tileset.json?fraction=0.1", "one error"), ("/cell/tileset.json?compression=none", "compression"),
+                                   ("/cell/grid?surface=source&bbox=7.3,46.3,7.32,46.32&width=3&height=3", "sources"),
+                                   ("/cell/sight?surface=source&from=46.3,7.3,900&to=46.32,7.33,900", "sources")):
+                status, _, body = alone.get(target, {"Accept-Encoding": "identity"})
                 self.assertEqual((status, reason in body.decode()), (404, True), (target, body))
             self.assertEqual(both.get("/cell/heights?locations=46.5,7.5")[0], 200)
 

@@ -46,6 +46,10 @@ class BakedTiles {
   // damaged or cannot be read; the message names it.
   virtual Result<std::optional<EncodedTile>> Find(const TileRequest& request) const = 0;
 
+  // Whether tiles of the request's level with its error, compression, texture, encoding and size were baked. Of the
+  // key, only the level counts.
+  virtual bool HasKind(const TileRequest& request) const = 0;
+
   // ElevationModel::RangeBound of a baked tile; for other tiles the range of the dataset. Errors: those of Find.
   virtual Result<dem::HeightRange> RangeBound(const geo::TileKey& key) const = 0;
 

@@ -79,8 +79,9 @@ std::vector<std::string> AdviceFor(const dem::RasterInfo& info, double floor) {
         info.picture_color));
   }
   if (!info.found_voids.empty()) {
-    advice.push_back(
-        fmt::format("undeclared voids: {}; mend the file, or state `nodata` in the configuration", info.found_voids));
+    advice.push_back(fmt::format(
+        "undeclared voids: {}; they are voids already: nothing has to be done. For other programs, mend the file",
+        info.found_voids));
   }
   if (info.void_samples > 0) {
     advice.push_back(

@@ -99,6 +99,18 @@ std::vector<std::string> AdviceFor(const dem::DemInfo& info) {
         "sources first",
         SourcesLie(hidden)));
   }
+  const auto add_each = [&](auto text_of) {
+    for (const dem::RasterInfo& source : info.sources) {
+      if (const std::string text = text_of(source); !text.empty()) {
+        advice.push_back(fmt::format("{}: {}; `terrace info` of this file says more", source.path, text));
+      }
+    }
+  };
+  add_each([](const dem::RasterInfo& s) {
+    return s.picture_color.empty() ? ""
+                                   : fmt::format("band 1 is the \"{}\" of a picture, hardly heights", s.picture_color);
+  });
+  add_each([](const dem::RasterInfo& s) { return s.heights_doubted; });
   if (large > 0) {
     advice.push_back(fmt::format(
         "large, without overviews, and their averages are not kept: {}; shallow tiles read many of their samples: give "

@@ -53,14 +53,14 @@ void WarnAbout(const std::string& path, const dem::RasterHeights& raster, const 
     fmt::print(stderr,
                "terrace: {}: x and y of the mesh are angles, heights metres, and glTF takes all of them for metres: "
                "viewers will show a needle; for metres throughout, project it first with `gdalwarp -t_srs EPSG:XXXX -r "
-               "bilinear in out`\n",
+               "bilinear -dstnodata -9999 in out`\n",
                path);
   }
   if (!raster.coordinate_unit.empty() && coordinates != "pixel") {
     fmt::print(
         stderr,
         "terrace: {}: x and y of the mesh are in its reference system's unit ({}), heights in metres; for metres "
-        "throughout, project it first with `gdalwarp -t_srs EPSG:XXXX -r bilinear in out`\n",
+        "throughout, project it first with `gdalwarp -t_srs EPSG:XXXX -r bilinear -dstnodata -9999 in out`\n",
         path, raster.coordinate_unit);
   }
   if (!raster.found_voids.empty()) {

@@ -43,12 +43,14 @@ std::vector<config::ConfigError> FindSameNames(const config::Config& config, con
       errors.push_back({dem, fmt::format("would be dataset \"{}\", as one of the configuration is; {}", dataset.name,
                                          dems.size() == 1 ? "give it another name with --name NAME"
                                                           : "add it to the configuration with a name of its own")});
-    } else if (config.datasets[first->second].sources == dataset.sources) {
+    } else if (config.datasets[first->second].sources == dataset.sources &&
+               config.datasets[first->second].baked == dataset.baked) {
       errors.push_back({dem, "is given twice; leave one out"});
     } else {
-      errors.push_back({"", fmt::format("{} and {} would both be dataset \"{}\", as DEMs are named after their files; "
-                                        "rename one, or name both in a configuration (--config)",
-                                        dems[first->second - configured], dem, dataset.name)});
+      errors.push_back(
+          {"", fmt::format("{} and {} would both be dataset \"{}\", as DEMs are named after their files and "
+                           "archives after their datasets; name both in a configuration (--config)",
+                           dems[first->second - configured], dem, dataset.name)});
     }
   }
   return errors;
@@ -63,6 +65,15 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
     const std::string folder = std::filesystem::path(written).parent_path().string();
     return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
                        folder.empty() ? "." : folder);
+  }
+  // top.pmtiles, and units/7-76-40.pmtiles.
+  for (std::filesystem::path folder = std::filesystem::path(written).parent_path(), absolute = place.parent_path();
+       place.extension() == ".pmtiles" &&
+       (absolute == place.parent_path() || absolute == place.parent_path().parent_path());
+       folder = folder.parent_path(), absolute = absolute.parent_path()) {
+    if (!IsArchive(absolute.string())) continue;
+    return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
+                       folder.empty() ? "." : folder.string());
   }
   if (std::filesystem::exists(place / "bake.json", ignored) && !IsArchive(path)) {
     return fmt::format(

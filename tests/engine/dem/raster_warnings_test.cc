@@ -227,7 +227,7 @@ TEST(RasterWarnings, NameTheDatumOfADtedHeader) {
   const TempDir dir;
   const std::string path = WriteRaster(dir, {.geo_transform = {7, .01, 0, 46, 0, -.01}});
   GDALDatasetUniquePtr(GDALDataset::Open(path.c_str(), GDAL_OF_UPDATE))->SetMetadataItem("DTED_VerticalDatum", "E96");
-  ExpectOne(WarningsAbout(path), "no vertical datum stated (its DTED header states E96;");
+  ExpectOne(WarningsAbout(path), "no vertical datum stated (the file states DTED_VerticalDatum=E96;");
   EXPECT_EQ(WarningsAbout(path, {.vertical = "egm96"}), std::vector<std::string>());
 }
 

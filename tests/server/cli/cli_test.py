@@ -314,8 +314,8 @@ class Config(unittest.TestCase):
 
     def test_dems_of_one_name_are_told_with_both_paths_and_the_remedy(self):
         config = self.write(json.dumps({"datasets": [{"name": "x", "sources": ["/c/y.tif"]}]}))
-        for arguments, message in ((["/a/x.tif", "/b/x.tif"], '/a/x.tif and /b/x.tif would both be dataset "x", as DEMs are named after their files; '
-                                                              "rename one, or name both in a configuration (--config)"),
+        for arguments, message in ((["/a/x.tif", "/b/x.tif"], '/a/x.tif and /b/x.tif would both be dataset "x", as DEMs are named after their files and archives after their datasets; '
+                                                              "name both in a configuration (--config)"),
                                    (["a b.tif", "q.tif", "a-b.tif"], 'a b.tif and a-b.tif would both be dataset "a-b"'),
                                    (["x.tif", "x.tif"], "x.tif: is given twice; leave one out"),
                                    (["./x.tif", "x.tif"], "x.tif: is given twice; leave one out"),

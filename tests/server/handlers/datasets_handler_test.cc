@@ -60,6 +60,7 @@ class BakedFormats final : public tiler::BakedTiles {
   const tiler::BakedExtent& extent() const override { return extent_; }
   Result<std::optional<tiler::EncodedTile>> Find(const tiler::TileRequest&) const override { return std::nullopt; }
   Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange{}; }
+  bool HasKind(const tiler::TileRequest&) const override { return true; }
   bool is_outdated() const override { return false; }
   Error WhyAbsent(const tiler::TileRequest&) const override { return {}; }
 

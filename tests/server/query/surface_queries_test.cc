@@ -57,6 +57,7 @@ TEST(BinaryHeights, SaysWhatIsWrong) {
   ExpectSays(parse(BytesOf({0, -kInfinity})), "the latitude must be");
   ExpectSays(parse(BytesOf({46.5, 98.25})), "the longitude comes first");
   ExpectSays(parse(point, "locations=1,2"), "exclude a body of points");
+  ExpectSays(parse(point, "step=abc"), "step and samples need path");
   ExpectSays(parse(point, "certify=deepest"), "certify needs a reply in JSON");
   ExpectSays(parse(point, "normals=yes"), "normals must be 0 or 1");
 }

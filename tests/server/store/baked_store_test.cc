@@ -20,6 +20,7 @@ class FakeBaked final : public tiler::BakedTiles {
     return tile;
   }
   Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange(); }
+  bool HasKind(const tiler::TileRequest&) const override { return true; }
   bool is_outdated() const override { return false; }
   Error WhyAbsent(const tiler::TileRequest&) const override { return {}; }
 

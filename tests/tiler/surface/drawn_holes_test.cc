@@ -122,6 +122,7 @@ class UnreadableArchive final : public BakedTiles {
     return MakeError(ErrorCode::kUnavailable, "unreadable");
   }
   Result<dem::HeightRange> RangeBound(const geo::TileKey&) const override { return dem::HeightRange(); }
+  bool HasKind(const TileRequest&) const override { return true; }
   bool is_outdated() const override { return false; }
   Error WhyAbsent(const TileRequest&) const override { return {}; }
 
