@@ -119,11 +119,11 @@ class Baked final : public tiler::BakedTiles {
     std::string formats;
     for (const TileFormat format : extent_.formats) formats += (formats.empty() ? "" : ", ") + FolderOf(format);
     return {ErrorCode::kNotFound,
-            HasKind(request)
-                ? std::string("the dataset comes from an archive, which does not have this tile")
-                : fmt::format("the dataset comes from an archive ({}) with one error and one compression; leave these "
-                              "parameters out",
-                              formats)};
+            HasKind(request) ? std::string("the dataset comes from an archive, which does not have this tile")
+                             : fmt::format("the dataset comes from an archive ({}) with one error and one compression, "
+                                           "or one encoding and size of height images; leave these "
+                                           "parameters out",
+                                           formats)};
   }
 
  private:

@@ -37,7 +37,7 @@ bool IsEdited(const EditSet& edits, std::span<const TrackPiece> pieces) {
   return std::ranges::any_of(pieces, [&](const TrackPiece& piece) {
     if (!are_in(piece)) return false;
     for (int k = 0; k < kParts; ++k) {
-      const double first = double{k} / kParts, last = double{k + 1} / kParts;
+      const double first = static_cast<double>(k) / kParts, last = static_cast<double>(k + 1) / kParts;
       TrackPiece part;
       part.longitude = piece.longitude.Part(first, last);
       part.latitude = piece.latitude.Part(first, last);

@@ -246,9 +246,13 @@ GridMesh MakeGridMesh(const TileSamples& samples, const tin::TinMesh& mesh, cons
   const auto is_merged = [&](const Triangle& t) { return HasMergedCorners(t, all); };
   bool merges = std::erase_if(triangles, is_merged) > 0;
   if (triangles.empty()) {
-    // glTF needs a triangle: two grid steps tall, the least that rounding leaves apart, so that it is not seen.
+    // glTF needs a triangle: two grid steps tall, which rounding leaves apart, so that it is not seen.
     for (std::size_t k = 0; k < rim.size(); ++k) {
-      all[first_foot + k] = Snap(placer.Place(mesh.vertices[rim[k]], 2 * step_m), 1 / step_m);
+      const tin::SamplePosition node = mesh.vertices[rim[k]];
+      const GridPoint top = Snap(placer.Place(node, 0), 1 / step_m),
+                      below = Snap(placer.Place(node, 2 * step_m), 1 / step_m);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        all[first_foot + k][axis] = points[rim[k]][axis] + below[axis] - top[axis];
     }
     HangSkirt(rim, first_foot, FirstEdge(rim, points), triangles);
     merges = std::erase_if(triangles, is_merged) > 0;

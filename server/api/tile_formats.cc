@@ -209,9 +209,10 @@ Result<void> CheckHasKind(const DatasetView& dataset, tiler::TileFormat format, 
   }
   const auto* const row = std::ranges::find(kFormats, format, &TileFormatRow::format);
   TERRACE_CHECK(row != std::end(kFormats));
-  int level = 0;
-  for (const std::vector<geo::TileRange>& ranges : baked.extent().available) {
-    tile.key = {level++, ranges.front().start_x, ranges.front().start_y};
+  const std::vector<std::vector<geo::TileRange>>& available = baked.extent().available;
+  for (std::size_t level = 0; level < available.size(); ++level) {
+    if (available[level].empty()) continue;
+    tile.key = {static_cast<int>(level), available[level].front().start_x, available[level].front().start_y};
     if (Result<void> read = row->read(query, {}, dataset, tile); !read) return read;
     if (Result<void> has = check(tile); !has) return has;
   }

@@ -87,6 +87,7 @@ export class Access {
       const query = new URLSearchParams({ from: end(corners[0], eye), to: end(corners.at(-1), target), heights: "ground", refraction, surface });
       return readJson(`${dataset.urls.sight}?${query}`, { headers: this.headers });
     };
+    if (dataset.isArchive) return (await ask("served")).results[0];
     const reply = ask("source");
     // The sources do not contain edits: above these the server answers over tiles alone, and over few of them.
     const { results } = await (dataset.urls.edits ? reply.catch(() => ask("served")) : reply);

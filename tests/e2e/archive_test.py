@@ -218,6 +218,14 @@ class ArchiveTest(unittest.TestCase):
             self.assertEqual(server.get("/readyz")[0], 200)
             self.assertEqual(server.get("/metrics")[0], 200)
 
+    def test_files_of_archives_are_told(self):
+        folder = self.place / "glb"
+        for name in ["top.pmtiles", *(f"units/{path.name}" for path in (folder / "units").iterdir())][:2]:
+            done = subprocess.run([BINARY, "serve", folder / name, "--check-config"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60)
+            self.assertEqual((done.returncode, f"name its folder: terrace serve {folder}" in done.stdout), (2, True), done.stdout)
+        done = subprocess.run([BINARY, "serve", "/tmp/not-there.pmtiles", "--check-config"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=60)
+        self.assertNotEqual(done.returncode, 0)
+
     def test_single_file_and_folder(self):
         single, folder = self.scratch / "one.pmtiles", self.scratch / "static"
         for form, out in (("single", single), ("folder", folder)):

@@ -66,14 +66,13 @@ std::string ExplainOtherThanDem(const std::string& written, const std::string& p
     return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
                        folder.empty() ? "." : folder);
   }
-  // top.pmtiles, and units/7-76-40.pmtiles.
-  for (std::filesystem::path folder = std::filesystem::path(written).parent_path(), absolute = place.parent_path();
-       place.extension() == ".pmtiles" &&
-       (absolute == place.parent_path() || absolute == place.parent_path().parent_path());
-       folder = folder.parent_path(), absolute = absolute.parent_path()) {
-    if (!IsArchive(absolute.string())) continue;
+  const std::filesystem::path folder = place.parent_path();
+  if (place.filename() == "top.pmtiles" && IsArchive(folder.string())) {
+    return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written, folder.string());
+  }
+  if (place.extension() == ".pmtiles" && folder.filename() == "units" && IsArchive(folder.parent_path().string())) {
     return fmt::format("{} is a file of an archive; name its folder: terrace serve {}", written,
-                       folder.empty() ? "." : folder.string());
+                       folder.parent_path().string());
   }
   if (std::filesystem::exists(place / "bake.json", ignored) && !IsArchive(path)) {
     return fmt::format(
