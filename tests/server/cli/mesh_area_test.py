@@ -77,6 +77,8 @@ class MeshOfAreas(unittest.TestCase):
         self.assertNotEqual(before, after)
         self.assertEqual((plain["edits"], edited["edits"]), (0, 3))
         self.assertAlmostEqual(edited["origin"][0], 36.30, 6)
+        self.assertEqual(edited["criterion"], "delaunay")
+        self.assertGreater(edited["peak_rss_bytes"], 1 << 20)
 
     def test_the_whole_raster_is_the_default(self):
         statistics, _ = self.mesh("whole.obj", "--edits", self.edits, "--max-error", 50)
