@@ -128,6 +128,10 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
   if (etag.empty()) return false;  // not even "*", because there is no representation
   std::string_view rest = Trim(if_none_match);
   if (rest == "*") return true;
+  const auto skip_empty_elements = [&rest] {  // RFC 9110, section 5.6.1.2
+    while (rest.starts_with(',')) rest = Trim(rest.substr(1));
+  };
+  skip_empty_elements();
   while (!rest.empty()) {
     if (rest.starts_with("W/")) rest.remove_prefix(2);
     if (!rest.starts_with('"')) return false;  // not a list of ETags: treated as absent
@@ -136,7 +140,7 @@ bool MatchesEtag(std::string_view if_none_match, std::string_view etag) {
     if (rest.substr(0, close + 1) == etag) return true;
     rest = Trim(rest.substr(close + 1));
     if (!rest.empty() && rest.front() != ',') return false;
-    while (rest.starts_with(',')) rest = Trim(rest.substr(1));
+    skip_empty_elements();
   }
   return false;
 }

@@ -80,6 +80,7 @@ TEST(Response, MatchesEtagsAsListsWeakAndStar) {
       {"\"a,b\"", false},
       {"\"*\"", false},
   };
+  EXPECT_TRUE(MatchesEtag(" ,, \"a\"", "\"a\"")) << "empty elements";
   for (const auto& c : cases) EXPECT_EQ(MatchesEtag(c.if_none_match, "\"a\""), c.matches) << c.if_none_match;
   EXPECT_FALSE(MatchesEtag("*", "")) << "a reply without one";
 }
