@@ -106,8 +106,7 @@ std::optional<Edit> Parser::Parse(const json& feature) {
     return std::nullopt;
   }
   const std::string op = (*terrain)["op"];
-  const auto known =
-      std::ranges::find(kEditOpNames, std::string_view(op), [](const char* name) { return std::string_view(name); });
+  const auto known = std::ranges::find(kEditOpNames, std::string_view(op));
   if (known == kEditOpNames.end()) {
     const std::string nearest = NearestOf(op, kEditOpNames);
     Fail(fmt::format("unknown op \"{}\"{}", op,
@@ -427,7 +426,7 @@ void Parser::ReadHeights(const json& terrain) {
   }
   if (edit_.op == EditOp::kSlope) return FitSlope(HeightsOf(terrain, "heights", rings_.front()));
   if (edit_.op != EditOp::kCarve && edit_.op != EditOp::kRaise) return;
-  for (std::size_t r = 0; r < rings_.size() && !has_failed(); ++r) {
+  for (std::size_t r = 0; r < rings_.size(); ++r) {
     std::vector<std::optional<double>> heights = HeightsOf(terrain, "height", rings_[r]);
     if (has_failed()) return;
     Interpolate(heights, edit_.rings[r], false);
