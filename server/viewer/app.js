@@ -16,6 +16,7 @@ const kFlightSeconds = 2.5;
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
 const kRetryMs = 5000;  // of what is not essential
+const kForgetMs = 120000;  // a failure that comes later does not prolong the pause after the one before
 const kCoarser = 8;  // between the errors on the left and on the right, at first
 
 // `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
@@ -24,7 +25,7 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // server does not have this dataset any more. `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
-                hasFailed: false, isGone: false, failures: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
+                hasFailed: false, isGone: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [], shown: undefined };
 
 const panel = new Panel({
@@ -52,7 +53,7 @@ const card = new TokenCard((token) => useToken(token));
 const traffic = new Traffic();
 const globe = makeGlobe();
 
-const watch = new Watch({ list: () => list(), onLost: () => lose(), onList: (wasLost) => follow(wasLost) });
+const watch = new Watch({ list: () => list(), onLost: (error) => lose(error), onList: (wasLost) => follow(wasLost) });
 
 function complain(problem) {
   state.problems.push(String(problem));
@@ -133,8 +134,9 @@ function refetch(fraction) {
   return show();
 }
 
-// The server does not answer: the picture stays, and comes to life again with the server.
-function lose() {
+// The server does not answer: the picture stays, and comes to life again with the server. Or it has other tokens now.
+function lose(error) {
+  if (error instanceof UnknownToken) return ask("The server does not know the token of this page any more.");
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
 }
 
@@ -165,7 +167,10 @@ function follow(wasLost) {
   const isBack = state.isGone;
   state.dataset = current;
   state.isGone = false;
-  if (isNew) panel.note(`${dataset.name} has a new version.`);
+  if (isNew) {
+    panel.note(`${dataset.name} has a new version.`);
+    openTool()?.refresh();
+  }
   if (wasLost || isBack) panel.setMessage(undefined);
   if (isNew || isBack || (state.hasFailed && wasLost)) return show();
 }
@@ -178,6 +183,8 @@ function missTile(problem) {
     if (watch.isLost || state.isGone || !state.hasFailed) return;
     const detail = traffic.problem;  // read late: CesiumJS reports a failure before `traffic` has seen the reply
     complain(detail ? `Tiles of ${state.dataset.name} cannot be read: ${detail}. The page tries again.` : problem);
+    if (performance.now() - state.failedAt > kForgetMs) state.failures = 0;
+    state.failedAt = performance.now();
     setTimeout(() => state.hasFailed && !watch.isLost && show(), Math.min(60000, 5000 * 2 ** state.failures++));
   });
 }
@@ -203,16 +210,15 @@ function setSun(text) {
 // The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
   const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
-  if (name === "draft") {
-    const { Draft } = await import("/viewer/draft.js");
-    state.measure?.end();
-    state.draft ??= new Draft(options);
-    return state.draft.toggle();
+  try {
+    if (name === "draft") state.draft ??= new (await import("/viewer/draft.js")).Draft(options);
+    else state.measure ??= new (await import("/viewer/measure.js")).Measure(options);
+  } catch {
+    return panel.note("The tool could not be loaded: the server does not answer.");
   }
-  const { Measure } = await import("/viewer/measure.js");
-  state.draft?.end();
-  state.measure ??= new Measure(options);
-  return state.measure.toggle(name);
+  const [other, tool] = name === "draft" ? [state.measure, state.draft] : [state.draft, state.measure];
+  other?.end();
+  return tool.toggle(name);
 }
 
 const openTool = () => (state.draft?.isOpen ? state.draft : state.measure);

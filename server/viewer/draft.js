@@ -8,6 +8,7 @@ import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } fr
 import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
 
 const kSamples = 400;
+const kMinArea = 0.01;  // square metres; less has corners on one line
 const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
 const byId = (id) => document.getElementById(id);
 
@@ -41,6 +42,7 @@ export class Draft {
 
   end() {
     if (!this.isOpen) return;
+    if (byId("draft").contains(document.activeElement)) byId("tool-draft").focus();
     this.isOpen = false;
     this.globe.scene.globe.depthTestAgainstTerrain = false;
     this.globe.onClick = undefined;
@@ -57,8 +59,14 @@ export class Draft {
   }
 
   undo() {
+    if (!this.isOpen) return undefined;
     this.corners.pop();
     return this.#change();
+  }
+
+  // The dataset has another version: its heights are read anew.
+  refresh() {
+    return this.isOpen && this.#change();
   }
 
   // The exaggeration has changed.
@@ -74,8 +82,16 @@ export class Draft {
     return Math.max(0, byId("draft-blend").valueAsNumber || 0);
   }
 
+  // Why the corners make no polygon; undefined: they make one.
+  get #fault() {
+    if (this.corners.length === 0) return "Click the ground to set the first corner of a polygon.";
+    if (this.corners.length < 3) return "Click the next corner.";
+    if (crossesItself(this.corners)) return "The outline crosses itself: remove the last corner.";
+    return Math.abs(signedArea(this.corners)) < kMinArea ? "The corners are on one line: click another one." : undefined;
+  }
+
   get #isPolygon() {
-    return this.corners.length > 2 && !crossesItself(this.corners);
+    return this.#fault === undefined;
   }
 
   // The corners have changed: their ground is read anew.
@@ -145,21 +161,21 @@ export class Draft {
 
   #describe() {
     byId("draft-undo").hidden = this.corners.length === 0;
-    byId("draft-save").disabled = !this.#isPolygon;
+    const isOutside = this.ground?.every((height) => height === undefined);  // the server would refuse the file
+    byId("draft-save").disabled = !this.#isPolygon || isOutside;
     byId("draft-text").textContent = this.#text();
   }
 
   #text() {
     const { corners, ground } = this;
-    if (corners.length === 0) return "Click the ground to set the first corner of a polygon.";
-    if (corners.length < 3) return "Click the next corner.";
-    if (!this.#isPolygon) return "The outline crosses itself: remove the last corner.";
+    if (!this.#isPolygon) return this.#fault;
     const area = Math.abs(signedArea(corners));
     const size = formatArea(area);
     if (!ground) return `${size}.`;
-    const { samples, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
-    if (samples === 0) return `${size}; no heights there.`;
-    return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${formatVolume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${formatVolume(cut)}.`;
+    const { known, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
+    if (known === 0) return `${size}; no heights there.`;
+    const remark = known < 1 ? ` ${Math.ceil(100 * (1 - known))} % of the area has no heights and does not count.` : "";
+    return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${formatVolume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${formatVolume(cut)}.${remark}`;
   }
 
   #save() {

@@ -20,16 +20,29 @@ function subdivided(line, pieces) {
   });
 }
 
-// Draws the features in view; `heightAt(longitude, latitude)`: of the drawn ground, undefined where nothing is drawn.
-// Returns how many there are in view.
+// The box of a line: [west, south, east, north].
+function boxOf(line) {
+  const [longitudes, latitudes] = [0, 1].map((axis) => line.map((at) => at[axis]));
+  return [Math.min(...longitudes), Math.min(...latitudes), Math.max(...longitudes), Math.max(...latitudes)];
+}
+
+// Places that are drawn at no height, as in a hole, take the height of the place before them.
+function onGround(places, heightAt) {
+  const heights = places.map((at) => heightAt(...at));
+  let height = heights.find((value) => value !== undefined) ?? 0;
+  return places.map(([longitude, latitude], i) => ({ longitude, latitude, height: (height = heights[i] ?? height) }));
+}
+
+// Draws the features in view. `isInView(box)`; `heightAt(longitude, latitude)`: of the drawn ground, undefined where nothing
+// is drawn. Returns how many there are in view.
 export function drawEdits(overlay, features, isInView, heightAt) {
-  const seen = features.filter(({ geometry }) => geometry.coordinates.some((line) => line.some((at) => isInView(...at))));
+  const seen = features.filter(({ geometry }) => geometry.coordinates.some((line) => isInView(boxOf(line))));
   const drawn = seen.slice(0, kMaxDrawn);
   const corners = drawn.reduce((sum, { geometry }) => sum + geometry.coordinates.reduce((n, line) => n + line.length, 0), 0);
   const pieces = corners * kPieces < kMaxPoints ? kPieces : 1;
   overlay.setLine("edits", drawn.flatMap(({ properties, geometry }) => geometry.coordinates.map((line) => ({
     className: `edit ${properties.op}`,
-    points: subdivided(line, pieces).map(([longitude, latitude]) => ({ longitude, latitude, height: heightAt(longitude, latitude) ?? properties.height ?? 0 })),
+    points: onGround(subdivided(line, pieces), heightAt),
   }))));
   return seen.length;
 }

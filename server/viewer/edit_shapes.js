@@ -1,5 +1,8 @@
 // Polygons of edits as rings of {longitude, latitude}, without a repeated first corner. Uses neither CesiumJS nor the page.
-const kMetresPerDegree = 111320;
+const kDegree = Math.PI / 180;
+// WGS 84: the equatorial radius in metres, and the eccentricity.
+const kRadius = 6378137;
+const kEccentricity = 0.0818191908426215;
 
 const turned = (degrees) => degrees - 360 * Math.round(degrees / 360);
 
@@ -9,28 +12,29 @@ function unwrapped(corners) {
   return corners.map((corner) => ({ ...corner, longitude: first + turned(corner.longitude - first) }));
 }
 
-// Corners in metres east and north of the first one; good for shapes much smaller than the Earth.
-function inMetres(corners) {
-  const [first] = corners;
-  const east = kMetresPerDegree * Math.cos((first.latitude * Math.PI) / 180);
-  return unwrapped(corners).map(({ longitude, latitude }) =>
-    [(longitude - first.longitude) * east, (latitude - first.latitude) * kMetresPerDegree]);
+// The area between the equator and a parallel on the ellipsoid, square metres for each radian of longitude.
+function areaBelow(latitude) {
+  const sine = Math.sin(latitude * kDegree);
+  const square = kEccentricity * kEccentricity;
+  return ((kRadius * kRadius * (1 - square)) / 2) * (sine / (1 - square * sine * sine) + Math.atanh(kEccentricity * sine) / kEccentricity);
 }
 
 const cross = ([ax, ay], [bx, by], [cx, cy]) => (bx - ax) * (cy - ay) - (by - ay) * (cx - ax);
 
-// Square metres; positive if the ring runs counterclockwise.
+// Square metres on the ellipsoid; positive if the ring runs counterclockwise. Edges are straight in degrees, as those of
+// GeoJSON; the area below one is integrated by Simpson's rule.
 export function signedArea(corners) {
-  const points = inMetres(corners);
-  return points.reduce((sum, [x, y], i) => {
-    const [nextX, nextY] = points[(i + 1) % points.length];
-    return sum + (x * nextY - nextX * y) / 2;
+  const ring = unwrapped(corners);
+  return ring.reduce((sum, from, i) => {
+    const to = ring[(i + 1) % ring.length];
+    const mean = (areaBelow(from.latitude) + 4 * areaBelow((from.latitude + to.latitude) / 2) + areaBelow(to.latitude)) / 6;
+    return sum - (to.longitude - from.longitude) * kDegree * mean;
   }, 0);
 }
 
 // Whether two edges of the ring that are not neighbours meet.
 export function crossesItself(corners) {
-  const points = inMetres(corners);
+  const points = unwrapped(corners).map(({ longitude, latitude }) => [longitude, latitude]);
   const n = points.length;
   const edge = (i) => [points[i], points[(i + 1) % n]];
   for (let i = 0; i < n; ++i) {
@@ -69,15 +73,15 @@ export function placesInside(outline, count) {
   return [...outline, { longitude: turned(mean(longitudes)), latitude: mean(latitudes) }];
 }
 
-// What flattening to `height` would do to ground of these heights on `area` square metres. Volumes in cubic metres, of
-// the polygon without its blend. Heights that are undefined do not count.
+// What flattening to `height` would do to ground of these heights, which are spread evenly over `area` square metres.
+// Volumes in cubic metres, of the polygon without its blend and without the ground whose heights are undefined.
 export function earthwork(heights, height, area) {
   const known = heights.filter((value) => value !== undefined);
   const differences = known.map((value) => height - value);
   const sum = (values) => values.reduce((total, value) => total + value, 0);
-  const share = known.length > 0 ? area / known.length : 0;
+  const share = heights.length > 0 ? area / heights.length : 0;
   return {
-    samples: known.length,
+    known: heights.length > 0 ? known.length / heights.length : 0,
     raised: Math.max(0, ...differences), lowered: Math.max(0, ...differences.map((value) => -value)),
     fill: share * sum(differences.filter((value) => value > 0)), cut: -share * sum(differences.filter((value) => value < 0)),
   };

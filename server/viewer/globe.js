@@ -314,7 +314,9 @@ export class Globe {
   viewTest() {
     const { camera, ellipsoid } = this.scene;
     const box = camera.computeViewRectangle(ellipsoid);
-    return (longitude, latitude) => !box || Rectangle.contains(box, Cartographic.fromDegrees(longitude, latitude));
+    const kMargin = 1e-6;  // degrees: a line along a parallel has no area
+    return ([west, south, east, north]) => !box || Rectangle.intersection(box, Rectangle.fromDegrees(
+      west - kMargin, south - kMargin, east + kMargin, north + kMargin)) !== undefined;
   }
 
   get loading() {

@@ -8,9 +8,10 @@ export function drop(distance) {
 }
 
 // `points`: [{distance, height}] with metres from the start; height is undefined where nothing was measured. Returns
-// {length, along, up, down, min, max}: `length` over the ellipsoid, `along` over the ground.
+// {length, along, up, down, min, max, gaps}: `length` over the ellipsoid, `along` over the ground; `gaps`: a height is undefined.
 export function measurePath(points) {
-  const sum = { length: points.at(-1)?.distance ?? 0, along: 0, up: 0, down: 0, min: Infinity, max: -Infinity };
+  const gaps = points.some(({ height }) => height === undefined);
+  const sum = { length: points.at(-1)?.distance ?? 0, along: 0, up: 0, down: 0, min: Infinity, max: -Infinity, gaps };
   points.forEach(({ distance, height }, i) => {
     if (height !== undefined) {
       sum.min = Math.min(sum.min, height);

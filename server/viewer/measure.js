@@ -42,6 +42,7 @@ export class Measure {
 
   end() {
     if (!this.mode) return;
+    if (byId("dock").contains(document.activeElement)) byId(`tool-${this.mode}`).focus();
     this.mode = undefined;
     this.globe.onClick = undefined;
     this.corners = [];
@@ -62,8 +63,14 @@ export class Measure {
   }
 
   undo() {
+    if (!this.mode) return undefined;
     this.corners.pop();
     return this.#update();
+  }
+
+  // The dataset has another version: its heights are read anew.
+  refresh() {
+    return this.mode && this.#update();
   }
 
   #clear() {
@@ -98,11 +105,11 @@ export class Measure {
     if (points.length < 2) return;
     byId("plot").hidden = false;
     if (mode === "sight") return this.#describeSight();
-    const { length, along, up, down, min, max } = measurePath(points);
+    const { length, along, up, down, min, max, gaps } = measurePath(points);
     const isKnown = min <= max;
     byId("dock-text").textContent = `${formatMetres(length)} straight, ` + (isKnown ?
       `${formatMetres(along)} along the ground, ${formatHeight(up)} up, ${formatHeight(down)} down, between ${formatHeight(min)} and ${formatHeight(max)}` :
-      "no heights there");
+      "no heights there") + (isKnown && gaps ? ". Parts of the ground have no heights; they count as level." : "");
     this.globe.overlay.setLine("measured", [{ className: "path", points }]);
     this.plot.show(points);
   }

@@ -21,7 +21,7 @@ export const formatVolume = (cubicMetres) =>
   (cubicMetres < 1e6 ? `${fourDigits(cubicMetres)} m³` : `${fourDigits(cubicMetres / 1e6)} million m³`);
 
 // Heights are in metres however large they are.
-export const formatHeight = (metres) => `${formatNumber(Number(metres.toFixed(Math.abs(metres) < 10 ? 1 : 0)))} m`;
+export const formatHeight = (metres, digits = Math.abs(metres) < 10 ? 1 : 0) => `${formatNumber(Number(metres.toFixed(digits)))} m`;
 
 export function formatBytes(bytes) {
   return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;

@@ -35,7 +35,7 @@ export class Panel {
       actions.exaggeration(event.target.valueAsNumber);
     });
     byId("colouring").addEventListener("change", (event) => actions.colouring(event.target.value));
-    for (const id of ["sun-date", "sun-hour"]) byId(id).addEventListener("input", () => this.#readSun(actions));
+    for (const id of ["sun-date", "sun-hour"]) byId(id).addEventListener("input", ({ target }) => this.#readSun(target, actions));
     for (const tool of kTools) byId(`tool-${tool}`).addEventListener("click", () => actions.tool(tool));
     byId("link").addEventListener("click", actions.link);
     byId("help").addEventListener("click", () => byId("keys").showModal());
@@ -45,10 +45,14 @@ export class Panel {
     this.splitter = new Splitter(byId("splitter"), actions.split);
   }
 
-  #readSun(actions) {
+  // A date that is being typed is incomplete; then the hour belongs to the last complete one.
+  #readSun(changed, actions) {
+    const date = byId("sun-date");
+    const isComplete = date.value !== "" && date.validity.valid;
+    if (changed === date && !isComplete) return;
     const hour = byId("sun-hour").valueAsNumber;
     const two = (value) => String(Math.floor(value)).padStart(2, "0");
-    if (byId("sun-date").value) actions.sun(`${byId("sun-date").value}T${two(hour)}:${two((hour % 1) * 60)}`);
+    actions.sun(`${isComplete ? date.value : this.day}T${two(hour)}:${two((hour % 1) * 60)}`);
   }
 
   // `text`: "2026-06-21T18:30"; undefined: no sun.
@@ -57,7 +61,8 @@ export class Panel {
     byId("sun-field").hidden = !text;
     if (!text) return;
     const [hour, minute] = text.slice(11).split(":").map(Number);
-    byId("sun-date").value = text.slice(0, 10);
+    this.day = text.slice(0, 10);
+    byId("sun-date").value = this.day;
     byId("sun-hour").value = hour + minute / 60;
     byId("sun-value").textContent = text.slice(11);
     byId("sun-hour").setAttribute("aria-valuetext", text.slice(11));

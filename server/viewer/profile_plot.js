@@ -7,11 +7,12 @@ import { svg } from "/viewer/overlay.js";
 const kMargin = { left: 62, right: 14, top: 10, bottom: 22 };
 const kKeys = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10, Home: -Infinity, End: Infinity };
 
+// Round values between two ends, and the digits behind the point that tell them apart.
 function ticks(low, high, count) {
   const step = niceInterval(Math.max(1e-3, (high - low) / count));
   const values = [];
   for (let value = Math.ceil(low / step) * step; value <= high; value += step) values.push(value);
-  return values;
+  return { values, digits: Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)) };
 }
 
 export class ProfilePlot {
@@ -36,6 +37,8 @@ export class ProfilePlot {
   show(points, sight) {
     Object.assign(this, { points, sight, index: undefined });
     this.element.setAttribute("aria-valuemax", Math.max(0, points.length - 1));
+    this.element.setAttribute("aria-valuenow", 0);
+    this.element.removeAttribute("aria-valuetext");
     this.#draw();
   }
 
@@ -59,12 +62,13 @@ export class ProfilePlot {
     this.y = (value) => kMargin.top + ((top - value) / (top - bottom)) * (height - kMargin.top - kMargin.bottom);
 
     const root = svg("svg", { width, height, "aria-hidden": "true" });
-    for (const value of ticks(bottom, top, 4)) {
+    const levels = ticks(bottom, top, 4);
+    for (const value of levels.values) {
       svg("path", { class: "grid", d: `M${kMargin.left} ${this.y(value)}H${width - kMargin.right}` }, root);
       svg("text", { x: kMargin.left - 6, y: this.y(value), "text-anchor": "end", "dominant-baseline": "central" }, root)
-        .textContent = formatHeight(value);
+        .textContent = formatHeight(value, levels.digits);
     }
-    for (const value of ticks(0, points.at(-1).distance, Math.max(2, width / 140))) {
+    for (const value of ticks(0, points.at(-1).distance, Math.max(2, width / 140)).values) {
       const anchor = this.x(value) > width - 50 ? "end" : this.x(value) < kMargin.left + 10 ? "start" : "middle";
       svg("text", { x: this.x(value), y: height - 5, "text-anchor": anchor }, root).textContent = formatMetres(value);
     }
@@ -83,10 +87,14 @@ export class ProfilePlot {
   #drawGround(root, heights, base) {
     const { points, sight } = this;
     for (let from = 0; from < points.length - 1; ) {
+      if (heights[from] === undefined) {
+        ++from;
+        continue;
+      }
       let to = from;
       const isHidden = sight && !sight.seen[from + 1];
       while (to < points.length - 1 && heights[to + 1] !== undefined && (sight && !sight.seen[to + 1]) === isHidden) ++to;
-      if (to > from && heights[from] !== undefined) {
+      if (to > from) {
         const line = [];
         for (let i = from; i <= to; ++i) line.push(`${this.x(points[i].distance).toFixed(1)} ${this.y(heights[i]).toFixed(1)}`);
         const d = `M${line.join("L")}`;

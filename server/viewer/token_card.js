@@ -21,6 +21,7 @@ export class TokenCard {
   }
 
   close() {
+    if (byId("token-card").contains(document.activeElement)) byId("dataset").focus();
     byId("token").value = "";
     byId("token-card").hidden = true;
   }

@@ -28,7 +28,7 @@ const kCameraRanges = [[-360, 360], [-90, 90], [-12000, 1e8], [-360, 360], [-90,
 export function decodeView(fragment) {
   const query = new URLSearchParams(fragment.replace(/^#/, ""));
   const view = {};
-  const camera = query.get("camera")?.split(",").map(Number);
+  const camera = query.get("camera")?.split(",").map((part) => (part.trim() ? Number(part) : NaN));
   const kRanges = { fraction: kFractions, right: kFractions, exaggeration: [1, 10] };
   if (query.get("dataset")) view.dataset = query.get("dataset");
   for (const [name, range] of Object.entries(kRanges)) {
@@ -36,7 +36,8 @@ export function decodeView(fragment) {
   }
   view.colouring = kColourings.includes(query.get("colours")) ? query.get("colours") : "height";
   const sun = query.get("sun") ?? "";
-  if (/^\d{4}-\d\d-\d\dT\d\d:\d\d$/.test(sun) && Date.parse(`${sun}:00Z`)) view.sun = sun;
+  const time = new Date(`${sun}:00Z`);
+  if (/^\d{4}-\d\d-\d\dT\d\d:\d\d$/.test(sun) && !Number.isNaN(time.getTime()) && time.toISOString().startsWith(sun)) view.sun = sun;
   const split = Number(query.get("split") ?? 0.5);
   view.split = split >= 0 && split <= 1 ? split : 0.5;
   if (camera?.length === 5 && camera.every((value, i) => value === within(value, kCameraRanges[i]))) view.camera = camera;

@@ -18,9 +18,16 @@ describe('shapes of edits', () => {
   const square = [at(-84.3, 36.3), at(-84.3, 36.31), at(-84.29, 36.31), at(-84.29, 36.3)];
 
   it('have an area and a direction', () => {
-    const side = 0.01 * 111320;
-    assert.ok(Math.abs(signedArea(square) + side * side * Math.cos((36.3 * Math.PI) / 180)) < 1000, 'clockwise');
-    assert.ok(signedArea([...square].reverse()) > 0);
+    // Square kilometres: the element of area (the radii of curvature of WGS 84), integrated numerically.
+    const box = (west, south, east, north) => [at(west, south), at(east, south), at(east, north), at(west, north)];
+    for (const [ring, squareKm] of [[box(-84.3, 36.2, -84.2, 36.3), 99.7322], [box(0, 40, 40, 70), 8447290.5433], [box(170, -10, -170, 10), 4899329.1759]]) {
+      for (let first = 0; first < 4; ++first) {
+        const turned = [...ring.slice(first), ...ring.slice(0, first)];
+        assert.ok(Math.abs(signedArea(turned) / 1e6 / squareKm - 1) < 1e-6, `${signedArea(turned) / 1e6} km2`);
+      }
+    }
+    assert.ok(signedArea(square) < 0, 'clockwise');
+    assert.equal(signedArea([at(8, 46), at(9, 46), at(8.5, 46)]), 0);
   });
 
   it('may not cross themselves', () => {
@@ -36,7 +43,7 @@ describe('shapes of edits', () => {
   });
 
   it('move ground', () => {
-    assert.deepEqual(earthwork([10, 20, undefined, 30, 40], 25, 400), { samples: 4, raised: 15, lowered: 15, fill: 2000, cut: 2000 });
+    assert.deepEqual(earthwork([10, 20, undefined, 30, 40], 25, 400), { known: 0.8, raised: 15, lowered: 15, fill: 1600, cut: 1600 });
   });
 
   it('have volumes in one unit', () => {
@@ -126,6 +133,15 @@ describe('edits in the viewer', () => {
     assert.match(page.url(), /&edits/);
     const height = await page.evaluate(() => terrace.globe.heightAt(-84.25, 36.3));
     assert.ok(Math.abs(height - 400) < 60, `on the flat ground, at this error: ${height} m`);
+    const camera = await page.evaluate(() => {
+      const before = terrace.globe.camera;
+      terrace.state.editsInView = undefined;
+      terrace.globe.camera = [-84.25, 36.3, 1200, 0, -90];
+      return before;
+    });
+    await page.waitForFunction(() => terrace.state.editsInView !== undefined, undefined, kWait);
+    assert.equal(await page.evaluate(() => terrace.state.editsInView), 1, 'an edit around the view, without a corner in it');
+    await page.evaluate((before) => (terrace.globe.camera = before), camera);
     await page.locator('#edits').uncheck();
     assert.equal(await page.locator('.overlay .line.edit').count(), 0);
   });
@@ -170,6 +186,25 @@ describe('edits in the viewer', () => {
     const { results } = await json(`${other.url}/jacksboro/heights?locations=${middle}`);
     await other.stop();
     assert.equal(results[0].elevation, 512.5);
+  });
+
+  it('cannot be downloaded if terrace would refuse them', async () => {
+    const draw = (places) => page.evaluate((corners) => {
+      while (terrace.state.draft.corners.length > 0) terrace.state.draft.undo();
+      return corners.map(([longitude, latitude]) => terrace.state.draft.add({ longitude, latitude, height: 400 })).at(-1);
+    }, places);
+    const says = (text) => page.waitForFunction((wanted) => document.getElementById('draft-text').textContent.includes(wanted), text, kWait);
+    await draw([[-84.3, 36.3], [-84.2, 36.3], [-84.25, 36.3]]);
+    await says('on one line');
+    assert.ok(await page.locator('#draft-save').isDisabled());
+    await draw([[-80, 36.3], [-79.9, 36.3], [-79.95, 36.4]]);
+    await says('no heights there');
+    assert.ok(await page.locator('#draft-save').isDisabled());
+    await draw([[-84.3, 36.3], [-82, 36.3], [-82, 36.31], [-84.3, 36.31]]);
+    await says('% of the area has no heights');
+    assert.ok(await page.locator('#draft-save').isEnabled());
+    await draw([[-84.3, 36.3], [-84.2, 36.3], [-84.25, 36.35]]);
+    await says('Raises the ground');
   });
 
   it('stay drafts: undo, and the end of drawing', async () => {

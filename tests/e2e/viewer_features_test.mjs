@@ -15,12 +15,12 @@ const kWait = { timeout: 90000, polling: 200 };
 describe('numbers of the viewer', () => {
   it('measure the ground of a tent', () => {
     const points = [0, 300, 600].map((distance, i) => ({ distance, height: [0, 400, 0][i] }));
-    assert.deepEqual(measurePath(points), { length: 600, along: 1000, up: 400, down: 400, min: 0, max: 400 });
+    assert.deepEqual(measurePath(points), { length: 600, along: 1000, up: 400, down: 400, min: 0, max: 400, gaps: false });
   });
 
   it('leave voids out', () => {
     const points = [{ distance: 0, height: 5 }, { distance: 10 }, { distance: 20, height: 9 }];
-    assert.deepEqual(measurePath(points), { length: 20, along: 20, up: 0, down: 0, min: 5, max: 9 });
+    assert.deepEqual(measurePath(points), { length: 20, along: 20, up: 0, down: 0, min: 5, max: 9, gaps: true });
   });
 
   it('see over a plain, not through a wall, and not beyond the horizon', () => {
@@ -105,6 +105,23 @@ describe('features of the viewer', () => {
     await page.keyboard.press('End');
     assert.match(await page.locator('#plot').getAttribute('aria-valuetext'), /no height$/);
     await page.waitForFunction(() => document.querySelector('.marker.place').hasAttribute('hidden'), undefined, kWait);
+    await measure([-84.7, -84.2]);  // begins beside the data
+    await says(/^[\d.,]+ km straight, .*Parts of the ground have no heights/);
+    const drawn = await page.locator('#plot .ground.fill').evaluate((path) => path.getBBox());
+    assert.ok(drawn.x > 100 && drawn.width > 100, `the ground after the gap is drawn: ${JSON.stringify(drawn)}`);
+    assert.equal(await page.locator('#plot').getAttribute('aria-valuetext'), null, 'of the profile before');
+    await measure([-84.25, -84.2499]);  // 9 m
+    await says(/^[\d.,]+ m straight/);
+    const heights = await page.locator('#plot text[text-anchor=end]').allTextContents();
+    assert.equal(new Set(heights).size, heights.length, heights.join(', '));
+  });
+
+  it('have no key for a tool that is closed', async () => {
+    await page.locator('#dock-close').focus();
+    await page.keyboard.press('Enter');
+    assert.equal(await page.evaluate(() => document.activeElement.id), 'tool-distance');
+    await page.locator('#globe').press('Backspace');
+    assert.deepEqual(page.wrongs, []);
   });
 
   it('tell what hides a place', async () => {
@@ -164,6 +181,15 @@ describe('features of the viewer', () => {
     await page.reload();
     await settled();
     assert.deepEqual(await state(), before);
+    await page.locator('#sun-date').fill('');
+    await page.locator('#sun-hour').focus();
+    await page.keyboard.press('Home');
+    assert.match((await state())[1], /^\d{4}-06-21T00:00$/, 'the hour of the last date');
+    await page.locator('#sun-date').evaluate((date) => {
+      date.value = '12026-06-21';
+      date.dispatchEvent(new Event('input', { bubbles: true }));
+    });
+    assert.match((await state())[1], /^\d{4}-06-21T00:00$/, 'a year of five digits');
     await page.locator('#compare').uncheck();
     await page.locator('#sunny').uncheck();
     await page.locator('#colouring').selectOption('height');
@@ -183,6 +209,10 @@ describe('features of the viewer', () => {
     await server.stop('SIGKILL');
     await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
     await assertAccessible(page, 'a message');
+    await page.locator('#tool-draft').click();
+    await page.getByText('The tool could not be loaded').waitFor({ timeout: 30000 });
+    const boxes = await page.evaluate(() => ['message', 'note'].map((id) => document.getElementById(id).getBoundingClientRect().toJSON()));
+    assert.ok(boxes[0].bottom <= boxes[1].top, `one below the other: ${JSON.stringify(boxes)}`);
     server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
     await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
     await page.locator('#fraction').focus();
@@ -194,9 +224,16 @@ describe('features of the viewer', () => {
 
   it('follow a new version and tell of a dataset that is gone', async () => {
     const version = await page.evaluate(() => terrace.state.dataset.version);
+    await page.locator('#tool-distance').click();
+    await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);
+    await page.evaluate(() => [-84.3, -84.2].map((longitude) => terrace.state.measure.add({ longitude, latitude: 36.3, height: 400 })).at(-1));
+    await says(/straight/);
+    const points = await page.evaluateHandle(() => terrace.state.measure.points);
     write({ ...dataset, error_fraction: 0.9 });
     process.kill(server.pid, 'SIGHUP');
     await page.waitForFunction((old) => ![old, undefined].includes(terrace.globe.shownVersion), version, kWait);
+    await page.waitForFunction((old) => terrace.state.measure.points !== old && terrace.state.measure.points.length > 1, points, kWait);
+    await page.locator('#dock-close').click();
     await settled();
     write({ ...dataset, name: 'others' });
     process.kill(server.pid, 'SIGHUP');

@@ -116,9 +116,11 @@ describe('the viewer', () => {
     assert.deepEqual({ ...view, fraction: 0 }, { fraction: 0, right: undefined, sun: undefined, exaggeration: 10, colouring: 'height', split: 0.5 });
     assert.match(page.url(), /camera=(9|10)\.\d+,4[45]\.\d+,/, 'the first dataset is in view');
     const decoded = (hash) => page.evaluate(async (text) => (await import('/viewer/view_url.js')).decodeView(text), hash);
-    for (const camera of ['a,b,c,d,e', '1,2,3', '', 'NaN,0,0,0,0', '1,2,3,4,5,6', '8,46,1e9,0,0', '8,46,-1e5,0,0', '8,91,5000,0,0']) {
+    for (const camera of ['a,b,c,d,e', '1,2,3', '', 'NaN,0,0,0,0', '1,2,3,4,5,6', '8,46,1e9,0,0', '8,46,-1e5,0,0', '8,91,5000,0,0', ',,,,', '8,46,,0,0']) {
       assert.equal((await decoded(`#dataset=x&camera=${camera}`)).camera, undefined, camera);
     }
+    const suns = ['2026-02-31T10:00', '2026-06-21T24:00', '12026-06-21T10:00', '1970-01-01T00:00', '2026-02-28T23:59'];
+    for (const [i, sun] of suns.entries()) assert.equal((await decoded(`#sun=${sun}`)).sun, i > 2 ? sun : undefined, sun);
     const { camera, fraction, right } = await decoded('#dataset=x&camera=-179.5,-80,-4000,359.9,12.5&fraction=1e-300&right=1e300');
     assert.deepEqual({ camera, fraction, right }, { camera: [-179.5, -80, -4000, 359.9, 12.5], fraction: 1 / 32, right: 4 });
     assert.deepEqual(page.wrongs, []);

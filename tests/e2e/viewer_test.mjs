@@ -330,6 +330,15 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     assert.equal(await page.evaluate(() => terrace.state.dataset.name), 'hills', 'the tab keeps the token');
     assert.deepEqual(unauthorized, []);
     assert.ok(!page.requested.some((url) => url.includes(token)), 'no URL holds the token');
+
+    await page.route('**/datasets', (route) => route.fulfill({ status: 401, json: {} }));  // after a start with other tokens
+    await page.getByText('The server does not know the token of this page any more.').waitFor({ timeout: kSettleMs });
+    await page.unroute('**/datasets');
+    await page.locator('#token').fill(token);
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.getElementById('token-card').hidden, undefined, { timeout: kSettleMs });
+    assert.equal(await page.evaluate(() => document.activeElement.id), 'dataset');
+    assert.deepEqual(page.wrongs, []);
     await page.close();
   });
 
