@@ -175,7 +175,7 @@ struct Config {
   double requests_per_second = 0;                      // of each client or token; 0: no limit
   double request_burst = 0;                            // 0: two seconds' worth
   std::size_t max_mesh_samples = 1025 * 1025;          // a height map of a Unity terrain
-  std::size_t max_locations = 10'000;                  // in one request for heights
+  std::size_t max_locations = 10'000;                  // in one request for heights, or rays of one for sight
 
   std::vector<TokenConfig> tokens;  // none: all datasets are public
   std::vector<std::string> cors_origins = {"*"};
@@ -205,7 +205,7 @@ struct Config {
   friend bool operator==(const Config&, const Config&) = default;
 };
 
-// One error in the configuration. All errors are collected and shown together.
+// One error in the configuration. All errors (at most kMaxConfigErrors) are collected and shown together.
 struct ConfigError {
   std::string path;     // JSON Pointer (RFC 6901) such as "/datasets/0/sources/1", or a flag such as "--listen"
   std::string message;  // what is wrong and how to correct it

@@ -31,7 +31,7 @@ tl::unexpected<Error> CannotPut(const std::string& object) {
 class OpenObject {
  public:
   static Result<OpenObject> Create(const std::string& object) {
-    if (!dem::IsRemote(object)) {
+    if (!dem::IsAllowedRemote(object)) {
       return MakeError(ErrorCode::kInvalidArgument,
                        "{} does not begin with an allowed prefix; add its bucket to allowed_prefixes", object);
     }
@@ -119,7 +119,7 @@ Result<std::vector<std::string>> NamesInBucket(const std::string& folder) {
   const auto fail = [&] {
     return MakeError(ErrorCode::kUnavailable, "{}: no object is listed; check the right to list the bucket", folder);
   };
-  if (!dem::IsRemote(folder + "/x")) return fail();  // the folder itself may be the prefix
+  if (!dem::IsAllowedRemote(folder + "/x")) return fail();  // the folder itself may be the prefix
   dem::InitGdal();
   VSICurlPartialClearCache(folder.c_str());
   const CPLStringList names(VSIReadDir(folder.c_str()));
@@ -133,7 +133,7 @@ Result<std::vector<std::string>> NamesInBucket(const std::string& folder) {
 }
 
 void RemoveObject(const std::string& object) {
-  if (dem::IsRemote(object)) VSIUnlink(object.c_str());
+  if (dem::IsAllowedRemote(object)) VSIUnlink(object.c_str());
 }
 
 }  // namespace terrace::archive

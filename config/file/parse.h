@@ -13,7 +13,7 @@
 
 namespace terrace::config {
 
-// A Config, or all errors in the order of the text. A syntax error is the only error.
+// A Config, or its errors, at most kMaxConfigErrors. A syntax error is the only error.
 using ConfigResult = tl::expected<Config, std::vector<ConfigError>>;
 
 // `directory`: the folder that relative paths and globs in `text` are relative to.

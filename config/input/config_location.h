@@ -1,6 +1,7 @@
 // The location of a value in the configuration: the folder that its paths are relative to, and the list that its errors
-// go to. For the modules of config/ only. Messages go into logs, and any value may be a token by mistake. Therefore no
-// message quotes a value, or a key that does not resemble a known one.
+// go to. For the modules of config/ only. Messages go into logs, and any value may be a token by mistake. Therefore a
+// message quotes no value that is wrong, and no key that does not resemble a known one; it quotes names of datasets and
+// of folders.
 #pragma once
 
 #include <filesystem>

@@ -105,7 +105,7 @@ class DuplicateKeyFinder : public nlohmann::detail::json_sax_dom_parser<Json> {
   const std::string& fault() const { return fault_; }
 
  private:
-  // Each level takes more memory than text.
+  // A level takes more bytes of memory than its bracket takes of text.
   bool Descend() {
     if (++depth_ <= kMaxDepth) return true;
     return Refuse(fmt::format("lists or objects nested more than {} deep; no configuration is that deep", kMaxDepth));

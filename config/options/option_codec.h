@@ -1,7 +1,7 @@
 // Reads the values of options from JSON and writes them back. For this module only.
-// A codec belongs to one member of Config or DatasetConfig. `read` sets the member, or reports what the value must be.
-// `write` returns a value that `read` accepts. `from_text` converts the text of a flag to such a value. `schema` is the
-// JSON Schema of the values that `read` accepts.
+// A codec belongs to one member of Config, DatasetConfig or a struct in them. `read` sets the member, or reports what
+// the value must be. `write` returns a value that `read` accepts. `from_text` converts the text of a flag to such a
+// value. `schema` is the JSON Schema of the values that `read` accepts.
 #pragma once
 
 #include <fmt/format.h>
@@ -52,7 +52,7 @@ bool HasControlCharacter(const std::string& text);
 // A check for Text: returns "must be text on one line", or an empty string.
 std::string CheckOneLine(const std::string& text);
 
-// A whole number below 2^53, which JSON represents exactly. 1e3 and 1000.0 are whole.
+// A whole number from -2^53 to 2^53, which a double represents exactly. 1e3 and 1000.0 are whole.
 std::optional<std::int64_t> WholeNumber(const Json& value);
 // 268435456, "512MB", "1GiB", "64 MiB"
 std::optional<std::int64_t> ByteCount(const Json& value);

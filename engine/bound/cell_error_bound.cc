@@ -130,7 +130,7 @@ double CellErrorBound::BoundByAverages(const TileCell& cell, bool& has_voids) co
   };
   SampleBox around;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto [node_column, node_row] = tile_.NodeAt(cell, k);
+    const auto [node_column, node_row] = tile_.GlobalNode(cell, k);
     const GridCell at = reading_.cells.OfNode(node_column, node_row);
     SampleBox near{at.column, at.row, at.column + 1, at.row + 1};
     if (off_x > 0 || off_y > 0) {
@@ -203,7 +203,7 @@ double CellErrorBound::BoundByAveragesNear(const TileCell& cell, const PixelBoun
 std::optional<std::array<Position, 4>> CellErrorBound::CornersOf(const TileCell& cell) const {
   std::array<Position, 4> corners;
   for (std::size_t k = 0; k < 4; ++k) {
-    const auto [column, row] = tile_.NodeAt(cell, k);
+    const auto [column, row] = tile_.GlobalNode(cell, k);
     corners[k] = reading_.cells.positions().OfNode(column, row);
     if (grid_.georeference().is_geographic_grid()) {
       // The nodes of a pole may share one position: use the columns of the row beside it.

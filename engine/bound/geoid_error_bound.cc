@@ -77,7 +77,7 @@ void GeoidErrorBound::FindLines(const UndulationGrid& grid) {
   }
   is_whole_ = is_inside && patch_->is_whole();
   for (int j = 0; j <= tile_.cells() && is_whole_; ++j) {
-    is_whole_ = AreFinite(added_.subspan(tile_.NodeOf(0, j), static_cast<std::size_t>(tile_.cells()) + 1));
+    is_whole_ = AreFinite(added_.subspan(tile_.NodeIndex(0, j), static_cast<std::size_t>(tile_.cells()) + 1));
   }
 }
 
@@ -156,7 +156,7 @@ double GeoidErrorBound::OverNodes(const TileCell& cell) const {
 // difference at the ends of the step is at least half of that product. So half a second difference per axis is a bound;
 // the whole is used, because the change of slope varies along the line.
 double GeoidErrorBound::OverSmooth(const CellBox& box) const {
-  const auto at = [&](int i, int j) { return added_[tile_.NodeOf(i, j)]; };
+  const auto at = [&](int i, int j) { return added_[tile_.NodeIndex(i, j)]; };
   double xx = 0, yy = 0, xy = 0, sum = 0;
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {

@@ -38,7 +38,7 @@ class GridStatistics {
 
   const RasterGrid& grid_;
   const GridReading& reading_;
-  const double turn_;              // columns; 0: the raster grid does not wrap around the Earth
+  const double turn_;              // columns in 360 degrees; 0: the raster grid is not geographic
   Box around_;                     // the tile's pixels, and some more
   std::vector<std::size_t> near_;  // members that meet it, in any turn
   mutable std::size_t members_visited_ = 0;

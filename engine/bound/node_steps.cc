@@ -33,7 +33,7 @@ HWY_INLINE void Raise(V& largest, V value) {
   largest = hn::Max(largest, hn::Abs(value));
 }
 
-// Measures the nodes of as many columns as the tag has lanes. `known` becomes NaN with any place.
+// Measures the nodes of as many columns as the tag has lanes. `known` becomes NaN if a place is.
 template <class D, class V = hn::Vec<D>>
 HWY_INLINE void MeasureColumns(D d, const double* place, std::size_t stride, int rows, AxisSteps<D>& steps, V& known) {
   V here = hn::LoadU(d, place), south = hn::Sub(here, hn::LoadU(d, place - stride));

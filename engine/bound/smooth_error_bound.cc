@@ -126,7 +126,7 @@ PixelBounds SmoothErrorBound::BoundsOf(const CellBox& box) const {
   PixelBounds bounds;
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {
-      const std::size_t n = tile_.NodeOf(i, j);
+      const std::size_t n = tile_.NodeIndex(i, j);
       const double x = is_separable_ ? x_[static_cast<std::size_t>(i + 1)] : x_[n];
       const double y = is_separable_ ? y_[static_cast<std::size_t>(j + 1)] : y_[n];
       if (std::isnan(x + y) || std::isnan(reading_.heights[n])) return {};
@@ -150,7 +150,7 @@ double SmoothErrorBound::LargestBlend(const CellBox& box) const {
   float largest = 0;
   for (int j = box.south; j <= box.north; ++j) {
     for (int i = box.west; i <= box.east; ++i) {
-      const std::size_t n = tile_.NodeOf(i, j);
+      const std::size_t n = tile_.NodeIndex(i, j);
       largest = std::max(largest, std::abs(tile_.heights[n] - reading_.heights[n]));
     }
   }
@@ -161,7 +161,7 @@ bool SmoothErrorBound::Measure(const CellBox& box, NodeSteps& steps, PixelBounds
   if (is_separable_) {
     if (!MeasureAxes(box, steps, at)) return false;
   } else {
-    const std::size_t n = tile_.NodeOf(box.west, box.south);
+    const std::size_t n = tile_.NodeIndex(box.west, box.south);
     const NodeCoordinates places{x_.get() + n, y_.get() + n, tile_.stride()};
     if (!MeasureSteps(places, box.east - box.west, box.north - box.south, steps, at)) return false;
   }
@@ -187,7 +187,7 @@ bool SmoothErrorBound::MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBo
       if (!GaveHeights(j, west - 1, east + 2)) return false;
     }
   }
-  double finite = 0;  // becomes NaN with any place
+  double finite = 0;  // becomes NaN if a place is
   const auto measure = [&](const double* places, std::size_t first, std::size_t last, double& step, double& bend) {
     for (std::size_t k = first; k <= last; ++k) {
       const double after = places[k + 1] - places[k], before = places[k] - places[k - 1];

@@ -1,5 +1,6 @@
-// Error bound for tile cells whose nodes are evenly spaced on the raster grid. The bound follows from the second
-// differences of the samples: they limit how far the surface between nodes departs from the one between samples.
+// Error bound for tile cells whose nodes are regular: nodes that took their heights from the raster grid, and lie where
+// its averages are evenly spaced. The bound follows from the second differences of the samples: they limit how far the
+// surface between nodes departs from the one between samples.
 #pragma once
 
 #include <cstddef>
@@ -26,10 +27,10 @@ class SmoothErrorBound {
   void PrepareRows(int south, int north);
 
   // Returns a bound in metres on the difference between served heights and the raster grid's samples. NaN or infinity:
-  // no bound is known, because a node is not evenly spaced, a sample is void or the geoid is not known.
+  // no bound is known, because a node is not regular, a sample is void or the geoid is not known.
   double BoundOver(const CellBox& box);
 
-  // Returns the bounds of the box's nodes, in averages; empty if one of them is not evenly spaced.
+  // Returns the bounds of the box's nodes, in averages; empty if one of them is not regular.
   PixelBounds BoundsOf(const CellBox& box) const;
 
  private:
@@ -40,7 +41,7 @@ class SmoothErrorBound {
   void PlaceNodes(const RasterGrid& grid);
   bool GaveHeights(std::size_t row, std::size_t first, std::size_t end) const;
   bool MeasureAxes(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
-  // Returns false if a node or a neighbour of one is not evenly spaced.
+  // Returns false if a node or a neighbour of one is not regular.
   bool Measure(const CellBox& box, NodeSteps& steps, PixelBounds& at) const;
   SampleBox AveragesIn(const PixelBounds& at) const;
   SampleBox Clipped(SampleBox range) const;
@@ -57,7 +58,7 @@ class SmoothErrorBound {
   const bool blends_;
   const double position_error_;  // in averages
   const Position misplacement_;  // of samples, in averages
-  // In averages; NaN where not evenly spaced: per column and per row of the tile's window if separable, else per node.
+  // In averages; NaN if not regular: per column and per row of the tile's window if separable, else per node.
   std::unique_ptr<double[]> x_, y_;
   bool is_separable_ = false;
   int known_south_ = 0, known_north_ = -1;  // rows of cells whose nodes all have heights, of those prepared

@@ -212,11 +212,11 @@ class GridErrorBound {
     AddBox(box, true);
   }
 
-  // Bounds the box as a whole if possible; else it is divided later. `may_give_way`: false if the box that this is a
-  // quarter of has no blended heights.
-  void AddBox(const CellBox& box, bool may_give_way) {
+  // Bounds the box as a whole if possible; else it is divided later. `parent_may_blend`: whether the box that this is a
+  // quarter of may have blended heights.
+  void AddBox(const CellBox& box, bool parent_may_blend) {
     if (!Touches(box)) return;
-    const bool may_blend = may_give_way && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
+    const bool may_blend = parent_may_blend && MayBlend(box), is_filled = may_blend && MayBeFilled(box);
     const bool is_partly_hidden = tile_.blends_ && IsPartlyCovered(box);
     const double error = is_filled || is_partly_hidden ? kUnknownError : smooth_.BoundOver(box);
     if (!std::isfinite(error)) {
@@ -235,7 +235,7 @@ class GridErrorBound {
   // Whether no node of the box took its height from the raster grid.
   bool HasNoHeights(const CellBox& box) const {
     for (int j = box.south; j <= box.north; ++j) {
-      const auto first = reading_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeOf(box.west, j));
+      const auto first = reading_.heights.begin() + static_cast<std::ptrdiff_t>(nodes_.NodeIndex(box.west, j));
       if (!std::all_of(first, first + (box.east - box.west + 1), [](float height) { return std::isnan(height); })) {
         return false;
       }

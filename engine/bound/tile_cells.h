@@ -69,16 +69,16 @@ struct TileNodes {
   int cells() const { return lattice.cells; }
   std::size_t stride() const { return static_cast<std::size_t>(window.columns); }
   // Index of the south-western node of a cell.
-  std::size_t NodeOf(int i, int j) const {
+  std::size_t NodeIndex(int i, int j) const {
     return static_cast<std::size_t>(j + 1) * stride() + static_cast<std::size_t>(i + 1);
   }
   TileCell Cell(int i, int j) const {
-    const std::size_t n = NodeOf(i, j);
+    const std::size_t n = NodeIndex(i, j);
     return {i, j, {n, n + 1, n + stride(), n + stride() + 1}};
   }
 
   // Global column and row of a cell's node, 0 to 3.
-  std::pair<std::int64_t, std::int64_t> NodeAt(const TileCell& cell, std::size_t k) const {
+  std::pair<std::int64_t, std::int64_t> GlobalNode(const TileCell& cell, std::size_t k) const {
     return {window.column + 1 + cell.i + (k % 2 == 0 ? 0 : 1), window.row + 1 + cell.j + (k < 2 ? 0 : 1)};
   }
 

@@ -20,8 +20,8 @@ std::vector<Position> Outline(double width, double height) {
   return outline;
 }
 
-// Also if the pole is so close that two points of the outline may lie on both sides of it, or beside the raster by
-// rounding.
+// Whether the raster contains this pole, or ends so close to it that two points of the outline may lie on both sides of
+// it, or that rounding may put it beside the raster.
 bool HoldsPole(const Georeference& georeference, double latitude) {
   std::array<Position, 4> poles{{{0, latitude}, {90, latitude}, {180, latitude}, {-90, latitude}}};
   georeference.ToPixels(poles);

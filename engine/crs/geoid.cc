@@ -184,8 +184,9 @@ void Geoid::FindGrid() {
 }
 
 // Most height systems have one operation for the whole Earth, which thousands of sources share; PROJ takes about 20 ms
-// to look it up. Failures are not cached, because a missing grid may be installed later.
-std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made) {
+// to look it up. Failures are not cached, because a missing grid may be installed later. Stores `made` if it is not
+// null. Null: none is stored, or its grid has changed.
+std::shared_ptr<const Geoid> Geoid::FindOrShare(const std::string& vertical_crs, std::shared_ptr<const Geoid> made) {
   static std::mutex mutex;
   // Never destroyed: at the end of the process, what GDAL and PROJ need to free their objects may be gone.
   static auto& shared = *new std::map<std::string, std::shared_ptr<const Geoid>>;
@@ -197,7 +198,7 @@ std::shared_ptr<const Geoid> Geoid::FindShared(const std::string& vertical_crs, 
 }
 
 Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_crs, Position centre) {
-  if (auto known = FindShared(vertical_crs, nullptr); known && Covers(known->area_, centre)) {
+  if (auto known = FindOrShare(vertical_crs, nullptr); known && Covers(known->area_, centre)) {
     return Checked(std::move(known), centre);
   }
   const ProjContextPtr context = MakeProjContext();
@@ -232,7 +233,7 @@ Result<std::shared_ptr<const Geoid>> Geoid::OfCrs(const std::string& vertical_cr
     geoid->files_ = StampedFiles(files);
     geoid->FindGrid();
     auto checked = Checked(geoid, centre);
-    if (checked && count == 1) FindShared(vertical_crs, *checked);
+    if (checked && count == 1) FindOrShare(vertical_crs, *checked);
     return checked;
   }
   return MakeError(ErrorCode::kInvalidArgument, "{} cannot be converted to ellipsoidal heights: {}", geoid->name_,

@@ -22,8 +22,8 @@ namespace terrace::dem {
 // Whether an area contains a position. Longitudes count modulo 360 degrees.
 bool Covers(const geo::GeoBounds& area, Position degrees);
 
-// Returns the name of a vertical reference system, in a form as for Geoid::OfCrs, that counts downwards, as depths do.
-// Nothing: it has heights, or PROJ does not know it.
+// `vertical_crs`: as for Geoid::OfCrs. Returns its name if it counts downwards, as depths do. Nothing: it has heights,
+// or PROJ does not know it.
 std::optional<std::string> NameOfDepths(const std::string& vertical_crs);
 
 // Thread-safe: every call borrows a PROJ context of its own.
@@ -35,7 +35,8 @@ class Geoid {
   static Result<std::shared_ptr<const Geoid>> OfCrs(const std::string& vertical_crs, Position centre);
 
   // Opens a file of undulations above the WGS 84 ellipsoid, in metres: .gtx, or GeoTIFF as on cdn.proj.org.
-  // kInvalidArgument: PROJ cannot read it, or no undulation is as large as its value at `centre`.
+  // kNotFound: there is no such file. kInvalidArgument: PROJ cannot read it, or its value at `centre` is larger than
+  // any undulation of the Earth.
   static Result<std::shared_ptr<const Geoid>> OfGrid(const std::string& path, Position centre);
 
   // Returns the geoid's height above the ellipsoid in metres; NaN where the geoid is not known. The result depends only
@@ -70,7 +71,7 @@ class Geoid {
   Geoid() = default;
   static Result<std::shared_ptr<const Geoid>> Checked(std::shared_ptr<const Geoid> geoid, Position centre);
   void FindGrid();
-  static std::shared_ptr<const Geoid> FindShared(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
+  static std::shared_ptr<const Geoid> FindOrShare(const std::string& vertical_crs, std::shared_ptr<const Geoid> made);
 
   geo::GeoBounds area_;  // of use
   std::string name_, unit_, description_;

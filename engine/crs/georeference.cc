@@ -63,7 +63,7 @@ std::string UnitOfHeightAxis(const OGRSpatialReference& srs) {
   return fmt::format("{} m a unit", metres);  // unknown unit: logged as a warning
 }
 
-// Returns nothing if the CRS cannot be written as WKT.
+// Returns nothing if the CRS cannot be written in PROJ's older notation.
 std::optional<std::string> Proj4(const OGRSpatialReference& srs) {
   char* text = nullptr;
   const bool written = srs.exportToProj4(&text) == OGRERR_NONE;

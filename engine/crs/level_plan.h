@@ -1,5 +1,5 @@
-// The deepest level of a source, and the lattice and averaging factor of each level. All are functions of the source
-// and the level alone.
+// The deepest level of a source, and the lattice and averaging factor of each level. All are functions of the arguments
+// alone.
 #pragma once
 
 #include <optional>

@@ -19,7 +19,7 @@ ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position 
   if (any == nullptr) return nullptr;
   ProjObjectPtr ordered(proj_normalize_for_visualization(context, any.get()));
   if (ordered == nullptr) return nullptr;
-  is_only = proj_get_type(ordered.get()) != PJ_TYPE_UNKNOWN;  // that of a set of operations
+  is_only = proj_get_type(ordered.get()) != PJ_TYPE_UNKNOWN;  // unknown: the type of a set of operations
   const PJ_COORD there = proj_trans(ordered.get(), PJ_INV, proj_coord(centre.x, centre.y, 0, HUGE_VAL));
   proj_trans(ordered.get(), PJ_FWD, there);
   ProjObjectPtr used(proj_trans_get_last_used_operation(ordered.get()));
@@ -27,8 +27,8 @@ ProjObjectPtr OperationAt(PJ_CONTEXT* context, const std::string& wkt, Position 
 }
 
 // Most reference systems have only one operation, which thousands of sources share; PROJ takes milliseconds to look it
-// up.
-std::shared_ptr<const Projector> FindShared(const std::string& wkt, std::shared_ptr<const Projector> made) {
+// up. Stores `made` if it is not null. Null: none is stored, or its grids have changed.
+std::shared_ptr<const Projector> FindOrShare(const std::string& wkt, std::shared_ptr<const Projector> made) {
   static std::mutex mutex;
   // Never destroyed: at the end of the process, what GDAL and PROJ need to free their objects may be gone.
   static auto& shared = *new std::map<std::string, std::shared_ptr<const Projector>>;
@@ -42,7 +42,7 @@ std::shared_ptr<const Projector> FindShared(const std::string& wkt, std::shared_
 }  // namespace
 
 Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt, Position centre) {
-  if (auto known = FindShared(wkt, nullptr)) return known;
+  if (auto known = FindOrShare(wkt, nullptr)) return known;
   const ProjContextPtr context = MakeProjContext();
   bool is_only = false;
   const ProjObjectPtr operation = OperationAt(context.get(), wkt, centre, is_only);
@@ -66,7 +66,7 @@ Result<std::shared_ptr<const Projector>> Projector::Make(const std::string& wkt,
     return MakeError(ErrorCode::kInvalidArgument, "the transformation from WGS 84 cannot be set up: {}",
                      projector->pipeline());
   }
-  return is_only ? FindShared(wkt, projector) : projector;
+  return is_only ? FindOrShare(wkt, projector) : projector;
 }
 
 void Projector::Transform(std::span<Position> positions, bool forward) const {

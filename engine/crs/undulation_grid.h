@@ -18,7 +18,7 @@
 
 namespace terrace::dem {
 
-// A position along one axis of a grid, between two nodes; no nodes outside the grid.
+// A position along one axis of a grid, between two nodes; outside the grid both are -1.
 struct AxisPosition {
   int node = -1, next = -1;
   double weight = 0;  // of `next`, 0 .. 1

@@ -229,7 +229,6 @@ void Undulations::FillBoxes() {
   values.reserve(positions.size());
   const Geoid::Reader geoid(*geoid_);
   for (const Position& position : positions) values.push_back(geoid.At(position));
-  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   whole_ = {kInfinity, -kInfinity};
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
@@ -268,7 +267,7 @@ const HeightRange& Undulations::BoxAt(double longitude, double latitude) const {
 }
 
 HeightRange Undulations::RangeOf(double west, double south, double width, double height) const {
-  HeightRange range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+  HeightRange range{kInfinity, -kInfinity};
   const HeightRange& whole = ranges_ ? ranges_->whole() : whole_;
   if (ranges_) range = ranges_->Query(west, south, width, height);
   const double box_width = (area_.east - area_.west) / columns_, box_height = (area_.north - area_.south) / rows_;
@@ -334,7 +333,7 @@ Result<void> Undulations::Interpolate(const Grid& grid, const NodeWindow& window
 }
 
 template <typename Grid>
-void Undulations::Ask(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
+void Undulations::Evaluate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const {
   constexpr int kCell = NodeCell<Grid>::kSize;
   const auto at = [&](std::int64_t column, std::int64_t row) -> double& {
     return out[static_cast<std::size_t>((row - window.row) * window.columns + column - window.column)];
@@ -376,7 +375,7 @@ template <typename Grid>
 Result<std::vector<double>> Undulations::At(const Grid& grid, const NodeWindow& window) const {
   std::vector<double> out(Area(window.columns, window.rows), kUnknownUndulation);
   if (geoid_->grid() == nullptr) {
-    Ask(grid, window, out);
+    Evaluate(grid, window, out);
   } else if (auto done = Interpolate(grid, window, out); !done) {
     return tl::unexpected(done.error());
   }

@@ -79,7 +79,7 @@ class Undulations {
   Undulations(std::shared_ptr<const Geoid> geoid, const Footprint& area) : geoid_(std::move(geoid)), area_(area) {}
   Result<void> FindPoles();
   template <typename Grid>
-  void Ask(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
+  void Evaluate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
   template <typename Grid>
   Result<void> Interpolate(const Grid& grid, const NodeWindow& window, std::vector<double>& out) const;
   double EastOfArea(double longitude) const;  // degrees, 0 .. 360

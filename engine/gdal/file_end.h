@@ -14,8 +14,8 @@ namespace terrace::dem {
 // nothing is known, as for files of other formats and for a JPEG with its end marker.
 std::uint64_t EndOfSamples(GDALDataset& dataset, const std::string& path);
 
-// The same for the first bytes of a netCDF file. 0: it is of no classic format (CDF-1, CDF-2, CDF-5), as netCDF-4 is,
-// its header is damaged, or it is not complete in `bytes`.
+// The same for the first bytes of a netCDF file. 0: it has no classic format (CDF-1, CDF-2, CDF-5; netCDF-4 has
+// none), its header is damaged, or the header is not complete in `bytes`.
 std::uint64_t EndOfClassicNetCdf(std::string_view bytes);
 
 // The size in bytes that the first bytes of an HDF5 file state; netCDF-4 is HDF5. 0: they are no such header.

@@ -1,4 +1,4 @@
-// Owning pointers to PROJ objects. For sources that use PROJ directly; others use operation_pool.h.
+// Owning pointers to PROJ objects. For code that calls PROJ itself; other code uses operation_pool.h.
 #pragma once
 
 #include <proj.h>

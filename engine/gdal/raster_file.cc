@@ -37,7 +37,7 @@ constexpr unsigned kOpenFlags = GDAL_OF_RASTER | GDAL_OF_READONLY | GDAL_OF_VERB
 class LookUpSidecars {
  public:
   explicit LookUpSidecars(const std::string& path) {
-    if (!IsRemote(path)) option_.emplace("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
+    if (!IsAllowedRemote(path)) option_.emplace("GDAL_DISABLE_READDIR_ON_OPEN", "TRUE", /*bSetOnlyIfUndefined=*/false);
   }
 
  private:
@@ -123,7 +123,7 @@ Result<void> CheckShape(GDALDataset& dataset, const std::string& path) {
 // GDAL's drivers of several other formats (SRTMHGT, ENVI, HFA) return zeros for samples that the network did not
 // deliver.
 Result<void> CheckRemoteFormat(GDALDataset& dataset, const std::string& path) {
-  if (!IsRemote(path) || EQUAL(dataset.GetDriverName(), "GTiff")) return {};
+  if (!IsAllowedRemote(path) || EQUAL(dataset.GetDriverName(), "GTiff")) return {};
   return MakeError(
       ErrorCode::kInvalidArgument,
       "{}: is remote, and its format is {}: only GeoTIFFs are read over the network, because GDAL does not "
@@ -222,7 +222,7 @@ bool HasMaskOfItsOwn(GDALDataset& dataset) {
 // GDAL ignores sidecars that it cannot read, and would so make heights of the voids that they declare. It reads no
 // description (.aux.xml) of a VRT.
 Result<void> CheckSidecarsAreRead(GDALDataset& dataset, const std::string& path) {
-  if (IsRemote(path)) return {};
+  if (IsAllowedRemote(path)) return {};
   const auto refuse = [](const std::string& file, std::string_view what) {
     return MakeError(ErrorCode::kInvalidArgument, "{}: is not used by GDAL: {}; write it again, or remove it", file,
                      what);
@@ -247,7 +247,7 @@ Error CutShort(const std::string& path, std::uint64_t size, std::uint64_t end) {
 
 // What GDAL's own message, "not recognized as a supported file format", does not say.
 std::optional<Error> ExplainUnrecognized(const std::string& path) {
-  if (IsRemote(path)) return std::nullopt;
+  if (IsAllowedRemote(path)) return std::nullopt;
   std::error_code unknown;
   std::string start(64, '\0');
   std::ifstream(path, std::ios::binary).read(start.data(), static_cast<std::streamsize>(start.size()));
@@ -312,7 +312,7 @@ Result<void> CheckEnd(GDALDataset& dataset, const std::string& path, int bands) 
 Result<void> CheckParts(const std::string& vrt) {
   std::set<std::string> known;
   for (const std::string& part : PartsOfVrt(vrt)) {
-    if (IsRemote(part) || !known.insert(part).second) continue;
+    if (IsAllowedRemote(part) || !known.insert(part).second) continue;
     const auto refuse = [&](const Error& error) {
       return MakeError(error.code, "{}: a part of it: {}", vrt, error.message);
     };
@@ -344,10 +344,10 @@ Result<void> CheckSizeToMesh(const std::string& path, int width, int height) {
 
 void ForgetRemote(const std::string& path) {
   if (!AllowsRemote()) return;
-  if (IsRemote(path)) return VSICurlPartialClearCache(path.c_str());
+  if (IsAllowedRemote(path)) return VSICurlPartialClearCache(path.c_str());
   if (path.starts_with("/vsi") || !CheckSourceName(path) || !LooksLikeVrt(path)) return;
   for (const std::string& part : PartsOfVrt(path)) {
-    if (IsRemote(part)) VSICurlPartialClearCache(part.c_str());
+    if (IsAllowedRemote(part)) VSICurlPartialClearCache(part.c_str());
   }
 }
 
@@ -403,7 +403,7 @@ bool ReadRaw(GDALRasterBand& band, int col, int row, int cols, int rows, GDALDat
 }
 
 Result<void> CheckComplete(GDALDataset& dataset, const std::string& path, int bands) {
-  if (IsRemote(path)) return {};
+  if (IsAllowedRemote(path)) return {};
   return EQUAL(dataset.GetDriverName(), "VRT") ? CheckParts(path) : CheckEnd(dataset, path, bands);
 }
 
@@ -430,12 +430,12 @@ std::vector<std::string> FilesOf(GDALDataset& dataset, const std::string& path) 
   for (int i = 0; i < list.Count(); ++i) {
     if (path != list[i]) files.emplace_back(list[i]);
   }
-  if (IsRemote(path) || !LooksLikeVrt(path)) return files;
+  if (IsAllowedRemote(path) || !LooksLikeVrt(path)) return files;
   std::set<std::string> known(files.begin(), files.end());
   for (const std::string& part : PartsOfVrt(path)) {
     for (const char* beside : {"", ".ovr", ".msk", ".aux.xml"}) {
       if (std::string name = part + beside; known.insert(name).second) files.push_back(std::move(name));
-      if (IsRemote(part)) break;  // each file beside it would take a request
+      if (IsAllowedRemote(part)) break;  // each file beside it would take a request
     }
   }
   return files;

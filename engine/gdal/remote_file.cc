@@ -40,7 +40,7 @@ RemoteFile::RemoteFile(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 RemoteFile::~RemoteFile() = default;
 
 Result<std::unique_ptr<RemoteFile>> RemoteFile::Open(const std::string& path) {
-  if (!IsRemote(path)) {
+  if (!IsAllowedRemote(path)) {
     return MakeError(ErrorCode::kInvalidArgument,
                      "{} does not begin with an allowed prefix; add its bucket to allowed_prefixes, or give a folder",
                      path);

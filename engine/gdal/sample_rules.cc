@@ -97,6 +97,7 @@ std::string WhyOverviewsLackMasks(GDALRasterBand& band) {
 }
 
 std::optional<double> MetresPerUnit(const std::string& unit) {
+  if (unit.empty()) return 1;
   std::string name;
   for (const char c : unit) {
     if (std::isdigit(static_cast<unsigned char>(c))) return std::nullopt;  // "0.1 m"
@@ -109,7 +110,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
     std::string_view names;
   };
   constexpr Unit kUnits[] = {
-      {1, "  m metre metres meter meters "},
+      {1, " m metre metres meter meters "},
       {.01, " cm centimetre centimeter centimetres centimeters "},
       {.001, " mm millimetre millimeter millimetres millimeters "},
       {1000, " km kilometre kilometer kilometres kilometers "},
@@ -120,7 +121,7 @@ std::optional<double> MetresPerUnit(const std::string& unit) {
       {6 * kFoot, " fathom fathoms "},
   };
   for (const Unit& unit_of : kUnits) {
-    if (unit_of.names.find(" " + name + " ") != std::string_view::npos) return unit_of.metres;
+    if (!name.empty() && unit_of.names.find(" " + name + " ") != std::string_view::npos) return unit_of.metres;
   }
   return std::nullopt;
 }
@@ -144,12 +145,12 @@ namespace {
 // Most bands have at most one nodata value and no other rules.
 bool IsPlain(const SampleRules& rules) { return !rules.has_mask && !rules.is_indicator && rules.extra_nodata.empty(); }
 
-// Raw samples are heights in metres that a float represents exactly.
+// Raw samples are heights in metres.
 bool IsInMetres(const SampleRules& rules) {
   return rules.scale == 1 && rules.offset == 0 && rules.metres_per_unit == 1 && !rules.is_signed_byte;
 }
 
-// The type in which a band is read; double if more than a sample's value must be tested.
+// The type in which a band is read: its own if ConvertSamples does all that the rules require, else double.
 GDALDataType RawTypeOf(GDALRasterBand& band, const SampleRules& rules) {
   const GDALDataType type = band.GetRasterDataType();
   const bool is_exact = type == GDT_Byte || type == GDT_Int16 || type == GDT_UInt16 || type == GDT_Float32;

@@ -25,8 +25,8 @@ struct SampleRules {
   bool compare_as_float = false;
   std::vector<double> extra_nodata;                         // further raw values that are voids: configured or detected
   double lowest = -kMaxAbsHeight, highest = kMaxAbsHeight;  // metres; heights beyond are voids
-  // Samples within this number of samples of a void, along either axis, are voids too, because resampling mixed them
-  // with nodata values. Applies only at full resolution.
+  // Samples within this number of columns and rows of a void are voids too, because resampling mixed them with nodata
+  // values. Applies only at full resolution.
   int void_margin = 0;
   bool has_mask = false;         // a mask band says which samples are valid
   bool is_signed_byte = false;   // bytes above 127 are negative numbers; GDAL before 3.7 does not convert them
@@ -66,11 +66,11 @@ std::optional<double> DeclaredNodata(GDALRasterBand& band);
 // `standard_name: sea_floor_depth_below_geoid` (CF conventions 1.11, section 3.3); empty: none does.
 std::string AttributeOfDepths(GDALRasterBand& band);
 
-// Why the overviews of a band with a mask, or with an alpha band, show samples that it hides, and the remedy; empty:
-// they hide them too, or there is nothing that hides samples.
+// Returns why samples that the mask or the alpha band of a band hides are visible in its overviews, with the remedy.
+// Empty: they are hidden there too, or nothing is hidden.
 std::string WhyOverviewsLackMasks(GDALRasterBand& band);
 
-// Returns metres per unit for a unit name; nothing if the name is unknown.
+// Returns metres per unit for a unit name, 1 for an empty one; nothing if the name is unknown.
 std::optional<double> MetresPerUnit(const std::string& unit);
 
 // Gets the next rows of heights.

@@ -54,7 +54,7 @@ bool HasControlCharacter(const std::string& text) {
 }
 
 // Accepts names that stay below an allowed prefix: no "..", options ("?") or nested names.
-bool IsAllowedRemote(const SourcePolicy& policy, const std::string& path) {
+bool IsBelowPrefix(const SourcePolicy& policy, const std::string& path) {
   return std::ranges::any_of(policy.prefixes, [&](const std::string& prefix) {
     if (!path.starts_with(prefix)) return false;
     const std::string rest = "/" + path.substr(prefix.size());
@@ -156,8 +156,8 @@ std::string EscapeControls(const std::string& path) {
   return escaped;
 }
 
-bool IsRemote(const std::string& path) {
-  return path.starts_with("/vsi") && !HasControlCharacter(path) && IsAllowedRemote(*Current(), path);
+bool IsAllowedRemote(const std::string& path) {
+  return path.starts_with("/vsi") && !HasControlCharacter(path) && IsBelowPrefix(*Current(), path);
 }
 
 bool HasDataRoots() { return !Current()->roots.empty(); }
@@ -184,7 +184,7 @@ Result<void> CheckPlainFile(const std::string& path) {
 }
 
 Result<void> CheckSourceName(const std::string& path) {
-  if (IsRemote(path)) return {};
+  if (IsAllowedRemote(path)) return {};
   if (auto file = CheckPlainFile(path); !file) return file;
   if (!LooksLikeVrt(path)) return {};
   if (std::ranges::find(DriversOf(*Current()), "VRT") == DriversOf(*Current()).end()) {

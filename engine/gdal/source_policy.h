@@ -31,8 +31,8 @@ Result<void> SetSourcePolicy(const SourcePolicy& policy);
 // Sets the default policy with VRTs allowed, for commands that read files named by their user.
 Result<void> AllowVrts();
 
-// Checks whether a name may be passed to GDAL. Opens no file that is not allowed. kNotFound, kInvalidArgument: the
-// message has the remedy.
+// Checks whether a name may be passed to GDAL. Opens no file that is not allowed. kNotFound, kUnavailable (it cannot be
+// read), kInvalidArgument: the message has the remedy.
 Result<void> CheckSourceName(const std::string& path);
 
 // Checks that an opened file refers to allowed files only. Call it before overviews are used.
@@ -49,8 +49,8 @@ std::string EscapeControls(const std::string& path);
 bool HasDataRoots();
 bool AllowsRemote();
 
-// Whether the name is below an allowed remote prefix.
-bool IsRemote(const std::string& path);
+// Whether the name is below an allowed remote prefix. IsGdalName (remote_file.h) is true for all remote names.
+bool IsAllowedRemote(const std::string& path);
 
 // Removes the environment variables that GDAL, OGR and PROJ read, except the location of their data, because all
 // settings come from the configuration. Returns the removed names. Call it from main before threads are started.

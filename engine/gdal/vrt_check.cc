@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <string_view>
 #include <system_error>
 
@@ -34,10 +33,6 @@ constexpr std::string_view kElements =
 
 bool IsKnown(std::string_view name) { return kElements.find(fmt::format(" {} ", name)) != std::string_view::npos; }
 
-struct FreeXml {
-  void operator()(CPLXMLNode* node) const { CPLDestroyXMLNode(node); }
-};
-
 // Precondition: both paths have no links and dots.
 bool IsInside(const fs::path& file, const fs::path& folder) {
   const auto [in_file, in_folder] = std::ranges::mismatch(file, folder);
@@ -58,8 +53,8 @@ class Checker {
     if (depth > kDeepestNesting || fs::file_size(vrt, ignored) > kMaxBytes) {
       return MakeError(ErrorCode::kInvalidArgument, "{}: is too large or nested too deeply for a VRT", vrt.string());
     }
-    const std::unique_ptr<CPLXMLNode, FreeXml> tree(CPLParseXMLFile(vrt.c_str()));
-    if (tree == nullptr) return MakeError(ErrorCode::kInvalidArgument, "{}: is no valid VRT", vrt.string());
+    const CPLXMLTreeCloser tree(CPLParseXMLFile(vrt.c_str()));
+    if (tree.get() == nullptr) return MakeError(ErrorCode::kInvalidArgument, "{}: is no valid VRT", vrt.string());
     return CheckNodes(tree.get(), vrt, depth);
   }
 
@@ -96,7 +91,7 @@ class Checker {
       return MakeError(ErrorCode::kInvalidArgument, "{}: a part of it: {}", vrt.string(), why);
     };
     parts_.push_back(part.string());
-    if (IsRemote(part.string())) {
+    if (IsAllowedRemote(part.string())) {
       // OpenRaster would look into the file, but a mosaic may have thousands of parts.
       const std::string ending = part.extension().string();
       if (EQUAL(ending.c_str(), ".tif") || EQUAL(ending.c_str(), ".tiff")) return {};

@@ -119,7 +119,8 @@ void CacheFolder::Scan() {
   }
 }
 
-// Removes the oldest files until `bytes` are free. Keeps files that another process has used, replaced or is writing.
+// Removes the oldest files until they had at least `bytes` bytes. Keeps files that another process has used, replaced
+// or is writing.
 void CacheFolder::Evict(std::uint64_t bytes) {
   std::uint64_t gone = 0;
   while (gone < bytes && !oldest_first_.empty()) {
@@ -137,8 +138,8 @@ void CacheFolder::Evict(std::uint64_t bytes) {
   }
 }
 
-// Several processes write between their scans. Each scans before it has written a 16th of the budget, and removes an
-// eighth of the budget more than it must. So two of them keep the budget.
+// Several processes write between their scans. Each scans before it has written a 16th of the budget, and keeps an
+// eighth of it free. So two of them do not exceed it.
 Result<void> CacheFolder::Reserve(std::uint64_t bytes) {
   if (max_bytes_ == kUnbounded) return {};
   const std::lock_guard lock(mutex_);

@@ -1,8 +1,8 @@
 // A folder of files with statistics and averages of rasters, with a limited total size.
 // Several processes may share it. Before a file grows, the least recently used files are removed until it fits. Loading
 // a file counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's
-// modification time. Files in use by this process are not removed. Files that terrace did not write are neither counted
-// nor removed: a file is recognized by its name and its first bytes.
+// modification time. Files in use by this process are not removed. Other files are neither counted nor removed,
+// also not the hashes of files (file_content.h): a file is recognized by its name and its first bytes.
 #pragma once
 
 #include <chrono>
@@ -34,7 +34,6 @@ class CacheFolder {
   CacheFolder& operator=(const CacheFolder&) = delete;
 
   const std::string& path() const { return path_; }
-  std::uint64_t max_bytes() const { return max_bytes_; }
 
   // Marks one raster's file as in use until the object is destroyed. The file need not exist.
   class Use {
@@ -44,7 +43,6 @@ class CacheFolder {
     Use(const Use&) = delete;
     Use& operator=(const Use&) = delete;
 
-    CacheFolder& folder() const { return *folder_; }
     // Reports that the file can be neither stored nor read. `reason`: "cannot be written: No space left on device".
     void Fail(const std::string& reason) const;
     void Succeed() const;

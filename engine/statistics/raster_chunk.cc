@@ -50,7 +50,7 @@ Chunk WithHalo(const Chunk& chunk, const RasterLayout& layout) {
           std::min(layout.height, chunk.row + chunk.rows + kHalo) - north};
 }
 
-// Statistics of one row, of its first `used` samples.
+// Appends the runs of voids among the first `used` samples of a row.
 void AddVoidRuns(const float* row, int r, int used, std::vector<VoidRun>& runs) {
   for (int c = 0; c < used; ++c) {
     if (!std::isnan(row[c])) continue;

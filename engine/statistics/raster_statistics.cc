@@ -18,7 +18,7 @@ std::optional<double> MeanOf(const BlockSum& sum) {
   return sum.weight == 0 ? std::nullopt : std::optional(sum.sum / sum.weight);
 }
 
-// The lines of both grids along one axis, and the averages of each grid around each line.
+// A line of either grid across one axis, and its place in both grids.
 struct Line {
   double position = 0;
   GridAxis::Location fine, coarse;
@@ -152,12 +152,12 @@ void AddCoarseErrors(const RasterLayout& layout, const CoarseAverages& coarse, A
   }
 }
 
-// Whether averages of an overview are no averages of the samples around them. Where voids take part as heights, they
-// are far from them, but often within the range of the whole raster.
+// Whether averages of an overview are no averages of the samples around them. Averages that include nodata values are
+// far from these samples, though often within the range of the whole raster.
 bool IsStray(const RangeTable& overview, const RangeTable& samples, const RasterLayout& layout, int factor,
              bool has_voids) {
-  // Compression with loss changes samples and overviews by as much as their owner allows. Voids may change averages by
-  // less.
+  // Tolerance for lossy compression, in metres. A raster with voids has only that of rounding, because nodata values
+  // may shift averages by less than this.
   constexpr double kMaxLoss = 2;
   // Samples beyond an average's own that kernels reach, if each overview was made from the one before.
   const double reach = 6.0 * factor;

@@ -50,9 +50,8 @@ struct RasterStatistics {
   ContentHash content;            // of all heights, including those of overviews that are read
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
   float lowest = 0, highest = 0;  // of the samples
-  // An overview that is read has a height outside the range of the raster's samples around it, as if it were made of
-  // voids too.
-  // False without voids.
+  // An overview that is read has a height far outside the range of the raster's samples around it: it was made of
+  // nodata values, or of other samples.
   bool has_stray_overviews = false;
   std::uint64_t valid = 0, voids = 0;
   RimVoids rim_voids;
@@ -75,7 +74,7 @@ class StatisticsAssembler {
 
   void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
 
-  // Reads overviews where the raster has some. kUnavailable: they cannot be read. kInvalidArgument: nothing but voids.
+  // Reads overviews where the raster has some. kUnavailable: they cannot be read. kNotFound: nothing but voids.
   // kCancelled: stopped. Errors do not name the file.
   Result<RasterStatistics> Finish(GDALDataset& dataset, const std::stop_token& stop);
 

@@ -10,7 +10,7 @@ namespace terrace::dem {
 namespace {
 
 constexpr std::uint32_t kNoRegion = std::numeric_limits<std::uint32_t>::max();
-// Number of regions before those that no longer exist are removed.
+// If there are more regions, those that were joined to others are removed.
 constexpr std::size_t kManyRegions = std::size_t{1} << 20;
 
 }  // namespace

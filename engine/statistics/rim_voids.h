@@ -36,6 +36,7 @@ class RimVoids {
   bool is_everything() const { return is_everything_; }
   bool has_runs() const { return !spans_.empty(); }
   std::vector<Run> Runs() const;
+  // Memory of the runs. For tests.
   std::size_t bytes() const { return spans_.size() * sizeof(Span) + bands_.size() * sizeof(Band); }
 
   // The region of a void, or nothing for a hole. For a valid sample: nothing, or 0 if is_everything().

@@ -281,7 +281,7 @@ void StatisticsCacheWriter::KeepWholeChunks(const std::function<void(const Chunk
   }
 }
 
-// The file is removed even if it is complete, because its space is needed.
+// Also with all chunks in it: the space is needed.
 void StatisticsCacheWriter::Remove() {
   ::unlink((path_ + ".partial").c_str());
   folder_->Release(std::exchange(reserved_, 0));

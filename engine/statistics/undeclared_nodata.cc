@@ -32,7 +32,7 @@ struct Beyond {
                leaps = 0;  // alone: no void nearby; leaps: a neighbour differs by more than the leap
 };
 
-// Counts of the second pass over a raster.
+// Counts of both passes of FindVoids.
 struct Evidence {
   std::array<std::int64_t, kUsualNodata.size()> at_value{}, near_value{};
   Beyond below_land, below_sea, above;

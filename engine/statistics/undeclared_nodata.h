@@ -1,6 +1,6 @@
 // Detects voids that a file does not declare: undeclared nodata values, values that resampling mixed from heights and
 // nodata values at the edges of voids, and collars of zeros around the data. Real terrain must not be lost: every rule
-// examines the whole raster and is dropped if a single sample contradicts it.
+// examines the whole raster, and applies only if few samples or none contradict it.
 #pragma once
 
 #include <algorithm>

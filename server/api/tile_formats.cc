@@ -88,7 +88,7 @@ std::string_view PngType(const TileRequest&) { return "image/png"; }
 // Accept asks for extensions.
 std::string_view QuantizedMeshVary(const TileRequest&) { return "Accept, Accept-Encoding"; }
 std::string_view GlbVary(const TileRequest& tile) { return CodingHelps(tile) ? "Accept-Encoding" : ""; }
-std::string_view PngVary(const TileRequest&) { return ""; }
+std::string_view NoVary(const TileRequest&) { return ""; }
 
 Result<void> ReadPicture(std::string_view query, const RequestFields&, const DatasetView& dataset, TileRequest& tile) {
   return ReadMapTile(query, dataset, tile);
@@ -109,18 +109,18 @@ constexpr TileFormatRow kFormats[] = {
     {tiler::TileFormat::kQuantizedMesh, "", ".terrain", QuantizedMeshType, QuantizedMeshVary, ReadQuantizedMesh,
      proto::PictureFormat::kPng, &kTerrainTileOperation},
     {tiler::TileFormat::kGlb, "", ".glb", GlbType, GlbVary, ReadGlb, proto::PictureFormat::kPng, &kGlbTileOperation},
-    {tiler::TileFormat::kHeightPng, "", ".png", PngType, PngVary, ReadHeightPng, proto::PictureFormat::kPng,
+    {tiler::TileFormat::kHeightPng, "", ".png", PngType, NoVary, ReadHeightPng, proto::PictureFormat::kPng,
      &kHeightTileOperation},
-    {kHillshade, "hillshade", ".png", MapTileType, PngVary, ReadPicture, kPng, &kHillshadePngOperation},
-    {kHillshade, "hillshade", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kHillshadeWebpOperation},
-    {kSlope, "slope", ".png", MapTileType, PngVary, ReadPicture, kPng, &kSlopePngOperation},
-    {kSlope, "slope", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kSlopeWebpOperation},
+    {kHillshade, "hillshade", ".png", MapTileType, NoVary, ReadPicture, kPng, &kHillshadePngOperation},
+    {kHillshade, "hillshade", ".webp", MapTileType, NoVary, ReadPicture, kWebp, &kHillshadeWebpOperation},
+    {kSlope, "slope", ".png", MapTileType, NoVary, ReadPicture, kPng, &kSlopePngOperation},
+    {kSlope, "slope", ".webp", MapTileType, NoVary, ReadPicture, kWebp, &kSlopeWebpOperation},
     {kContours, "contours", ".mvt", MapTileType, ContoursVary, ReadContours, kPng, &kContoursOperation},
-    {kImagery, "imagery", ".webp", MapTileType, PngVary, ReadPicture, kWebp, &kImageryWebpOperation},
-    {kImagery, "imagery", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg, &kImageryJpegOperation},
-    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, PngVary, ReadPicture, kWebp,
+    {kImagery, "imagery", ".webp", MapTileType, NoVary, ReadPicture, kWebp, &kImageryWebpOperation},
+    {kImagery, "imagery", ".jpg", MapTileType, NoVary, ReadPicture, kJpeg, &kImageryJpegOperation},
+    {kGeodeticImagery, "imagery/geodetic", ".webp", MapTileType, NoVary, ReadPicture, kWebp,
      &kGeodeticImageryWebpOperation},
-    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, PngVary, ReadPicture, kJpeg,
+    {kGeodeticImagery, "imagery/geodetic", ".jpg", MapTileType, NoVary, ReadPicture, kJpeg,
      &kGeodeticImageryJpegOperation},
 };
 

@@ -102,7 +102,7 @@ class DocumentMaker {
   struct Key {
     std::string text;
     tiler::Coding coding = tiler::Coding::kIdentity;
-    std::uint64_t generation = 0;  // all documents belong to one catalog
+    std::uint64_t generation = 0;  // ByteCache needs it; always 0, because all documents belong to one catalog
 
     friend bool operator==(const Key&, const Key&) = default;
   };

@@ -76,10 +76,10 @@ std::string_view MediaTypeOf(std::string_view path) {
 Result<StaticFiles> StaticFiles::Load(const fs::path& directory) {
   StaticFiles files;
   std::error_code error;
-  if (directory.empty() || !fs::exists(directory, error)) return files;
+  if (directory.empty() || fs::status(directory, error).type() == fs::file_type::not_found) return files;
   fs::recursive_directory_iterator walk(directory, error);
   for (; !error && walk != fs::recursive_directory_iterator(); walk.increment(error)) {
-    if (!walk->is_regular_file() || IsCompressedSibling(walk->path())) continue;
+    if (!walk->is_regular_file(error) || IsCompressedSibling(walk->path())) continue;
     Result<Document> document = LoadDocument(walk->path());
     if (!document) return tl::unexpected(document.error());
     files.files_.emplace(walk->path().lexically_relative(directory).generic_string(), std::move(*document));

@@ -51,7 +51,7 @@ struct Steps {
     return steps;
   }
   // Voids become the lowest height. Heights outside the range are clamped.
-  std::uint16_t Of(float height) const {
+  std::uint16_t Encode(float height) const {
     if (std::isnan(height) || scale == 0) return 0;
     return static_cast<std::uint16_t>(std::clamp(std::floor((height - offset) / scale + 0.5), 0.0, double{kLargest}));
   }
@@ -123,7 +123,7 @@ Result<std::string> Encode(const GridQuery& query, const dem::OutputGrid& grid, 
   }
   std::vector<std::uint16_t> values;
   values.reserve(heights.size());
-  for (const float height : heights) values.push_back(steps.Of(height));
+  for (const float height : heights) values.push_back(steps.Encode(height));
   if (query.format == GridFormat::kPng16) return dem::WritePng16(grid, values);
   return std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(std::uint16_t));
 }

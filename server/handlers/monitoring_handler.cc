@@ -57,7 +57,7 @@ Answer AnswerReady(const HandlerState& state, const RequestContext& context) {
   }
   if (state.process.draining() || state.process.opening()) {
     Response response = PlainState(503, state.process.draining() ? "draining\n" : "opening\n");
-    response.headers.emplace_back("Retry-After", "5");
+    response.headers.emplace_back("Retry-After", kPendingRetryAfter);
     return response;
   }
   const std::map<std::string, std::string> problems = state.process.problems();

@@ -15,7 +15,8 @@ bool HasMediaType(std::string_view content_type, std::string_view type) {
 bool IsForm(std::string_view content_type) { return HasMediaType(content_type, "application/x-www-form-urlencoded"); }
 bool IsJson(std::string_view content_type) { return HasMediaType(content_type, "application/json"); }
 
-// Without control characters; forms may have bytes of UTF-8. Floats nearly always have some.
+// Whether a body has no control characters. Forms may have bytes of UTF-8; binary floats nearly always have control
+// characters.
 bool IsText(std::string_view body) {
   return std::none_of(body.begin(), body.end(), [](char c) {
     const auto byte = static_cast<unsigned char>(c);

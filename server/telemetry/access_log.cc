@@ -25,14 +25,14 @@ using SystemClock = std::chrono::system_clock;
 // `blanks`: also escapes blanks, because they separate the fields of a line.
 std::string Escaped(std::string_view text, bool blanks = true) {
   std::string escaped;
-  for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
+  for (const char c : text.substr(0, kMaxLoggedBytes)) {
     if (c > (blanks ? 0x20 : 0x1f) && c < 0x7f && c != '"' && c != '\\') {
       escaped += c;
     } else {
       fmt::format_to(std::back_inserter(escaped), "\\x{:02x}", static_cast<unsigned char>(c));
     }
   }
-  if (text.size() > kMaxLoggedTargetBytes) escaped += "...";
+  if (text.size() > kMaxLoggedBytes) escaped += "...";
   return escaped;
 }
 
@@ -41,7 +41,7 @@ std::string EscapedOrDash(std::string_view text) { return text.empty() ? "-" : E
 // Bytes above ASCII become Latin-1 characters, because JSON has no bytes.
 std::string Latin1(std::string_view text) {
   std::string utf8;
-  for (const char c : text.substr(0, kMaxLoggedTargetBytes)) {
+  for (const char c : text.substr(0, kMaxLoggedBytes)) {
     const auto byte = static_cast<unsigned char>(c);
     if (byte < 0x80) {
       utf8 += c;

@@ -17,10 +17,10 @@
 
 namespace terrace::server {
 
-inline constexpr std::size_t kMaxLoggedTargetBytes = 512;
+inline constexpr std::size_t kMaxLoggedBytes = 512;  // of a target, a referer, a user agent or a token's name
 
-// All formats write quotes, backslashes and bytes that are not printable ASCII as \xHH (in JSON as \u00HH), so that an
-// entry is always one line. Texts longer than kMaxLoggedTargetBytes are truncated.
+// An entry is always one line: quotes, backslashes and bytes that are not printable ASCII are written as \xHH, in JSON
+// with its escapes. Texts longer than kMaxLoggedBytes are truncated.
 
 // GET "/maui/0/0/0.terrain" 200 4711 B 12.345 ms cache=miss id=0123456789abcdef peer=127.0.0.1:4242
 // and client= and token= if they are set.

@@ -65,8 +65,8 @@ void AddCaches(const std::vector<CacheTier>& tiers, std::size_t in_memory, std::
   using Stats = tiler::StoreStats;
   add(kCounter, "terrace_cache_hits_total", "Found in a cache", &Stats::hits, 0);
   add(kCounter, "terrace_cache_misses_total", "Looked for in a cache and not found", &Stats::misses, 0);
-  add(kGauge, "terrace_cache_entries", "Entries of a cache; on disk about", &Stats::entries, 0);
-  add(kGauge, "terrace_cache_bytes", "Bytes charged to a cache; on disk those of its files", &Stats::bytes, 0);
+  add(kGauge, "terrace_cache_entries", "Entries of a cache; of the disk cache an estimate", &Stats::entries, 0);
+  add(kGauge, "terrace_cache_bytes", "Bytes that count against the limit of a cache", &Stats::bytes, 0);
   add(kCounter, "terrace_cache_errors_total", "Reads and writes of a cache that the disk or the network failed",
       &Stats::errors, in_memory);
   add(kCounter, "terrace_cache_damaged_total", "Records that did not check out and were erased", &Stats::damaged,

@@ -19,7 +19,7 @@ struct ReplyRecord {
   std::chrono::microseconds duration{0};  // from the end of the request's head
   std::string_view route;                 // a literal
   std::string_view dataset;               // an existing dataset, or empty
-  // Where the tile was: hit, miss, join, the name of the tier that had it (tiler::TileStore::name), or -.
+  // Where the tile was: hit, miss, join, the name of the tier that had it (tiler::StoreBase::name), or -.
   std::string_view cache;
   std::string_view request_id;
   std::string_view peer;                 // address and port

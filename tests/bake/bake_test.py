@@ -217,6 +217,11 @@ class Bake(BakeCase):
         self.assertEqual(other.returncode, 2, other.stderr)
         self.assertIn('extensions "octvertexnormals", not "none"', other.stderr)
 
+    def test_an_error_that_no_level_has_is_named(self):
+        for levels, is_unused in (("0-9", True), ("0-11", False)):
+            done = self.run_bake("--dry-run", "--error", "5", levels=levels)
+            self.assertEqual((done.returncode, "--error 5 has no effect" in done.stderr), (0, is_unused), done.stderr)
+
     def test_options_that_an_archive_alone_does_not_use_are_named(self):
         config = self.scratch / "alone.json"
         config.write_text(json.dumps({"listen": "127.0.0.1:0", "datasets": [

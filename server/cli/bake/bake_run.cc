@@ -23,6 +23,7 @@
 #include "engine/gdal/gdal_runtime.h"
 #include "engine/gdal/remote_file.h"
 #include "engine/gdal/source_policy.h"
+#include "engine/geo/error_ladder.h"
 #include "engine/statistics/cache_folder.h"
 #include "server/cli/bake/bake_display.h"
 #include "server/cli/bake/bake_export.h"
@@ -342,6 +343,24 @@ std::string WrongPlace(const std::string& out) {
   return "--out: a bake is written into a folder, or into a bucket such as /vsis3/BUCKET/FOLDER";
 }
 
+// --error is a lower limit above the deepest level of the sources, and changes nothing if all levels exceed it.
+void WarnAboutUnusedError(const BakeArguments& arguments, const tiler::Dataset& dataset,
+                          const std::vector<archive::Manifest>& manifests) {
+  const auto mesh = std::ranges::find_if(manifests, [](const archive::Manifest& manifest) {
+    return manifest.kind.format != tiler::TileFormat::kHeightPng;
+  });
+  if (arguments.error <= 0 || mesh == manifests.end()) return;
+  const int last = static_cast<int>(mesh->available.size()) - 1;
+  const int deepest = dataset.model->max_source_level();
+  const double default_error = dataset.error_fraction * geo::LevelError(last);
+  if (last >= deepest || arguments.error >= default_error) return;
+  std::fprintf(
+      stderr,
+      "terrace: --error %s has no effect: level %d has %.3g m and the levels above it more, and only level %d, "
+      "the deepest, would have it; --fraction makes all levels finer\n",
+      PlainNumber(arguments.error).c_str(), last, default_error, deepest);
+}
+
 // Combinations that make no sense; empty: none.
 std::string WrongTogether(const BakeArguments& arguments) {
   const auto given = [](const std::string& text) { return !text.empty(); };
@@ -439,6 +458,7 @@ int Bake(const BakeArguments& given) {
     targets.push_back({{}, manifest});
     tiles += bake::CountTiles(manifest.available);
   }
+  WarnAboutUnusedError(arguments, *dataset, *manifests);
   // A tile's refinement is needed only by the tile's other formats.
   constexpr std::size_t kRefinementBytes = std::size_t{64} << 20;
   const tiler::TilePipeline pipeline({*std::move(dataset)}, targets.size() > 1 ? kRefinementBytes : 0);

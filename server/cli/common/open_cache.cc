@@ -30,8 +30,8 @@ dem::RasterCache OpenCache(const config::Config& config) {
     const bool exists = std::filesystem::is_directory(place, unknown);
     if (const auto folder = CheckFolder(place); !exists && !folder) return none(folder.error().message);
   }
-  spdlog::info("cache_dir: {}, for up to {} bytes of statistics and averages of sources", place,
-               config.cache_dir_bytes);
+  spdlog::info("cache_dir: {}, for up to {} MiB of statistics and averages of sources", place,
+               config.cache_dir_bytes >> 20);
   cache.folder = std::make_shared<dem::CacheFolder>(place, config.cache_dir_bytes);
   return cache;
 }

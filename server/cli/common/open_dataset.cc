@@ -1,6 +1,8 @@
 #include "server/cli/common/open_dataset.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 #include <xxhash.h>
 
 #include <filesystem>
@@ -113,6 +115,10 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
                                    std::shared_ptr<const dem::ElevationModel> model, const dem::RasterCache& cache,
                                    const std::string& version, std::stop_token stop) {
   const dem::GeoBounds bounds = model->info().bounds;
+  if (!wanted.edits.empty() && model->info().edits == 0) {
+    spdlog::warn(R"(dataset {}: its edits change nothing: no feature of {} has "terrain" in its properties)",
+                 wanted.name, fmt::join(wanted.edits, ", "));
+  }
   const dem::FileContentOptions content{cache.folder ? cache.folder->path() : std::string(), std::move(stop)};
   auto water = OpenWater(wanted.water, bounds, content);
   if (!water) return tl::unexpected(water.error());

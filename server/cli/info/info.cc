@@ -180,7 +180,9 @@ struct InfoArguments {
 
 // Writes the picture of a dataset's edits.
 int Draw(const dem::ElevationModel& model, const std::string& path) {
-  if (model.info().edits == 0) return Fail("--draw: there are no edits; name them with --edits FILE", kExitUsage);
+  if (model.info().edits == 0) {
+    return Fail(R"(--draw: there is nothing to draw: no feature has "terrain" in its properties)", kExitFailure);
+  }
   const Result<std::string> png = DrawEdits(model);
   if (!png) return Fail(png.error().message, kExitFailure);
   Result<ReplacedFile> file = ReplacedFile::Open(path);
@@ -221,6 +223,10 @@ int Info(const InfoArguments& arguments) {
   std::string problem;
   nlohmann::json all = nlohmann::json::array();
   const auto datasets = Datasets(dems, mosaic, exit_code);
+  if (!draw.empty() && flags.edits.empty()) return Fail("--draw shows edits; name them with --edits FILE", kExitUsage);
+  if (!draw.empty() && datasets.size() > 1) {
+    return Fail("--draw is for one dataset; give one DEM, or --mosaic", kExitUsage);
+  }
   if (!draw.empty() && IsRead(draw, datasets, flags.edits)) {
     return Fail(fmt::format("--draw: {} is a file that is read; give the picture another name", draw), kExitUsage);
   }

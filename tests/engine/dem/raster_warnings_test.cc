@@ -231,8 +231,9 @@ TEST(RasterWarnings, NameTheDatumOfADtedHeader) {
   EXPECT_EQ(WarningsAbout(path, {.vertical = "egm96"}), std::vector<std::string>());
 }
 
-TEST(RasterWarnings, UnitsWithNumbersAreNotKnown) {
-  for (const char* const unit : {"0.1 m", "10 m", "1/10 metre"}) EXPECT_EQ(MetresPerUnit(unit), std::nullopt) << unit;
+TEST(RasterWarnings, UnitsWithNumbersOrWithoutLettersAreNotKnown) {
+  for (const char* const unit : {"0.1 m", "10 m", "1/10 metre", "%", "[-]", "\u00b0"})
+    EXPECT_EQ(MetresPerUnit(unit), std::nullopt) << unit;
   EXPECT_EQ(MetresPerUnit("centimeters"), .01);
   EXPECT_EQ(MetresPerUnit("Decimetres"), .1);
   const TempDir dir;

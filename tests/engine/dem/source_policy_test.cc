@@ -345,7 +345,7 @@ TEST_F(SourcePolicyTest, OverviewsBesideAndElsewhereAreHeldToTheRoots) {
 
 TEST_F(SourcePolicyTest, RemoteNamesStayBelowTheirPrefix) {
   Allow({.prefixes = {"/vsicurl/" + web_.url("dems/")}});
-  EXPECT_TRUE(IsRemote("/vsicurl/" + web_.url("dems/a.tif")));
+  EXPECT_TRUE(IsAllowedRemote("/vsicurl/" + web_.url("dems/a.tif")));
   EXPECT_TRUE(CheckSourceName("/vsicurl/" + web_.url("dems/deep/er/a.tif")));
   for (const std::string& name :
        {"/vsicurl/" + web_.url("other/a.tif"), "/vsicurl/" + web_.url("dems/"), "/vsicurl/" + web_.url("dems/../a.tif"),

@@ -40,6 +40,21 @@ class WrittenFiles(unittest.TestCase):
         self.assertEqual(run("info", dem, "--edits", edits, "--draw", picture).returncode, 0)
         self.assertTrue(picture.read_bytes().startswith(b"\x89PNG"))
 
+    def test_a_picture_needs_edits_and_one_dataset(self):
+        edits, picture = self.folder / "edits.geojson", self.folder / "a.png"
+        for arguments, said in ((("info", SAMPLE, "--draw", picture), "name them with --edits FILE"),
+                                (("info", SAMPLE, SAMPLE, "--edits", edits, "--draw", picture), "is for one dataset")):
+            refused = run(*arguments)
+            self.assertEqual((refused.returncode, refused.stdout), (2, ""))
+            self.assertIn(said, refused.stderr)
+        edits.write_text(json.dumps({"type": "FeatureCollection", "features": [EDIT | {"properties": {}}]}))
+        plain = run("info", SAMPLE, "--edits", edits, "--draw", picture)
+        self.assertEqual(plain.returncode, 1)
+        self.assertIn('no feature has "terrain"', plain.stderr)
+        baked = run("bake", SAMPLE, "--edits", edits, "--out", self.folder / "baked", "--levels", "0-2")
+        self.assertIn(f'its edits change nothing: no feature of {edits} has "terrain"', baked.stderr)
+        self.assertFalse(picture.exists())
+
     def test_a_full_disk_is_told_with_the_file(self):
         out = self.folder / "a.obj"
         limit = 1000  # as a full disk: a write beyond it fails

@@ -43,9 +43,9 @@ TEST(AccessLog, CutsLongTargets) {
   const std::string target(8000, 'a');
   ReplyRecord record;
   record.target = record.user_agent = record.referer = target;
-  EXPECT_LT(FormatAccessLine(record).size(), kMaxLoggedTargetBytes + 100);
-  EXPECT_LT(FormatCombinedLine(record, kNow).size(), 3 * kMaxLoggedTargetBytes + 100);
-  EXPECT_LT(FormatJsonLine(record, kNow).size(), 3 * kMaxLoggedTargetBytes + 300);
+  EXPECT_LT(FormatAccessLine(record).size(), kMaxLoggedBytes + 100);
+  EXPECT_LT(FormatCombinedLine(record, kNow).size(), 3 * kMaxLoggedBytes + 100);
+  EXPECT_LT(FormatJsonLine(record, kNow).size(), 3 * kMaxLoggedBytes + 300);
 }
 
 // The text in place of a name may be a token.
