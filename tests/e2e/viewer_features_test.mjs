@@ -107,7 +107,7 @@ describe('features of the viewer', () => {
     await page.waitForFunction(() => document.querySelector('.marker.place').hasAttribute('hidden'), undefined, kWait);
     await measure([-84.7, -84.2]);  // begins beside the data
     await says(/^[\d.,]+ km straight, .*Parts of the ground have no heights/);
-    const drawn = await page.locator('#plot .ground.fill').evaluate((path) => path.getBBox());
+    const drawn = await page.locator('#plot .ground.fill').evaluate((path) => (({ x, width }) => ({ x, width }))(path.getBBox()));
     assert.ok(drawn.x > 100 && drawn.width > 100, `the ground after the gap is drawn: ${JSON.stringify(drawn)}`);
     assert.equal(await page.locator('#plot').getAttribute('aria-valuetext'), null, 'of the profile before');
     await measure([-84.25, -84.2499]);  // 9 m
