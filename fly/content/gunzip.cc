@@ -14,14 +14,15 @@ Result<std::string> Gunzip(std::string_view bytes) {
       libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
   if (!decompressor) return MakeError(ErrorCode::kUnavailable, "no memory to decompress a body");
   std::string out;
-  // The length at the end of a stream is only a hint: it may be damaged.
+  // Not from the length at the end of the stream, which may be damaged.
   std::size_t capacity = std::clamp<std::size_t>(bytes.size() * 8, 4096, kMaxBodyBytes);
   for (;;) {
     out.resize(capacity);
-    std::size_t written = 0;
-    const libdeflate_result result =
-        libdeflate_gzip_decompress(decompressor.get(), bytes.data(), bytes.size(), out.data(), out.size(), &written);
+    std::size_t read = 0, written = 0;
+    const libdeflate_result result = libdeflate_gzip_decompress_ex(decompressor.get(), bytes.data(), bytes.size(),
+                                                                   out.data(), out.size(), &read, &written);
     if (result == LIBDEFLATE_SUCCESS) {
+      if (read < bytes.size()) return MakeError(ErrorCode::kInvalidArgument, "bytes follow the gzip stream");
       out.resize(written);
       return out;
     }

@@ -55,7 +55,7 @@ std::string DetailOf(const std::string& body) {
   return is_line && text.size() <= kMaxDetailBytes ? text : std::string();
 }
 
-std::string Describe(const HttpReply& reply, Outcome outcome) {
+std::string Explain(const HttpReply& reply, Outcome outcome) {
   if (reply.failure != Failure::kNone) return fmt::format("{}: {}", NameOf(outcome), reply.detail);
   std::string text = fmt::format("status {}", reply.status);
   if (const std::string detail = DetailOf(reply.body); !detail.empty()) text += ": " + detail;
@@ -106,7 +106,7 @@ void Client::Decode(Format format, DecodedReply& decoded) {
     }
   }
   if (decoded.outcome != Outcome::kOk) {
-    decoded.message = terrace::fly::Describe(decoded.reply, decoded.outcome);
+    decoded.message = Explain(decoded.reply, decoded.outcome);
     return;
   }
   if (decoded.resource != Resource::kTile) {
@@ -122,7 +122,7 @@ void Client::Decode(Format format, DecodedReply& decoded) {
 void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) {
   Result<Url> url = resource == Resource::kDocument ? Result<Url>(options_.document) : Resolve(options_.document, uri);
   if (!url) {
-    if (tile != nullptr) tile->state = LoadState::kFailed;
+    if (tile != nullptr) Fail(*tile);
     statistics_.AddMessage(url.error().message);
     return;
   }
@@ -135,9 +135,9 @@ void Client::SendRequest(Resource resource, Tile* tile, const std::string& uri) 
   const char* accept = resource == Resource::kDocument             ? kAcceptJson
                        : resource == Resource::kTile && is_terrain ? kAcceptTerrain
                                                                    : "*/*";
-  const auto version = static_cast<std::uint32_t>(versions_.size());
   http_.Get(number_, *std::move(url), accept,
-            [inbox = inbox_, &workers = workers_, format = options_.format, resource, tile, version](HttpReply reply) {
+            [inbox = inbox_, &workers = workers_, format = options_.format, resource, tile,
+             version = version_](HttpReply reply) {
               auto decoded = std::make_shared<DecodedReply>();
               decoded->resource = resource;
               decoded->tile = tile;
@@ -188,7 +188,7 @@ void Client::Take(DecodedReply& decoded, double now_s) {
   }
   if (decoded.resource == Resource::kDocument) return TakeDocument(decoded, now_s);
   if (decoded.outcome != Outcome::kOk) return FailOrWait(decoded, now_s);
-  decoded.tile->attempts = 0;
+  decoded.tile->attempts = {};
   if (decoded.resource == Resource::kTile) TakeTile(decoded, now_s);
 }
 
@@ -196,14 +196,14 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
   is_document_requested_ = false;
   document_due_s_ = now_s + kDocumentPause;
   if (decoded.outcome != Outcome::kOk) {
-    document_due_s_ = now_s + PauseFor(decoded, ++document_attempts_);
+    const bool asks_again = AsksAgain(decoded, document_attempts_);
+    document_due_s_ = now_s + PauseFor(decoded, document_attempts_);
     document_problem_ = decoded.message;
     if (tree_) return;
-    const bool asks_again = IsTransient(decoded.reply, decoded.outcome) &&
-                            (decoded.outcome == Outcome::kRefused || document_attempts_ < options_.max_attempts);
     if (asks_again) return statistics_.AddRetry();
     return GiveUp(fmt::format("{}: {}", options_.document.Text(), decoded.message));
   }
+  document_attempts_ = {};
   if (tree_) {
     const std::string before = tree_->version();
     if (const Result<void> taken = tree_->TakeDocument(decoded.text); !taken) {
@@ -211,7 +211,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
     }
     if (tree_->version() == before) return;
     statistics_.AddVersionChange(now_s, before, tree_->version());
-    versions_.push_back(tree_->version());
+    ++version_;
     for (Tile* tile : ready_) tile->is_stale = true;  // drawn until the new one is there
     return;
   }
@@ -219,7 +219,7 @@ void Client::TakeDocument(const DecodedReply& decoded, double now_s) {
       options_.format == Format::kTerrain ? MakeLayerTree(decoded.text) : MakeTilesetTree(decoded.text);
   if (!tree) return GiveUp(fmt::format("{}: {}", options_.document.Text(), tree.error().message));
   tree_ = *std::move(tree);
-  versions_.push_back(tree_->version());
+  version_ = 1;
   record_.document_s = now_s - start_s_;
   phase_ = Phase::kFirstView;
 }
@@ -228,11 +228,10 @@ void Client::TakeTile(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
   tile_bytes_ -= tile.decoded_bytes;
   tree_->TakeContent(tile, decoded.content);
-  tile.triangles = decoded.content.triangles;
   tile.decoded_bytes = decoded.content.bytes;
   tile_bytes_ += tile.decoded_bytes;
   tile.version = decoded.version;
-  tile.is_stale = decoded.version != versions_.size();
+  tile.is_stale = decoded.version != version_;
   const std::string& stated = decoded.reply.max_error;
   tile.stated_error_m = -1;
   std::from_chars(stated.data(), stated.data() + stated.size(), tile.stated_error_m);
@@ -256,8 +255,17 @@ void Client::CheckVersion(const DecodedReply& decoded, double now_s) {
   SendRequest(Resource::kDocument, nullptr, "");
 }
 
-double Client::PauseFor(const DecodedReply& decoded, int attempts) const {
-  double pause_s = std::min(kLongestPause, kFirstPause * std::exp2(std::min(attempts, 10) - 1));
+// Counts an attempt without success. Returns whether another one is due: after refusals without limit.
+bool Client::AsksAgain(const DecodedReply& decoded, Attempts& attempts) const {
+  ++attempts.all;
+  if (decoded.outcome == Outcome::kRefused) return true;
+  ++attempts.failed;
+  const int limit = decoded.outcome == Outcome::kDamaged ? kDamagedAttempts : options_.max_attempts;
+  return IsTransient(decoded.reply, decoded.outcome) && attempts.failed < limit;
+}
+
+double Client::PauseFor(const DecodedReply& decoded, const Attempts& attempts) const {
+  const double pause_s = std::min(kLongestPause, kFirstPause * std::exp2(std::min(attempts.all, 10) - 1));
   const std::string& text = decoded.reply.retry_after;
   double stated = -1;
   std::from_chars(text.data(), text.data() + text.size(), stated);
@@ -268,17 +276,14 @@ double Client::PauseFor(const DecodedReply& decoded, int attempts) const {
 
 void Client::FailOrWait(const DecodedReply& decoded, double now_s) {
   Tile& tile = *decoded.tile;
-  ++tile.attempts;
   CheckVersion(decoded, now_s);
-  const int limit = decoded.outcome == Outcome::kRefused ? 1'000'000  // refusals are no failures: retried without limit
-                    : decoded.outcome == Outcome::kDamaged ? kDamagedAttempts
-                                                           : options_.max_attempts;
-  if (IsTransient(decoded.reply, decoded.outcome) && tile.attempts < limit) {
-    tile.waiting = true;
-    waiting_.push_back({&tile, now_s + PauseFor(decoded, tile.attempts)});
-    statistics_.AddRetry();
-    return;
-  }
+  if (!AsksAgain(decoded, tile.attempts)) return Fail(tile);
+  tile.waiting = true;
+  waiting_.push_back({&tile, now_s + PauseFor(decoded, tile.attempts)});
+  statistics_.AddRetry();
+}
+
+void Client::Fail(Tile& tile) {
   tile.is_stale = false;  // the outdated content stays
   if (tile.state != LoadState::kReady) tile.state = LoadState::kFailed;
 }
@@ -294,17 +299,12 @@ void Client::WakeWaiting(double now_s) {
 void Client::StartLoad(Tile& tile) {
   if (!tile.NeedsLoad()) return;
   if (tile.content == Content::kUpsampled) {
-    Tile& parent = *tile.parent;
-    if (parent.state == LoadState::kUnloaded) return StartLoad(parent);
-    tile.stated_error_m = parent.stated_error_m;
-    tile.version = parent.version;
-    tile.is_stale = false;
+    if (tile.parent->state == LoadState::kUnloaded) return StartLoad(*tile.parent);
     tile.state = LoadState::kReady;
     return;
   }
   const NextRequest request = tree_->RequestFor(tile);
   if (request.kind == NextRequest::Kind::kNothing) {
-    tile.is_stale = false;
     tile.state = LoadState::kReady;
     return;
   }
@@ -343,17 +343,17 @@ FrameRecord Client::Describe(const Selection& selection, const View& view) {
   std::uint32_t version = 0;
   for (const DrawnTile& drawn : selection.drawn) {
     const Tile& tile = *drawn.tile;
-    const bool can_refine = !tile.children.empty() || tile.may_have_more_children;
+    const bool can_refine = !tile.children.empty() || tile.children_unknown;
     if (can_refine) record.worst_px = std::clamp(drawn.error_px, record.worst_px, kWorstPixels);
-    if (tile.may_have_more_children && drawn.error_px >= options_.select.max_error_px) record.is_refined = false;
-    record.triangles += tile.triangles;
-    if (tile.state != LoadState::kReady || tile.content == Content::kEmpty) continue;
-    if (tile.stated_error_m >= 0) {
-      const double px = view.ErrorInPixels(tile.stated_error_m, drawn.distance_m);
+    if (tile.children_unknown && drawn.error_px >= options_.select.max_error_px) record.is_refined = false;
+    const Tile& loaded = tile.content == Content::kUpsampled ? *tile.parent : tile;
+    if (tile.state != LoadState::kReady || loaded.version == 0) continue;
+    if (loaded.stated_error_m >= 0) {
+      const double px = view.ErrorInPixels(loaded.stated_error_m, drawn.distance_m);
       record.worst_stated_px = std::clamp(px, record.worst_stated_px, kWorstPixels);
     }
-    if (version != 0 && tile.version != version) record.is_mixed = true;
-    version = tile.version;
+    if (version != 0 && loaded.version != version) record.is_mixed = true;
+    version = loaded.version;
   }
   if (phase_ == Phase::kFlying && frame_ % kCoveragePeriod == 0) {
     record.coverage = MeasureCoverage(view, frame_, tree_->root());
@@ -375,8 +375,9 @@ void Client::Advance(const FrameRecord& record, double now_s) {
 }
 
 void Client::AdvancePhase(const FrameRecord& record, double now_s) {
+  // A view that comes later than the take-off still counts as one.
+  if (record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
   if (phase_ == Phase::kFirstView && (record.is_refined || now_s - start_s_ > options_.first_view_limit_s)) {
-    if (record.is_refined) record_.first_view_s = now_s - start_s_;
     phase_ = Phase::kFlying;
     takeoff_s_ = now_s;
   }
@@ -387,12 +388,8 @@ void Client::AdvancePhase(const FrameRecord& record, double now_s) {
   }
   if (phase_ == Phase::kArrived) {
     if (record.is_refined && record_.arrival_s < 0) record_.arrival_s = now_s - landing_s_;
-    // A view that came later than the take-off still counts as one.
-    if (record.is_refined && record_.first_view_s < 0) record_.first_view_s = now_s - start_s_;
     if (record.is_loaded || now_s - landing_s_ > options_.arrival_limit_s) phase_ = Phase::kDone;
   }
-  if (phase_ == Phase::kFlying && record.is_refined && record_.first_view_s < 0)
-    record_.first_view_s = now_s - start_s_;
 }
 
 void Client::GiveUp(const std::string& why) {

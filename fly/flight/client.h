@@ -56,7 +56,9 @@ class Client {
   void TakeTile(const DecodedReply& decoded, double now_s);
   void TakeReady(Tile& tile);
   void FailOrWait(const DecodedReply& decoded, double now_s);
-  double PauseFor(const DecodedReply& decoded, int attempts) const;
+  static void Fail(Tile& tile);
+  bool AsksAgain(const DecodedReply& decoded, Attempts& attempts) const;
+  double PauseFor(const DecodedReply& decoded, const Attempts& attempts) const;
   void CheckVersion(const DecodedReply& decoded, double now_s);
   void WakeWaiting(double now_s);
   void StartLoads(const Selection& selection);
@@ -80,11 +82,11 @@ class Client {
   double start_s_ = -1, takeoff_s_ = 0, landing_s_ = 0;
   bool is_document_requested_ = false;
   double document_due_s_ = 0;
-  int document_attempts_ = 0;
+  Attempts document_attempts_;
   std::string document_problem_;  // of the last attempt
 
   std::unique_ptr<TileTree> tree_;
-  std::vector<std::string> versions_;
+  std::uint32_t version_ = 0;  // of the document: 1, 2, ..
   std::uint64_t frame_ = 0;
   int active_ = 0;  // requests of tiles and subtrees
   std::vector<Waiting> waiting_;

@@ -66,10 +66,9 @@ struct FrameRecord {
   bool is_loaded = false;  // refined, and nothing is left to load ahead
   bool is_mixed = false;   // shows tiles of more than one version
   bool is_late = false;
-  double worst_px = 0;         // of the geometric errors of what is drawn
+  double worst_px = 0;         // of the geometric errors of drawn tiles that can be refined
   double worst_stated_px = 0;  // of the errors that the server stated
   std::size_t drawn = 0, wanted = 0, in_flight = 0;
-  std::uint64_t triangles = 0;
   std::optional<Coverage> coverage;  // of some frames
 };
 
@@ -106,7 +105,8 @@ struct Totals {
   double worst_px = 0, worst_stated_px = 0;
   ValueCounts latencies_s, frame_worst_px;  // of tiles; of flying frames
   std::map<int, std::uint64_t> tiles_by_level;
-  std::map<std::string, std::uint64_t> messages;  // counts of failure messages, at most 50 different ones
+  // How often each failure and version change occurred. After 50 texts, failures with new ones are "other messages".
+  std::map<std::string, std::uint64_t> messages;
 };
 
 // All that reports need.
@@ -116,7 +116,7 @@ struct FlightRecord {
   std::set<std::tuple<int, std::int64_t, std::int64_t>> loaded_tiles;  // level, x, y of the first 6,000 different ones
   std::vector<std::string> urls;  // of the requested tiles, if FlightOptions::keeps_urls
   std::vector<ClientRecord> clients;
-  std::vector<GeodeticPoint> track;
+  std::vector<GeodeticPoint> track;     // of client 0: each tenth frame, at most 100,000
   std::vector<double> version_changes;  // seconds since the start
 };
 

@@ -6,7 +6,7 @@
 
 namespace terrace::fly {
 
-// How often each value occurred. Values keep 12 significant bits: at most about 60,000 different ones lie between a
+// How often each value occurred. Values keep 12 significant bits: at most about 65,000 different ones lie between a
 // microsecond and an hour, or between a thousandth of a pixel and 10,000 pixels.
 class ValueCounts {
  public:

@@ -206,9 +206,9 @@ class HttpClient::Impl {
       std::unique_ptr<Connection> connection = TakeIdle(call->client, call->url.origin);
       const bool is_reused = connection != nullptr;
       if (!connection) {
-        reply.opened_connection = true;
         connection = co_await Open(call->url.origin, reply);
         if (!connection) co_return reply;
+        reply.opened_connection = true;
       }
       bool answered = false, keeps = false;
       if (connection->tls) {

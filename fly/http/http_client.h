@@ -14,7 +14,7 @@ namespace terrace::fly {
 struct HttpOptions {
   int threads = 1;
   int clients = 1;                   // each has connections of its own
-  double timeout_s = 30;             // of connecting, and of a request with its reply
+  double timeout_s = 30;             // of connecting to a resolved host, and of a request with its reply
   std::vector<std::string> headers;  // "Name: value", added to each request
   bool verifies_certificates = true;
 };

@@ -26,7 +26,7 @@ struct Url {
 // kInvalidArgument if the text is not an http or https URL; the message begins with it.
 Result<Url> ParseUrl(std::string_view text);
 
-// RFC 3986, section 5, without "../" inside of `reference`.
+// RFC 3986, section 5, for a `reference` with a path. Resolves "./" and "../" at its beginning only.
 Result<Url> Resolve(const Url& base, std::string_view reference);
 
 }  // namespace terrace::fly

@@ -12,7 +12,7 @@
 #include "engine/core/escape_html.h"
 #include "engine/core/plain_number.h"
 #include "fly/report/map_plot.h"
-#include "fly/report/time_plot.h"
+#include "fly/report/plot.h"
 
 namespace terrace::fly {
 namespace {
@@ -192,7 +192,7 @@ double FailuresOf(const Second& second) {
 TimePlot FailurePlot(const std::vector<Second>& seconds) {
   return {.title = "Refused and failed requests",
           .unit = "a second",
-          .note = "Refused ones are tiles again when Retry-After says.",
+          .note = "The client asks again for refused ones when Retry-After says.",
           .series = {{"refused (429, 503)", "var(--b)",
                       ValuesOf(seconds, [](auto& s) { return double(s.outcomes[1]); }), Shape::kBars},
                      {"failed", "var(--d)", ValuesOf(seconds, FailuresOf), Shape::kBars}}};

@@ -8,14 +8,14 @@
 #include <iterator>
 
 #include "engine/core/plain_number.h"
-#include "fly/report/time_plot.h"
+#include "fly/report/plot.h"
 #include "fly/scene/volume.h"
 
 namespace terrace::fly {
 namespace {
 
 constexpr double kWidth = 1304, kHeight = 620, kMargin = 30;
-constexpr int kShownLevels = 7;  // the deepest ones; shallower tiles only tint the ground
+constexpr int kColoredLevels = 7;  // the deepest; shallower tiles have the colour of the first of them
 
 struct Frame {
   double longitude = 0, latitude = 0;  // of the middle
@@ -92,7 +92,7 @@ std::string MapOf(const std::set<std::tuple<int, std::int64_t, std::int64_t>>& t
   if (tiles.empty() || track.empty()) return {};
   const Frame frame = FrameOf(track);
   const int deepest = std::get<0>(*tiles.rbegin());
-  const int shallowest = std::max(std::get<0>(*tiles.begin()), deepest - kShownLevels + 1);
+  const int shallowest = std::max(std::get<0>(*tiles.begin()), deepest - kColoredLevels + 1);
   std::string svg;
   for (const auto& [level, x, y] : tiles) {
     AddTile(frame, {level, x, y}, ColorOfLevel(level, shallowest, deepest), svg);
@@ -113,8 +113,8 @@ std::string MapOf(const std::set<std::tuple<int, std::int64_t, std::int64_t>>& t
                    ColorOfLevel(level, shallowest, deepest), level == shallowest ? "up to level " : "", level);
   }
   return fmt::format(
-      R"(<figure class="wide"><figcaption><b>The path over the tiles that were loaded</b><p>Each rectangle is a tile of )"
-      R"(the first client or of others; the dot is the start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:.0f} {:.0f}" )"
+      R"(<figure class="wide"><figcaption><b>The path over the tiles that were loaded</b><p>Rectangles: tiles that )"
+      R"(any client loaded. Line: the path of the first client; the dot is its start.</p><div>{}</div></figcaption><svg class="map" viewBox="0 0 {:.0f} {:.0f}" )"
       R"(role="img" aria-label="map">{}</svg></figure>)",
       legend, kWidth, kHeight, svg);
 }

@@ -80,17 +80,18 @@ double ValueOf(Measure measure, const Summary& summary) {
   return -1;
 }
 
-std::string Show(Unit unit, double value) {
+// With `more` decimals than usual.
+std::string Show(Unit unit, double value, int more) {
   if (value < 0) return "never";
   switch (unit) {
     case Unit::kSeconds:
-      return value < 1 ? fmt::format("{:.1f} ms", value * 1000) : fmt::format("{:.2f} s", value);
+      return value < 1 ? fmt::format("{:.{}f} ms", value * 1000, 1 + more) : fmt::format("{:.{}f} s", value, 2 + more);
     case Unit::kShare:
-      return fmt::format("{:.2f} %", value * 100);
+      return fmt::format("{:.{}f} %", value * 100, 2 + more);
     case Unit::kPixels:
-      return fmt::format("{:.1f} px", value);
+      return fmt::format("{:.{}f} px", value, 1 + more);
     case Unit::kCount:
-      return fmt::format("{:.0f}", value);
+      return fmt::format("{:.{}f}", value, more);
   }
   return {};
 }
@@ -140,7 +141,11 @@ Judgements Judge(const std::vector<Requirement>& requirements, const Summary& su
     judgement.value = ValueOf(requirement.measure, summary);
     judgement.holds = judgement.value >= 0 &&
                       (row.is_minimum ? judgement.value >= requirement.bound : judgement.value <= requirement.bound);
-    judgement.shown = Show(row.unit, judgement.value);
+    // A value that fails is not shown as the bound itself.
+    int more = 0;
+    do {
+      judgement.shown = Show(row.unit, judgement.value, more);
+    } while (!judgement.holds && judgement.shown == Show(row.unit, requirement.bound, more) && ++more < 10);
     judgements.all.push_back(std::move(judgement));
   }
   return judgements;

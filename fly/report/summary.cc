@@ -146,7 +146,7 @@ std::string LineOf(std::size_t i, const Second& second) {
       Milliseconds(Percentile(second.latencies_s, 0.5)), Milliseconds(Percentile(second.latencies_s, 0.99)),
       second.wanted, refined, second.worst_px,
       second.worst_hole > 0 ? fmt::format("  hole {:.1f}%", 100 * second.worst_hole) : "",
-      bad > 0 ? fmt::format("  failed {}", bad) : "");
+      bad > 0 ? fmt::format("  refused or failed {}", bad) : "");
 }
 
 std::string TextOf(const Summary& summary) {
@@ -160,8 +160,9 @@ std::string TextOf(const Summary& summary) {
                              ? seconds_or_never(summary.first_view_s)
                              : fmt::format("{} median, {} worst of {} clients", seconds_or_never(summary.first_view_s),
                                            seconds_or_never(summary.worst_first_view_s), summary.clients.size()));
-  add("refined", fmt::format("{:.1f} % of {} frames of the flight; full {} after its end", 100 * summary.refined_share,
-                             Grouped(totals.flying_frames), seconds_or_never(summary.arrival_s)));
+  add("refined", fmt::format("{:.1f} % of {} frames of the flight; {} after its end", 100 * summary.refined_share,
+                             Grouped(totals.flying_frames),
+                             summary.arrival_s < 0 ? "not full" : "full " + Milliseconds(summary.arrival_s)));
   add("error on screen",
       fmt::format("{:.1f} px in half of the frames, {:.1f} px in 99 %, {:.1f} px at most; stated by the "
                   "server {:.1f} px at most",

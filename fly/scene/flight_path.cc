@@ -17,6 +17,7 @@ using Json = nlohmann::json;
 
 constexpr double kMeanRadius = 6371000;
 constexpr double kStepDegrees = 0.05;  // between the points of a great circle
+constexpr double kSamePlace = 1e-6;    // metres; rounding moves equal points apart by nanometres
 constexpr std::size_t kMaxPoints = 1'000'000;
 
 // The turn from a to b, -180 to 180.
@@ -42,16 +43,20 @@ double HeadingFromTo(const GeodeticPoint& a, const GeodeticPoint& b) {
 // Sets times by speed, headings along the path, and the pitch.
 void SetTimesAndHeadings(const FlightSpeed& speed, FlightPath& path) {
   std::vector<FlightPath::Point>& points = path.points;
+  double heading = 0;  // a vertical part keeps that of the part before
   for (std::size_t i = 0; i < points.size(); ++i) {
-    points[i].pose.pitch = speed.pitch;
+    Pose& pose = points[i].pose;
+    pose.pitch = speed.pitch;
     if (i + 1 < points.size()) {
-      points[i].pose.heading = HeadingFromTo(points[i].pose.position, points[i + 1].pose.position);
-    } else if (i > 0) {
-      points[i].pose.heading = path.is_closed ? points[0].pose.heading : points[i - 1].pose.heading;
+      const GeodeticPoint& next = points[i + 1].pose.position;
+      if (GroundMetres(pose.position, next) > kSamePlace) heading = HeadingFromTo(pose.position, next);
+    } else if (path.is_closed) {
+      heading = points[0].pose.heading;
     }
+    pose.heading = heading;
     if (i == 0) continue;
-    points[i].seconds =
-        points[i - 1].seconds + Metres(points[i - 1].pose.position, points[i].pose.position) / speed.metres_per_second;
+    const Pose& before = points[i - 1].pose;
+    points[i].seconds = points[i - 1].seconds + Metres(before.position, pose.position) / speed.metres_per_second;
   }
 }
 
@@ -122,8 +127,8 @@ const Json* FindLine(const Json& json) {
   return nullptr;
 }
 
-Result<FlightPath> ParseGeoJson(std::string_view text, const FlightSpeed& speed) {
-  FlightPath path;
+// Returns the numbers of each point.
+Result<std::size_t> ReadGeoJson(std::string_view text, FlightPath& path) {
   try {
     const Json json = Json::parse(text);
     const Json* line = FindLine(json);
@@ -136,13 +141,31 @@ Result<FlightPath> ParseGeoJson(std::string_view text, const FlightSpeed& speed)
       }
       if (Result<void> added = AddPoint(numbers, where, path); !added) return tl::unexpected(added.error());
     }
+    return 3;
   } catch (const std::exception& error) {
     return MakeError(ErrorCode::kInvalidArgument, "the GeoJSON cannot be read: {}", error.what());
   }
-  if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the LineString has no points");
-  Unwrap(path);
-  SetTimesAndHeadings(speed, path);
-  return path;
+}
+
+// Returns the numbers of each line.
+Result<std::size_t> ReadLines(std::string_view text, FlightPath& path) {
+  std::size_t columns = 0;
+  for (int number = 1; !text.empty(); ++number) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const std::optional<std::vector<double>> numbers = Numbers(line.substr(0, line.find('#')));
+    const std::string where = fmt::format("line {}", number);
+    if (!numbers) return MakeError(ErrorCode::kInvalidArgument, "{}: not only numbers", where);
+    if (numbers->empty()) continue;
+    if (columns != 0 && numbers->size() != columns) {
+      return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where,
+                       numbers->size(), columns);
+    }
+    columns = numbers->size();
+    if (Result<void> added = AddPoint(*numbers, where, path); !added) return tl::unexpected(added.error());
+  }
+  return columns;
 }
 
 }  // namespace
@@ -237,36 +260,28 @@ Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed) {
     text.remove_prefix(kByteOrderMark.size());
   }
   const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first != std::string_view::npos && text[first] == '{') return ParseGeoJson(text, speed);
+  const bool is_geojson = first != std::string_view::npos && text[first] == '{';
   FlightPath path;
-  std::size_t columns = 0;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    const std::string_view line = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    const std::optional<std::vector<double>> numbers = Numbers(line.substr(0, line.find('#')));
-    const std::string where = fmt::format("line {}", number);
-    if (!numbers) return MakeError(ErrorCode::kInvalidArgument, "{}: not only numbers", where);
-    if (numbers->empty()) continue;
-    if (columns != 0 && numbers->size() != columns) {
-      return MakeError(ErrorCode::kInvalidArgument, "{}: {} numbers, but {} in the lines before", where,
-                       numbers->size(), columns);
-    }
-    columns = numbers->size();
-    if (Result<void> added = AddPoint(*numbers, where, path); !added) return tl::unexpected(added.error());
-  }
+  const Result<std::size_t> columns = is_geojson ? ReadGeoJson(text, path) : ReadLines(text, path);
+  if (!columns) return tl::unexpected(columns.error());
   if (path.points.empty()) return MakeError(ErrorCode::kInvalidArgument, "the path has no points");
   Unwrap(path);
-  const std::vector<FlightPath::Point> stated = path.points;
-  if (columns != 6) SetTimesAndHeadings(speed, path);
-  for (std::size_t i = 0; i < stated.size(); ++i) {
-    if (columns == 6) path.points[i].seconds -= stated[0].seconds;
-    if (columns == 5) path.points[i].pose = stated[i].pose;
+  std::vector<FlightPath::Point>& points = path.points;
+  if (*columns == 6) {
+    const double start = points[0].seconds;
+    for (FlightPath::Point& point : points) point.seconds -= start;
+    return path;
   }
-  // Points at one place take no time.
-  path.points.erase(std::unique(path.points.begin(), path.points.end(),
-                                [](const auto& a, const auto& b) { return a.seconds == b.seconds; }),
-                    path.points.end());
+  // Points at one place take no time, and have no direction.
+  points.erase(
+      std::unique(points.begin(), points.end(),
+                  [](const auto& a, const auto& b) { return Metres(a.pose.position, b.pose.position) <= kSamePlace; }),
+      points.end());
+  const std::vector<FlightPath::Point> stated = points;
+  SetTimesAndHeadings(speed, path);
+  if (*columns == 5) {
+    for (std::size_t i = 0; i < stated.size(); ++i) points[i].pose = stated[i].pose;
+  }
   return path;
 }
 

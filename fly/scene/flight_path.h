@@ -51,8 +51,9 @@ inline constexpr double kMaxCircleRadius = 5'000'000;  // metres
 FlightPath MakeCircle(const GeodeticPoint& center, double radius_m, const FlightSpeed& speed);
 
 // Lines of "lon,lat,height", "lon,lat,height,heading,pitch" or "seconds,lon,lat,height,heading,pitch"; # begins a
-// comment; or a GeoJSON document whose first LineString has three coordinates a point. Skips a byte order mark.
-// kInvalidArgument names the line.
+// comment; or a GeoJSON document whose first LineString has three coordinates a point. Skips a byte order mark, and
+// points at the place of the one before unless they have seconds. kInvalidArgument names the line, or the point of the
+// LineString.
 Result<FlightPath> ParsePath(std::string_view text, const FlightSpeed& speed);
 
 }  // namespace terrace::fly

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <array>
-#include <vector>
 
 #include "engine/geo/ellipsoid.h"
 #include "fly/scene/volume.h"

@@ -50,11 +50,11 @@ OrientedBox BoxOf(const Vec3& origin, const std::array<Vec3, 3>& axes, std::arra
   return box;
 }
 
-// A box on the plane that touches the ellipsoid at the rectangle's centre. The widest parallel bounds it east and west:
-// the equator if the rectangle crosses it.
+// A box on the plane that touches the ellipsoid at the rectangle's centre. Three parallels bound it east and west: the
+// northern one, the southern one, and the equator if it lies between them, else the middle one.
 OrientedBox TangentBox(const Rectangle& r, double min_height_m, double max_height_m) {
   const double longitude = (r.west + r.east) / 2, latitude = (r.south + r.north) / 2;
-  const double widest = r.south < 0 && r.north > 0 ? 0.0 : latitude;
+  const double between = r.south < 0 && r.north > 0 ? 0.0 : latitude;
   const Vec3 origin = ToEcef(longitude, latitude, 0);
   const Vec3 up = geo::SurfaceNormal(longitude, latitude);
   const Vec3 east = East(longitude);
@@ -62,7 +62,7 @@ OrientedBox TangentBox(const Rectangle& r, double min_height_m, double max_heigh
   const auto across = [&](double lon, double lat) { return Dot(east, ToEcef(lon, lat, max_height_m) - origin); };
   const auto along = [&](double lon, double lat) { return Dot(north, ToEcef(lon, lat, max_height_m) - origin); };
   const auto above = [&](double lon, double lat) { return Dot(up, ToEcef(lon, lat, min_height_m) - origin); };
-  const double half = -std::min({across(r.west, r.north), across(r.west, widest), across(r.west, r.south)});
+  const double half = -std::min({across(r.west, r.north), across(r.west, between), across(r.west, r.south)});
   return BoxOf(origin, {east, north, up},
                {Extent{-half, half},
                 Extent{std::min(along(r.west, r.south), along(longitude, r.south)),

@@ -33,10 +33,16 @@ struct Visit {
 
 struct ImplicitTree;
 
+// Requests since the last success.
+struct Attempts {
+  int all = 0;
+  int failed = 0;  // without refusals
+};
+
 struct Tile {
   Tile* parent = nullptr;
   std::vector<std::unique_ptr<Tile>> children;
-  bool may_have_more_children = false;  // the tree has not added its children yet
+  bool children_unknown = false;  // the tree could not decide on them yet, as where a subtree is missing
 
   Volume volume;
   double geometric_error_m = 0;
@@ -55,12 +61,11 @@ struct Tile {
   bool in_flight = false;  // a request for it runs
   bool waiting = false;    // a request for it failed, and will be repeated after a pause
   bool is_stale = false;   // loaded, but from an older version of the dataset
-  int attempts = 0;        // that failed, since the last success
+  Attempts attempts;
 
   double stated_error_m = -1;  // the reply's Terrain-Max-Error; -1: not stated
-  std::uint32_t triangles = 0;
   std::uint64_t decoded_bytes = 0;
-  std::uint32_t version = 0;  // index of the version that it was loaded from
+  std::uint32_t version = 0;  // of the document that it was loaded by: 1, 2, ..; 0: none
 
   std::array<Visit, 2> visits;  // of this frame and of the one before
 

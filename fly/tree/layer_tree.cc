@@ -89,12 +89,6 @@ Result<Layer> ParseLayer(std::string_view text) {
   }
 }
 
-void Replace(std::string& text, std::string_view name, const std::string& value) {
-  for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at + value.size())) {
-    text.replace(at, name.size(), value);
-  }
-}
-
 class LayerTree : public TileTree {
  public:
   explicit LayerTree(Layer layer) : layer_(std::move(layer)) {
@@ -108,7 +102,7 @@ class LayerTree : public TileTree {
 
   // Adds all four children or none. The client upsamples the parent where the server has no child.
   void AddChildren(Tile& tile) override {
-    if (!std::exchange(tile.may_have_more_children, false) || !tile.key || tile.key->level >= geo::kMaxLevel) return;
+    if (!std::exchange(tile.children_unknown, false) || !tile.key || tile.key->level >= geo::kMaxLevel) return;
     const geo::TileKey& key = *tile.key;
     std::array<geo::TileKey, 4> keys;
     std::array<bool, 4> available{};
@@ -161,7 +155,7 @@ class LayerTree : public TileTree {
     tile->parent = &parent;
     tile->key = key;
     tile->content = available ? Content::kMesh : Content::kUpsampled;
-    tile->may_have_more_children = available;
+    tile->children_unknown = available;
     tile->volume = Region(RectangleOf(key), heights.min_m, heights.max_m);
     tile->geometric_error_m = error_m;
     parent.children.push_back(std::move(tile));

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -45,11 +44,18 @@ class TileTree {
  protected:
   TileTree() = default;
 
+  // Replaces all occurrences of `name`, a variable of a template for URIs.
+  static void Replace(std::string& text, std::string_view name, const std::string& value) {
+    for (std::size_t at = text.find(name); at != std::string::npos; at = text.find(name, at + value.size())) {
+      text.replace(at, name.size(), value);
+    }
+  }
+
   Tile root_;
   std::string version_;
 };
 
-// kInvalidArgument if the document is not what `format` expects; the message says what is missing.
+// kInvalidArgument if the text is no such document; the message says what is missing.
 Result<std::unique_ptr<TileTree>> MakeLayerTree(std::string_view layer_json);
 Result<std::unique_ptr<TileTree>> MakeTilesetTree(std::string_view tileset_json);
 

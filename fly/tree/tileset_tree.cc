@@ -23,7 +23,6 @@ namespace terrace::fly {
 struct ImplicitTree {
   std::string content_uri, subtree_uri;
   int subtree_levels = 1;
-  int available_levels = 1;
   Region region;
   std::map<std::tuple<int, std::int64_t, std::int64_t>, Subtree3d> subtrees;  // by level, x, y of their roots
 };
@@ -70,16 +69,6 @@ std::optional<geo::TileKey> KeyOf(const Volume& volume) {
   return same ? std::optional(key) : std::nullopt;
 }
 
-std::string Fill(std::string uri, const geo::TileKey& local) {
-  const std::pair<std::string_view, std::int64_t> values[] = {
-      {"{level}", local.level}, {"{x}", local.x}, {"{y}", local.y}};
-  for (const auto& [name, value] : values) {
-    const std::size_t at = uri.find(name);
-    if (at != std::string::npos) uri.replace(at, name.size(), std::to_string(value));
-  }
-  return uri;
-}
-
 std::tuple<int, std::int64_t, std::int64_t> SubtreeOf(const geo::TileKey& local, int subtree_levels) {
   const int below = local.level % subtree_levels;
   return {local.level - below, local.x >> below, local.y >> below};
@@ -110,9 +99,9 @@ void AddImplicitRoot(const Json& json, Tile& place) {
   tree->content_uri = json.at("content").at("uri").get<std::string>();
   tree->subtree_uri = tiling.at("subtrees").at("uri").get<std::string>();
   tree->subtree_levels = tiling.at("subtreeLevels").get<int>();
-  tree->available_levels = tiling.at("availableLevels").get<int>();
-  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tree->available_levels < 1)
+  if (tree->subtree_levels < 1 || tree->subtree_levels > 12 || tiling.at("availableLevels").get<int>() < 1) {
     Fail("levels of an implicit tiling");
+  }
   tree->region = *region;
   place.content = Content::kStructure;
   place.always_refine = true;
@@ -122,7 +111,7 @@ void AddImplicitRoot(const Json& json, Tile& place) {
   root.key = place.key;
   root.geometric_error_m = place.geometric_error_m;
   root.tree = std::move(tree);
-  root.may_have_more_children = true;
+  root.children_unknown = true;
 }
 
 void ParseTile(const Json& json, double enclosing_error_m, int depth, Tile& tile) {
@@ -158,17 +147,18 @@ class TilesetTree : public TileTree {
   }
 
   void AddChildren(Tile& tile) override {
-    if (!tile.may_have_more_children || !tile.tree) return;
+    if (!tile.children_unknown || !tile.tree) return;
     const ImplicitTree& tree = *tile.tree;
     const auto found = tree.subtrees.find(SubtreeOf(tile.local, tree.subtree_levels));
     if (found == tree.subtrees.end()) return;  // RequestFor requests the subtree first
-    tile.may_have_more_children = false;
+    tile.children_unknown = false;
     const int level = tile.local.level % tree.subtree_levels + 1;
     for (int i = 0; i < 4; ++i) {
       const geo::TileKey local{tile.local.level + 1, 2 * tile.local.x + i % 2, 2 * tile.local.y + i / 2};
       const auto x = static_cast<std::uint32_t>(local.x & ((std::int64_t{1} << level) - 1));
       const auto y = static_cast<std::uint32_t>(local.y & ((std::int64_t{1} << level) - 1));
       const bool is_last = level == tree.subtree_levels;
+      // Only its own subtree says whether the root of one has content.
       if (is_last ? found->second.HasSubtree(x, y) : found->second.HasTile(level, x, y)) {
         AddImplicit(tile, local, is_last || found->second.HasContent(level, x, y));
       }
@@ -190,6 +180,7 @@ class TilesetTree : public TileTree {
     ImplicitTree& tree = *tile.tree;
     Result<Subtree3d> subtree = Subtree3d::Parse(bytes, tree.subtree_levels);
     if (!subtree) return tl::unexpected(std::move(subtree).error());
+    if (!subtree->HasContent(0, 0, 0)) tile.content = Content::kEmpty;
     tree.subtrees.insert_or_assign(SubtreeOf(tile.local, tree.subtree_levels), *std::move(subtree));
     return {};
   }
@@ -215,10 +206,17 @@ class TilesetTree : public TileTree {
     tile.volume = PartOf(parent.tree->region, local);
     tile.key = KeyOf(tile.volume);
     tile.geometric_error_m = parent.geometric_error_m / 2;
-    tile.may_have_more_children = true;
+    tile.children_unknown = true;
     if (has_content) return;
     tile.content = Content::kEmpty;
     tile.state = LoadState::kReady;
+  }
+
+  static std::string Fill(std::string uri, const geo::TileKey& local) {
+    Replace(uri, "{level}", std::to_string(local.level));
+    Replace(uri, "{x}", std::to_string(local.x));
+    Replace(uri, "{y}", std::to_string(local.y));
+    return uri;
   }
 
   // URLs contain the version of the first document: replaces it by the current one.

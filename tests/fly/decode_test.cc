@@ -69,6 +69,8 @@ TEST(GunzipOfClient, ReadsWholeStreamsOnly) {
   ASSERT_TRUE(Gunzip(empty));
   EXPECT_EQ(*Gunzip(empty), "");
   EXPECT_FALSE(Gunzip(std::string_view(empty).substr(0, 15)));
+  EXPECT_FALSE(Gunzip(empty + "x"));
+  EXPECT_FALSE(Gunzip(empty + empty));
   EXPECT_TRUE(IsGzip(empty));
   EXPECT_FALSE(IsGzip("glTF"));
 }

@@ -67,6 +67,25 @@ TEST(FlightPath, ReadsLinesAndGeoJson) {
   EXPECT_DOUBLE_EQ(json->length_m(), line->length_m());
 }
 
+TEST(FlightPath, LooksAlongThePathWherePointsAreRepeated) {
+  for (const char* text :
+       {"8,46,3000\n8.1,46,3000\n8.1,46,3000\n8.2,46,3000\n8.2,46,3000",
+        "8,46,3000\n8.1,46,3000\n8.1,46,4000\n8.2,46,4000\n8.2,46,3000",  // vertical parts
+        "1.1,0,3000\n7.3,0,3000\n7.3,0,3000\n7.4,0,3000",                 // rounding moves the repeated point
+        R"({"type":"LineString","coordinates":[[8,46,3000],[8.1,46,3000],[8.1,46,3000],[8.2,46,3000]]})"}) {
+    const Result<FlightPath> path = ParsePath(text, kSpeed);
+    ASSERT_TRUE(path) << path.error().message;
+    const double whole = path->duration_s();
+    for (double t = 0; t <= whole; t += whole / 997) EXPECT_NEAR(path->PoseAt(t).heading, 90, 0.1) << text << t;
+  }
+  // Stated headings stay: of the first of equal points.
+  const Result<FlightPath> stated = ParsePath("8,46,1,10,0\n8,46,1,20,0\n8.1,46,1,30,0", kSpeed);
+  ASSERT_TRUE(stated);
+  ASSERT_EQ(stated->points.size(), 2U);
+  EXPECT_EQ(stated->PoseAt(0).heading, 10);
+  EXPECT_EQ(stated->PoseAt(stated->duration_s()).heading, 30);
+}
+
 TEST(FlightPath, SkipsAByteOrderMark) {
   for (const char* text :
        {"7 46 3000\n8 46 3000", R"({"type":"LineString","coordinates":[[7,46,3000],[8,46,3000]]})"}) {
@@ -104,6 +123,8 @@ TEST(FlightPath, NamesTheLineThatIsWrong) {
   EXPECT_NE(message("7,46,1,0,-91").find("line 1: heading"), std::string::npos);
   EXPECT_NE(message("").find("no points"), std::string::npos);
   EXPECT_NE(message(R"({"type":"Point"})").find("no LineString"), std::string::npos);
+  EXPECT_NE(message(R"({"type":"LineString","coordinates":[]})").find("no points"), std::string::npos);
+  EXPECT_NE(message(R"({"type":"LineString","coordinates":[[7,46,1],[7,46]]})").find("point 2"), std::string::npos);
 }
 
 }  // namespace

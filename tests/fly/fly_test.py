@@ -185,6 +185,27 @@ class Faults(unittest.TestCase):
         self.assertEqual(report["summary"]["outcomes"]["refused"], 2)
         self.assertEqual(report["summary"]["retries"], 2)
 
+    def test_counts_no_refusals_among_the_attempts(self):
+        asked = {"layer.json": 0, "0/0/0.terrain": 0}
+
+        def refuse_six_and_fail_once(path, status, headers, body):
+            for name in asked:
+                if path.split("?")[0].endswith(name):
+                    asked[name] += 1
+                    if asked[name] <= 6:
+                        return 503, {"Retry-After": "0"}, b""
+                    if asked[name] == 7:
+                        return 500 if name == "layer.json" else 200, {"Retry-After": "0"}, b"damaged"
+            return status, headers, body
+
+        with fault_proxy.FaultProxy(UPSTREAM, rewrite=refuse_six_and_fail_once) as proxy:
+            status, report = fly(proxy.address)
+        summary = report["summary"]
+        self.assertEqual(status, 0, summary)
+        self.assertEqual((summary["outcomes"]["refused"], summary["outcomes"]["other_status"], summary["outcomes"]["damaged"]), (12, 1, 1))
+        self.assertEqual(summary["retries"], 14)
+        self.assertEqual(asked, {"layer.json": 8, "0/0/0.terrain": 8})
+
     def test_repeats_what_a_problem_document_says(self):
         def answer(status, body):
             return lambda path, *_: (status, {"Content-Type": "application/problem+json"}, body)
@@ -252,7 +273,10 @@ class Faults(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("layer.json cannot be read", " ".join(report["summary"]["findings"]))
 
-    def test_takes_a_new_version_in_flight(self):
+    @staticmethod
+    def fly_over_a_change(edit=None, **more):
+        """(exit status, summary) of a flight during which the version becomes 0123456789ab. `edit(document)` may change
+        both versions of layer.json."""
         changed = threading.Event()
 
         def newer(path, status, headers, body):
@@ -262,6 +286,8 @@ class Faults(unittest.TestCase):
                 if changed.is_set():
                     document["tiles"] = [document["tiles"][0].replace(document["version"], "0123456789ab")]
                     document["version"] = "0123456789ab"
+                if edit:
+                    edit(document)
                 return status, headers, json.dumps(document).encode()
             is_old = changed.is_set() and "v=0123456789ab" not in path
             return status, {**headers, "Cache-Control": "no-store" if is_old else "public, max-age=31536000, immutable"}, body
@@ -272,13 +298,38 @@ class Faults(unittest.TestCase):
             return False
 
         with fault_proxy.FaultProxy(UPSTREAM, change, newer) as proxy:
-            status, report = fly(proxy.address, duration="4")
-        summary = report["summary"]
+            status, report = fly(proxy.address, **more)
+        return status, report["summary"]
+
+    def test_takes_a_new_version_in_flight(self):
+        status, summary = self.fly_over_a_change(duration="4")
         self.assertEqual(status, 0, summary)
         self.assertEqual(summary["version_changes"], 1)
         self.assertGreater(summary["mixed_version_frames"], 0)
         self.assertIn("changed its version", " ".join(summary["findings"]))
         self.assertGreaterEqual(summary["tiles"], 100)  # old ones, and all of them again
+
+    def test_shows_one_version_when_all_tiles_are_replaced(self):
+        def remove_a_column(document):  # below the camera: the client makes these tiles from their parents
+            (block,) = document["available"][12]
+            document["available"][12] = [{**block, "endX": 2177}, {**block, "startX": 2179}]
+
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder, "path.csv")  # rests for ten of its fourteen seconds
+            path.write_text("0,-84.27,36.2,3000,0,-20\n4,-84.27,36.3,3000,0,-20\n14,-84.27,36.3,3000,0,-20\n")
+            status, summary = self.fly_over_a_change(remove_a_column, way=["--path", path], duration="14")
+        self.assertEqual((status, summary["version_changes"]), (0, 1), summary)
+        self.assertLess(summary["mixed_version_frames"], summary["frames"] / 2)
+
+    def test_keeps_tiles_whose_new_url_is_none(self):
+        def break_url(document):
+            if document["version"] == "0123456789ab":
+                document["tiles"] = ["http://[::1/" + document["tiles"][0]]
+
+        status, summary = self.fly_over_a_change(break_url, duration="4")
+        self.assertEqual((status, summary["version_changes"]), (0, 1), summary)
+        counts = {count for text, count in summary["messages"].items() if text.startswith("http://[::1/")}
+        self.assertEqual(counts, {1}, "each tile is tried once")
 
     def test_says_that_a_slow_server_does_not_keep_up(self):
         with fault_proxy.FaultProxy(UPSTREAM, tiles_per_second=10) as proxy:

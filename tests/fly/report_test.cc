@@ -4,9 +4,9 @@
 
 #include "fly/report/html_report.h"
 #include "fly/report/map_plot.h"
+#include "fly/report/plot.h"
 #include "fly/report/requirement.h"
 #include "fly/report/summary.h"
-#include "fly/report/time_plot.h"
 
 namespace terrace::fly {
 namespace {
@@ -76,6 +76,7 @@ TEST(Summary, CountsWhatHappened) {
   const std::string text = TextOf(summary);
   EXPECT_NE(text.find("Holes: 1 of 10"), std::string::npos) << text;
   EXPECT_NE(text.find("refused (429, 503)"), std::string::npos) << text;
+  EXPECT_NE(LineOf(1, statistics.second(1)).find("refused or failed 1"), std::string::npos);
 }
 
 // A server that dies is not a fast one.
@@ -117,6 +118,25 @@ TEST(Requirements, HoldOrFail) {
   for (const char* text : {"full-view=99s", "p99=99s", "refined=0%", "holes=9", "hits=0%", "tiles=0"}) {
     EXPECT_FALSE(Judge(*ParseRequirements(text), empty).AllHold()) << text;  // what was not measured does not hold
   }
+}
+
+TEST(Requirements, ShowWhyTheyFail) {
+  const auto shown = [](std::string_view text, const Summary& summary) {
+    return Judge(*ParseRequirements(text), summary).all[0].shown;
+  };
+  Summary summary;
+  summary.totals.tiles = summary.totals.flying_frames = 1;
+  summary.tiles_per_second = 29.7;
+  summary.p99_s = 0.05004;
+  summary.refined_share = 0.949996;
+  EXPECT_EQ(shown("tiles=30", summary), "29.7");
+  EXPECT_EQ(shown("tiles=29", summary), "30");
+  EXPECT_EQ(shown("p99=50ms", summary), "50.04 ms");
+  EXPECT_EQ(shown("p99=60ms", summary), "50.0 ms");
+  EXPECT_EQ(shown("refined=95%", summary), "94.9996 %");
+  EXPECT_EQ(shown("errors=0", summary), "0");
+  summary.p99_s = 1.0004;
+  EXPECT_EQ(shown("p99=1s", summary), "1.0004 s");
 }
 
 TEST(Requirements, NameThePartThatIsWrong) {

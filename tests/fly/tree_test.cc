@@ -48,7 +48,7 @@ TEST(LayerTree, FindsTilesInManyRanges) {
   Tile parent;
   parent.volume = Region({0, 0, 1, 1}, 0, 1);
   parent.key = geo::TileKey{0, 2, 15};
-  parent.may_have_more_children = true;
+  parent.children_unknown = true;
   (*tree)->AddChildren(parent);
   ASSERT_EQ(parent.children.size(), 4U);
   for (const auto& child : parent.children) EXPECT_EQ(child->content, Content::kMesh);
@@ -103,6 +103,33 @@ TEST(TilesetTree, GrowsWithItsSubtrees) {
   tree.AddChildren(north_east);
   ASSERT_EQ(north_east.children.size(), 1U);  // the root of the next subtree
   EXPECT_EQ(tree.RequestFor(*north_east.children[0]).uri, "t/2.3.2.subtree?v=aaaa");
+}
+
+TEST(TilesetTree, DoesNotRequestTheContentOfASubtreesRootThatHasNone) {
+  auto made = MakeTilesetTree(kTileset);
+  ASSERT_TRUE(made);
+  Tile& root = *(*made)->root().children[0]->children[0]->children[0];
+  const std::string json = R"({"tileAvailability":{"constant":1},"contentAvailability":[{"constant":0}],)"
+                           R"("childSubtreeAvailability":{"constant":0}})";
+  std::string bytes("subt\x01\0\0\0", 8);
+  const auto put = [&bytes](std::uint64_t value) { bytes.append(reinterpret_cast<const char*>(&value), 8); };
+  put(json.size());
+  put(0);
+  ASSERT_TRUE((*made)->TakeSubtree(root, bytes + json));
+  EXPECT_EQ((*made)->RequestFor(root).kind, NextRequest::Kind::kNothing);
+  EXPECT_EQ(root.content, Content::kEmpty);
+  (*made)->AddChildren(root);
+  EXPECT_EQ(root.children.size(), 4U);
+}
+
+TEST(TilesetTree, FillsEachVariableOfATemplate) {
+  std::string tileset = kTileset;
+  tileset.replace(tileset.find("t/{level}/{x}/{y}.glb"), 21, "{x}/{level}/{x}/{y}.glb");
+  auto made = MakeTilesetTree(tileset);
+  ASSERT_TRUE(made);
+  Tile& root = *(*made)->root().children[0]->children[0]->children[0];
+  ASSERT_TRUE((*made)->TakeSubtree(root, SubtreeBytes(2, {{{0, 0, 0, 0}}, {}, {}})));
+  EXPECT_EQ((*made)->RequestFor(root).uri, "0/0/0/0.glb?v=aaaa");
 }
 
 TEST(TilesetTree, FollowsTheVersionOfItsDocument) {

@@ -56,7 +56,7 @@ Result<void> CheckWritable(const std::string& path, const std::string& read) {
   if (std::filesystem::equivalent(path, read, ignored)) {
     return MakeError(ErrorCode::kInvalidArgument, "{} is the file of --path; give another name", path);
   }
-  // A pipe would take the end of a try for the end of the report.
+  // Opening and closing a pipe here would end its reader.
   if (IsPipeOrDevice(path)) {
     if (::access(path.c_str(), W_OK) == 0) return {};
     return MakeError(ErrorCode::kUnavailable, "cannot write {}: {}; name a file in a folder that is writable", path,

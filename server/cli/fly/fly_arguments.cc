@@ -122,11 +122,8 @@ Result<fly::FlightOptions> OptionsOf(const FlyArguments& arguments) {
     }
   }
   options.document = *std::move(document);
-  options.format =
-      options.document.target.find("tileset.json") != std::string::npos ? fly::Format::k3dTiles : fly::Format::kTerrain;
-  if (options.document.target.find(".json") != std::string::npos && arguments.format == "3dtiles") {
-    options.format = fly::Format::k3dTiles;
-  }
+  const bool is_3d = arguments.format == "3dtiles" || options.document.target.find("tileset.json") != std::string::npos;
+  options.format = is_3d ? fly::Format::k3dTiles : fly::Format::kTerrain;
   options.path = *std::move(path);
   options.duration_s = arguments.duration >= 0 ? arguments.duration : std::max(10.0, options.path.duration_s());
   options.lens = {arguments.width, arguments.height, arguments.fov};
@@ -196,7 +193,7 @@ void AddClientFlags(CLI::App& command, FlyArguments& a) {
   command.add_option("--header", a.headers, "\"Name: value\" for each request; may be repeated")->type_name("HEADER");
   command.add_flag("--insecure", a.insecure, "Accept any TLS certificate");
   AddNumber(command, "--timeout", a.timeout, "S", 0.1, 3600.0,
-            "Longest time of connecting, and from a request to its complete reply");
+            "Longest time of connecting to a resolved host, and from a request to its complete reply");
   AddNumber(command, "--first-view-limit", a.first_view_limit, "S", 0.1, 3600.0,
             "A client takes off after this time without a full view");
 }

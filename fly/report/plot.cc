@@ -1,4 +1,4 @@
-#include "fly/report/time_plot.h"
+#include "fly/report/plot.h"
 
 #include <fmt/format.h>
 

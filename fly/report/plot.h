@@ -1,7 +1,6 @@
-// Plots over the seconds of a flight, as SVG.
+// Plots as SVG: over the seconds of a flight, and bars with labels.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -10,7 +9,7 @@ namespace terrace::fly {
 struct Series {
   std::string name;
   std::string color;                                              // a CSS colour or variable
-  std::vector<double> values;                                     // one a second; NaN leaves a gap
+  std::vector<double> values;                                     // one a second, or a label; NaN leaves a gap
   enum class Shape { kLine, kArea, kBars } shape = Shape::kLine;  // areas and bars are stacked in their order
 };
 
