@@ -3,6 +3,7 @@
 import { take } from "/viewer/begun.js";
 
 const kKey = "terrace.token";
+const kMaxUrl = 4000;  // bytes; the server reads heads of 8 KiB
 const kMaxTiles = 50;  // for the heights of one request; the server reads at most 64
 
 // The server does not know the token.
@@ -47,6 +48,11 @@ export class Access {
     return [401, 403].includes((await fetch(url, { headers: this.headers })).status);
   }
 
+  #post(url, query) {
+    const headers = { ...this.headers, "Content-Type": "application/json" };
+    return readJson(url, { method: "POST", headers, body: JSON.stringify(query) });
+  }
+
   heightUrl(dataset, longitude, latitude) {
     return heightsUrl(dataset, [{ longitude, latitude }], { locations: `${latitude},${longitude}` });
   }
@@ -64,9 +70,7 @@ export class Access {
 
   // Heights at {longitude, latitude}: metres, undefined where the dataset has none.
   async heights(dataset, places) {
-    const locations = places.map(locationOf).join("|");
-    const headers = { ...this.headers, "Content-Type": "application/json" };
-    const { results } = await readJson(heightsUrl(dataset, places, {}), { method: "POST", headers, body: JSON.stringify({ locations }) });
+    const { results } = await this.#post(heightsUrl(dataset, places, {}), { locations: places.map(locationOf).join("|") });
     return results.map(({ elevation }) => elevation ?? undefined);
   }
 
@@ -74,7 +78,9 @@ export class Access {
   // the dataset has none.
   async profile(dataset, corners, samples) {
     const query = { path: corners.map(locationOf).join("|"), samples };
-    const { results } = await readJson(heightsUrl(dataset, between(corners), query), { headers: this.headers });
+    const url = heightsUrl(dataset, between(corners), query);
+    const { results } = await (url.length < kMaxUrl ? readJson(url, { headers: this.headers }) :
+      this.#post(heightsUrl(dataset, between(corners), {}), query));
     return results.map(({ elevation, distance, location }) =>
       ({ longitude: location.lng, latitude: location.lat, distance, height: elevation ?? undefined }));
   }

@@ -74,8 +74,10 @@ function makeGlobe() {
   }
 }
 
+// A finer one where there is none.
 function coarserThan(fraction) {
-  return fractionOfStep(stepOfFraction(fraction * kCoarser));
+  const [coarser, finer] = [fraction * kCoarser, fraction / kCoarser].map((other) => fractionOfStep(stepOfFraction(other)));
+  return coarser > fraction ? coarser : finer;
 }
 
 // What was picked, measured or drawn belongs to one dataset.

@@ -32,6 +32,10 @@ export function signedArea(corners) {
   }, 0);
 }
 
+// Whether the boxes around two edges meet; edges on one line may lie apart.
+const areNear = ([a, b], [c, d]) => [0, 1].every((axis) =>
+  Math.max(Math.min(a[axis], b[axis]), Math.min(c[axis], d[axis])) <= Math.min(Math.max(a[axis], b[axis]), Math.max(c[axis], d[axis])));
+
 // Whether two edges of the ring that are not neighbours meet.
 export function crossesItself(corners) {
   const points = unwrapped(corners).map(({ longitude, latitude }) => [longitude, latitude]);
@@ -41,7 +45,7 @@ export function crossesItself(corners) {
     for (let k = i + 2; k < n; ++k) {
       if ((k + 1) % n === i) continue;
       const [[a, b], [c, d]] = [edge(i), edge(k)];
-      if (cross(a, b, c) * cross(a, b, d) <= 0 && cross(c, d, a) * cross(c, d, b) <= 0) return true;
+      if (areNear([a, b], [c, d]) && cross(a, b, c) * cross(a, b, d) <= 0 && cross(c, d, a) * cross(c, d, b) <= 0) return true;
     }
   }
   return false;

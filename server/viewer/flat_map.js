@@ -1,6 +1,6 @@
 // The page without WebGL 2: a flat map, drawn on a 2D canvas from the height tiles (Web Mercator PNGs, terrain-RGB), with
-// colours by height or the dataset's image, shading, and contours. Drag and wheel or arrow keys, plus and minus move it; a
-// click reads a height.
+// colours by height or the dataset's image, shading, and contours. Dragging, wheel or two fingers, arrow keys, plus and minus
+// move it; a click reads a height.
 import { pendingText } from "/viewer/access.js";
 import { heightColour, niceInterval, waterline } from "/viewer/colours.js";
 import { access, firstList } from "/viewer/early.js";
@@ -11,6 +11,7 @@ const kTile = 256;
 const kPendingMs = 1500;
 const kMaxTiles = 300;  // in memory
 const kWater = [51, 115, 158];
+const kStep = 0.1;  // metres between heights of an image
 const byId = (id) => document.getElementById(id);
 
 // Web Mercator: the whole world is 1 wide and 1 high.
@@ -30,7 +31,7 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
   const height = new Float32Array(width * width);
   const { data } = pixels;
   for (let i = 0; i < height.length; ++i) {
-    height[i] = -10000 + (data[4 * i] * 65536 + data[4 * i + 1] * 256 + data[4 * i + 2]) * 0.1;
+    height[i] = -10000 + (data[4 * i] * 65536 + data[4 * i + 1] * 256 + data[4 * i + 2]) * kStep;
   }
   const water = waterline(heights);
   const relief = Math.max(1.2, Math.min(12, metres / 40));
@@ -43,7 +44,8 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
       const light = (0.643 + 0.766 * (-0.707 * east + 0.707 * north)) / (0.643 * Math.hypot(east, north, 1));
       const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
       const isPhoto = photo?.data[4 * i + 3] > 0;
-      const isWater = height[i] < water && [w, e, n, s].every((beside) => beside === height[i]);
+      // The sea is level, or follows the geoid.
+      const isWater = height[i] < water && [w, e, n, s].every((beside) => Math.abs(beside - height[i]) < 1.5 * kStep);
       const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : isWater ? kWater : heightColour(height[i], heights);
       // A line lies between two pixels on both sides of its height.
       const crossed = interval > 0 ? lineBetween(height[i], [e, s], interval) : undefined;
@@ -75,8 +77,11 @@ class FlatMap {
 
   async show(dataset) {
     this.dataset = dataset;
+    this.template = undefined;
+    this.canvas.width = 0;  // nothing is drawn until this dataset's tiles are known
     this.#tiles.clear();
-    const reply = await fetch(dataset.urls.tiles_json ?? `/${encodeURIComponent(dataset.name)}/tiles.json`, { headers: this.access.headers });
+    if (!dataset.urls.tiles_json) throw new Error(`${dataset.name} has no height images, of which the flat map is made.`);
+    const reply = await fetch(dataset.urls.tiles_json, { headers: this.access.headers });
     if (!reply.ok) throw new Error(`the server answered ${reply.status} to tiles.json`);
     const description = await reply.json();
     if (this.dataset !== dataset) return;
@@ -154,7 +159,7 @@ class FlatMap {
     if (!this.template || this.frame) return;
     this.frame = requestAnimationFrame(() => {
       this.frame = undefined;
-      this.#paint();
+      if (this.template) this.#paint();
     });
   }
 
@@ -194,21 +199,29 @@ class FlatMap {
   }
 
   #steer(element) {
-    let last;
+    const pointers = new Map();  // by id: the last place of the mouse, or of each finger
     let moved = 0;
-    element.addEventListener("pointerdown", (event) => {
-      element.setPointerCapture(event.pointerId);
-      [last, moved] = [event, 0];
+    const hull = () => {
+      const [first, second = first] = pointers.values();
+      return { x: (first.x + second.x) / 2, y: (first.y + second.y) / 2, size: Math.hypot(second.x - first.x, second.y - first.y) };
+    };
+    element.addEventListener("pointerdown", ({ pointerId, x, y }) => {
+      element.setPointerCapture(pointerId);
+      if (pointers.size === 0) moved = 0;
+      if (pointers.size < 2) pointers.set(pointerId, { x, y });
     });
-    element.addEventListener("pointermove", (event) => {
-      if (!last) return;
-      moved += Math.abs(event.clientX - last.clientX) + Math.abs(event.clientY - last.clientY);
-      this.move(last.clientX - event.clientX, last.clientY - event.clientY);
-      last = event;
+    element.addEventListener("pointermove", ({ pointerId, x, y }) => {
+      if (!pointers.has(pointerId)) return;
+      const before = hull();
+      pointers.set(pointerId, { x, y });
+      const after = hull();
+      moved += Math.abs(after.x - before.x) + Math.abs(after.y - before.y) + Math.abs(after.size - before.size);
+      this.move(before.x - after.x, before.y - after.y);
+      if (before.size > 0 && after.size > 0) this.zoom(after.size / before.size);
     });
-    element.addEventListener("pointerup", (event) => {
-      last = undefined;
-      if (moved < 4) this.onPick?.(...this.placeOf(event.clientX, event.clientY));
+    element.addEventListener("pointercancel", ({ pointerId }) => pointers.delete(pointerId));
+    element.addEventListener("pointerup", ({ pointerId, x, y }) => {
+      if (pointers.delete(pointerId) && pointers.size === 0 && moved < 4) this.onPick?.(...this.placeOf(x, y));
     });
     element.addEventListener("wheel", (event) => {
       this.zoom(2 ** (-event.deltaY / 300));
@@ -251,24 +264,29 @@ export async function startFlatMap() {
     const show = async (name) => {
       const dataset = datasets.find((candidate) => candidate.name === name) ?? datasets[0];
       byId("dataset").value = dataset.name;
+      byId("readout").hidden = true;
       document.title = `${dataset.name} · terrace`;
       history.replaceState(undefined, "", `#dataset=${encodeURIComponent(dataset.name)}`);
       byId("attribution").textContent = dataset.attribution ?? "";
       byId("imagery").parentElement.hidden = !dataset.urls.imagery;
       drawLegend(byId("legend"), "height", dataset.heights);
+      byId("message").hidden = true;
       await map.show(dataset).catch(fail);
     };
+    const named = () => new URLSearchParams(location.hash.slice(1)).get("dataset");
     byId("dataset").addEventListener("change", (event) => show(event.target.value));
     for (const name of ["contours", "imagery"]) {
       byId(name).addEventListener("change", ({ target }) => map.setLook({ [name]: target.checked }));
     }
     byId("home").addEventListener("click", () => show(byId("dataset").value));
     map.onPick = async (longitude, latitude) => {
+      if (!map.template) return;
       const height = await access.heightAt(map.dataset, longitude, latitude);
       byId("readout").hidden = false;
       byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
     };
-    const wanted = new URLSearchParams(location.hash.slice(1)).get("dataset");
+    addEventListener("hashchange", () => show(named()));
+    const wanted = named();
     await show(wanted);
     if (!wanted || wanted === map.dataset.name || !byId("message").hidden) return;
     const pending = preparing.find(({ name }) => name === wanted);

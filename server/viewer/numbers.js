@@ -2,7 +2,7 @@
 const number = new Intl.NumberFormat("en");
 const short = new Intl.NumberFormat("en", { notation: "compact", maximumSignificantDigits: 3 });
 
-export const formatNumber = (value) => number.format(value).replace("-", "−");
+export const formatNumber = (value) => number.format(value + 0).replace("-", "−");  // −0 + 0 is 0
 export const formatCompact = (value) => short.format(value);
 
 export function formatMetres(metres) {
@@ -32,6 +32,6 @@ export function formatFraction(fraction) {
 }
 
 export function formatPosition({ longitude, latitude, height }) {
-  const angle = (value, positive, negative) => `${Math.abs(value).toFixed(5)}° ${value < 0 ? negative : positive}`;
+  const angle = (value, positive, negative) => `${Math.abs(value).toFixed(5)}° ${value < -5e-6 ? negative : positive}`;
   return `${angle(latitude, "N", "S")}  ${angle(longitude, "E", "W")}  ${formatNumber(Number(height.toFixed(1)))} m`;
 }

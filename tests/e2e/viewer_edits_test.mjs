@@ -34,6 +34,9 @@ describe('shapes of edits', () => {
     assert.ok(!crossesItself(square));
     assert.ok(!crossesItself(square.slice(1)));
     assert.ok(crossesItself([square[0], square[2], square[1], square[3]]));
+    const bracket = [at(0, 0), at(3, 0), at(3, 1), at(1, 1), at(1, 2), at(3, 2), at(3, 3), at(0, 3)];
+    assert.ok(!crossesItself(bracket), 'two edges on one line');
+    assert.ok(crossesItself([...bracket.slice(0, 6), at(3, 0.5), at(0, 3)]), 'two that overlap on one line');
   });
 
   it('contain places', () => {

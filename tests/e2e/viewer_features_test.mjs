@@ -8,6 +8,7 @@ import { assertAccessible } from './axe.mjs';
 import { end, launchWithoutWebGl, openBrowser } from './browser.mjs';
 import { samples, serve } from './harness.mjs';
 import { measurePath, seenGround } from '../../server/viewer/ground_path.js';
+import { formatHeight, formatPosition } from '../../server/viewer/numbers.js';
 import { fromLocalMeanTime, sunAltitude, sunDirection } from '../../server/viewer/sun.js';
 
 const kWait = { timeout: 90000, polling: 200 };
@@ -16,6 +17,12 @@ describe('numbers of the viewer', () => {
   it('measure the ground of a tent', () => {
     const points = [0, 300, 600].map((distance, i) => ({ distance, height: [0, 400, 0][i] }));
     assert.deepEqual(measurePath(points), { length: 600, along: 1000, up: 400, down: 400, min: 0, max: 400, gaps: false });
+  });
+
+  it('have no minus before zero', () => {
+    assert.deepEqual([-0.04, -0.06, 1309.5].map((height) => formatHeight(height)), ['0 m', '−0.1 m', '1,310 m']);
+    assert.equal(formatHeight(1309.5, 1), '1,309.5 m');
+    assert.equal(formatPosition({ longitude: -1e-6, latitude: -1, height: -0.04 }), '1.00000° S  0.00000° E  0 m');
   });
 
   it('leave voids out', () => {
@@ -66,6 +73,12 @@ describe('features of the viewer', () => {
 
   after(() => end(browser, server, folder));
 
+  it('have names', async () => {
+    for (const [role, name] of [['combobox', 'Dataset'], ['slider', 'Mesh error'], ['slider', 'Exaggeration']]) {
+      assert.equal(await page.getByRole(role, { name, exact: true }).count(), 1, name);
+    }
+  });
+
   it('keep colours true under exaggeration', async () => {
     const uniform = () => page.evaluate(() => terrace.globe.material.uniforms.exaggeration);
     assert.equal(await uniform(), 1);
@@ -110,6 +123,8 @@ describe('features of the viewer', () => {
     const drawn = await page.locator('#plot .ground.fill').evaluate((path) => (({ x, width }) => ({ x, width }))(path.getBBox()));
     assert.ok(drawn.x > 100 && drawn.width > 100, `the ground after the gap is drawn: ${JSON.stringify(drawn)}`);
     assert.equal(await page.locator('#plot').getAttribute('aria-valuetext'), null, 'of the profile before');
+    await measure(Array.from({ length: 400 }, (_, i) => -84.3 + i * 0.0002));  // more than a URL may have
+    await says(/^7,168 m straight|^7\.\d km straight|^7,1\d\d m straight/);
     await measure([-84.25, -84.2499]);  // 9 m
     await says(/^[\d.,]+ m straight/);
     const heights = await page.locator('#plot text[text-anchor=end]').allTextContents();
@@ -266,6 +281,21 @@ describe('features of the viewer', () => {
     await flat.keyboard.press('Enter');
     await flat.waitForFunction(() => / m$/.test(document.getElementById('readout').textContent), undefined, kWait);
     await assertAccessible(flat, 'the flat map');
+    await flat.route('**/datasets', async (route) => {
+      const list = await (await route.fetch()).json();
+      const [{ urls: { tiles_json, ...urls }, ...others }] = list.datasets;
+      await route.fulfill({ json: { ...list, datasets: [...list.datasets, { ...others, name: 'bare', urls }] } });
+    });
+    await flat.reload();
+    const isDrawn = (wanted) => flat.waitForFunction((is) => (document.querySelector('#globe canvas').width > 0) === is, wanted, kWait);
+    await isDrawn(true);
+    await flat.locator('#dataset').selectOption('bare');
+    await flat.getByText('bare has no height images').waitFor({ timeout: 30000 });
+    await isDrawn(false);
+    await flat.evaluate(() => (location.hash = 'dataset=hills'));
+    await isDrawn(true);
+    assert.ok(await flat.locator('#message').isHidden());
+    await flat.unroute('**/datasets');
     await flat.goto('about:blank');
     await flat.goto(`${server.url}/#dataset=nowhere`);
     await flat.getByText('There is no dataset nowhere on this server; this is hills.').waitFor({ timeout: 30000 });
