@@ -12,7 +12,7 @@ import { Traffic } from "/viewer/traffic.js";
 import { decodeView, encodeView } from "/viewer/view_url.js";
 import { Watch } from "/viewer/watch.js";
 
-const kFlightSeconds = 2.5;
+const flightSeconds = () => (matchMedia("(prefers-reduced-motion: reduce)").matches ? 0 : 2.5);
 
 const kFirstSun = "06-21T18:30";  // of this year: an evening, if none was chosen
 const kRetryMs = 5000;  // of what is not essential
@@ -30,8 +30,8 @@ const state = { datasets: [], preparing: [], moreWithToken: false, dataset: unde
 
 const panel = new Panel({
   dataset: (name) => choose(name),
-  home: () => state.dataset && lookAt(firstRegion(state.dataset), kFlightSeconds),
-  whole: () => lookAt(state.dataset, kFlightSeconds),
+  home: () => state.dataset && lookAt(firstRegion(state.dataset), flightSeconds()),
+  whole: () => lookAt(state.dataset, flightSeconds()),
   token: () => ask("Datasets that the token opens are added to the list."),
   fraction: (fraction) => refetch(fraction),
   exaggeration: (factor) => { globe.exaggeration = factor; state.draft?.stretch(); remember(); },
@@ -126,7 +126,7 @@ function choose(name) {
   state.wanted = undefined;
   state.dataset = state.datasets.find((dataset) => dataset.name === name) ?? state.datasets[0];
   state.fraction = defaultFraction(state.dataset);
-  lookAt(firstRegion(state.dataset), kFlightSeconds);
+  lookAt(firstRegion(state.dataset), flightSeconds());
   return show();
 }
 
@@ -138,7 +138,10 @@ function refetch(fraction) {
 
 // The server does not answer: the picture stays, and comes to life again with the server. Or it has other tokens now.
 function lose(error) {
-  if (error instanceof UnknownToken) return ask("The server does not know the token of this page any more.");
+  if (error instanceof UnknownToken) {
+    panel.setMessage(undefined);
+    return ask("The server does not know the token of this page any more.");
+  }
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
 }
 
@@ -212,12 +215,14 @@ function setSun(text) {
 // The tools are loaded when they are first used. One of them at a time.
 async function useTool(name) {
   const options = { globe, access, dataset: () => state.dataset, onMode: setMode };
+  let part;
   try {
-    if (name === "draft") state.draft ??= new (await import("/viewer/draft.js")).Draft(options);
-    else state.measure ??= new (await import("/viewer/measure.js")).Measure(options);
+    part = await import(name === "draft" ? "/viewer/draft.js" : "/viewer/measure.js");
   } catch {
     return panel.note("The tool could not be loaded: the server does not answer.");
   }
+  if (name === "draft") state.draft ??= new part.Draft(options);
+  else state.measure ??= new part.Measure(options);
   const [other, tool] = name === "draft" ? [state.measure, state.draft] : [state.draft, state.measure];
   other?.end();
   return tool.toggle(name);
@@ -336,7 +341,9 @@ function refresh() {
   panel.setActivity(globe.loading ? "loading" : "");
   // The labels belong to one camera and one set of tiles.
   const view = `${globe.camera} ${globe.exaggeration} ${globe.interval} ${state.drawn.keys}`;
-  if (globe.loading || view === state.labelled) return;
+  if (globe.loading) return;
+  globe.lift();
+  if (view === state.labelled) return;
   state.labelled = view;
   labelContours();
   outlineEdits();

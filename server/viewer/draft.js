@@ -8,6 +8,7 @@ import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } fr
 import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
 
 const kSamples = 400;
+const kMaxHeight = 20000;  // metres; the server takes no others
 const kMinArea = 0.01;  // square metres; less has corners on one line
 const kSurface = Color.fromCssColorString("#ff8a5c").withAlpha(0.55);
 const byId = (id) => document.getElementById(id);
@@ -75,7 +76,7 @@ export class Draft {
   }
 
   get height() {
-    return byId("draft-height").valueAsNumber || 0;
+    return Math.max(-kMaxHeight, Math.min(kMaxHeight, byId("draft-height").valueAsNumber || 0));
   }
 
   get blend() {

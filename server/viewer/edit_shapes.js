@@ -4,6 +4,8 @@ const kDegree = Math.PI / 180;
 const kRadius = 6378137;
 const kEccentricity = 0.0818191908426215;
 
+const kMaxSide = 300;  // of a grid, for rings much longer than wide
+
 const turned = (degrees) => degrees - 360 * Math.round(degrees / 360);
 
 // Corners whose longitudes go on beyond 180 degrees, on the side of the first one.
@@ -51,13 +53,18 @@ export function crossesItself(corners) {
   return false;
 }
 
-// Places inside the ring on a grid of about `count` over its box, as {longitude, latitude}.
+// About `count` places inside the ring, on a grid over its box, as {longitude, latitude}.
 export function placesInside(outline, count) {
   const corners = unwrapped(outline);
   const [longitudes, latitudes] = ["longitude", "latitude"].map((name) => corners.map((corner) => corner[name]));
   const [west, east] = [Math.min(...longitudes), Math.max(...longitudes)];
   const [south, north] = [Math.min(...latitudes), Math.max(...latitudes)];
-  const side = Math.ceil(Math.sqrt(count));
+  const doubled = corners.reduce((sum, a, k) => {
+    const b = corners[(k + 1) % corners.length];
+    return sum + (a.longitude - west) * (b.latitude - south) - (b.longitude - west) * (a.latitude - south);
+  }, 0);
+  const share = Math.abs(doubled) / 2 / ((east - west) * (north - south)) || 1;
+  const side = Math.min(kMaxSide, Math.ceil(Math.sqrt(count / share)));
   const places = [];
   for (let i = 0; i < side * side; ++i) {
     const longitude = west + ((east - west) * ((i % side) + 0.5)) / side;

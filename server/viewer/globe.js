@@ -6,7 +6,7 @@ import {
 } from "/viewer/cesium/index.js";
 import { errorQuery, layerUrl } from "/viewer/early.js";
 import { boxOf, discOf, isGlobal, kGlobalDistance, pixelTolerance, viewDistance } from "/viewer/framing.js";
-import { steerByKeyboard } from "/viewer/keyboard.js";
+import { kNearest, steerByKeyboard } from "/viewer/keyboard.js";
 import { niceInterval } from "/viewer/colours.js";
 import { makeTerrainMaterial, setColouring, setHeights } from "/viewer/material.js";
 import { Overlay } from "/viewer/overlay.js";
@@ -291,7 +291,9 @@ export class Globe {
       this.overlay.setMarker("picked", ground);
       callback(ground);
     };
-    steerByKeyboard(this.container, camera, () => click(middle()), (key) => this.onKey?.(key) ?? false);
+    steerByKeyboard(this.container, camera, {
+      clearance: () => this.clearance, onEnter: () => click(middle()), onKey: (key) => this.onKey?.(key) ?? false,
+    });
     handler.setInputAction(({ position }) => click(position), ScreenSpaceEventType.LEFT_CLICK);
   }
 
@@ -302,6 +304,19 @@ export class Globe {
     const ground = Cartographic.fromCartesian(point);
     return { longitude: CesiumMath.toDegrees(ground.longitude), latitude: CesiumMath.toDegrees(ground.latitude),
              height: ground.height / this.exaggeration };
+  }
+
+  // Metres from the camera down to the drawn ground, or to the ellipsoid where none is drawn. Negative: it is below.
+  get clearance() {
+    const { camera, globe } = this.scene;
+    return camera.positionCartographic.height - (globe.getHeight(camera.positionCartographic) ?? 0);
+  }
+
+  // Moves a camera from below the ground, whose height is known only when it is drawn, to above it.
+  lift() {
+    const { camera } = this.scene;
+    const { clearance } = this;
+    if (clearance < 0) camera.move(Cartesian3.normalize(camera.positionWC, new Cartesian3()), kNearest - clearance);
   }
 
   // Metres above the ellipsoid of the drawn ground; undefined where none is drawn.
@@ -316,7 +331,7 @@ export class Globe {
     const box = camera.computeViewRectangle(ellipsoid);
     const kMargin = 1e-6;  // degrees: a line along a parallel has no area
     return ([west, south, east, north]) => !box || Rectangle.intersection(box, Rectangle.fromDegrees(
-      west - kMargin, south - kMargin, east + kMargin, north + kMargin)) !== undefined;
+      Math.max(west - kMargin, -180), Math.max(south - kMargin, -90), Math.min(east + kMargin, 180), Math.min(north + kMargin, 90))) !== undefined;
   }
 
   get loading() {
@@ -333,8 +348,10 @@ export class Globe {
       sum.triangles += mesh.indexCountWithoutSkirts / 3;
       sum.withSkirts += mesh.indices.length / 3;
       sum.vertices += mesh.vertexCountWithoutSkirts;
-      sum.keys.push(`${tile.level}/${tile.x}/${2 ** tile.level - 1 - tile.y}`);
-      sum.deepest = Math.max(sum.deepest, tile.level);
+      let sent = tile;  // below the deepest tiles of the server CesiumJS draws parts of them
+      while (sent.upsampledFromParent && sent.parent) sent = sent.parent;
+      sum.keys.push(`${sent.level}/${sent.x}/${2 ** sent.level - 1 - sent.y}`);
+      sum.deepest = Math.max(sum.deepest, sent.level);
     }
     return sum;
   }

@@ -4,6 +4,7 @@ import { Cartesian3, Math as CesiumMath } from "/viewer/cesium/index.js";
 
 const kTurn = CesiumMath.toRadians(4);
 const kStep = 0.12;  // of the height above the ellipsoid
+export const kNearest = 10;  // metres above the ground
 
 // Moves along the ground by `right` and `ahead`, in steps relative to the camera.
 function travel(camera, right, ahead) {
@@ -24,13 +25,13 @@ function turn(camera, right, up) {
 const kArrows = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const kZooms = { "+": 1, "=": 1, "-": -1 };
 
-// `onKey(key)` returns whether the page has used the key.
-export function steerByKeyboard(element, camera, onEnter, onKey) {
+// `clearance()`: metres from the camera down to the drawn ground. `onKey(key)` returns whether the page has used the key.
+export function steerByKeyboard(element, camera, { clearance, onEnter, onKey }) {
   element.tabIndex = 0;
   element.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     if (event.key in kArrows) (event.shiftKey ? turn : travel)(camera, ...kArrows[event.key]);
-    else if (event.key in kZooms) camera.zoomIn(kZooms[event.key] * 0.2 * camera.positionCartographic.height);
+    else if (event.key in kZooms) camera.zoomIn(kZooms[event.key] * 0.2 * Math.max(clearance(), kNearest));
     else if (event.key === "Enter") onEnter();
     else if (!onKey(event.key)) return;
     event.preventDefault();

@@ -24,7 +24,7 @@ export const formatVolume = (cubicMetres) =>
 export const formatHeight = (metres, digits = Math.abs(metres) < 10 ? 1 : 0) => `${formatNumber(Number(metres.toFixed(digits)))} m`;
 
 export function formatBytes(bytes) {
-  return bytes < 1e6 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+  return bytes < 999500 ? `${(bytes / 1e3).toFixed(0)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
 }
 
 export function formatFraction(fraction) {

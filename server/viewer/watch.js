@@ -8,9 +8,10 @@ export class Watch {
   #timer;
   #retryMs = kFirstRetryMs;
   #running = false;
+  #error;  // the class of the last one
 
-  // `list`: fetches the datasets, throws if that fails. `onLost(error)`: it failed for the first time. `onList(wasLost)`:
-  // it succeeded. `isHasty`: something is about to appear.
+  // `list`: fetches the datasets, throws if that fails. `onLost(error)`: it failed, for the first time or
+  // with another kind of error. `onList(wasLost)`: it succeeded. `isHasty`: something is about to appear.
   constructor({ list, onLost, onList }) {
     Object.assign(this, { list, onLost, onList, isLost: false, isHasty: false });
   }
@@ -32,8 +33,9 @@ export class Watch {
       this.#retryMs = kFirstRetryMs;
       await this.onList(wasLost);
     } catch (error) {
-      if (!this.isLost) this.onLost(error);
+      if (!this.isLost || error.constructor !== this.#error) this.onLost(error);
       this.isLost = true;
+      this.#error = error.constructor;
       this.#retryMs = Math.min(kLastRetryMs, 1.5 * this.#retryMs);
     } finally {
       this.#running = false;

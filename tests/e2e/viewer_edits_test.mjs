@@ -41,7 +41,8 @@ describe('shapes of edits', () => {
 
   it('contain places', () => {
     const places = placesInside(square.slice(1), 400);
-    assert.ok(places.length > 150 && places.length < 250, `half of the box: ${places.length}`);
+    const runway = placesInside([at(-84.3, 36.3), at(-84.28, 36.32), at(-84.2802, 36.3204), at(-84.3002, 36.3004)], 400);
+    for (const found of [places, runway]) assert.ok(found.length > 350 && found.length < 450, `${found.length}`);
     assert.ok(places.every(({ longitude, latitude }) => longitude - -84.3 > 36.31 - latitude - 1e-9));
   });
 

@@ -89,6 +89,23 @@ describe('features of the viewer', () => {
     assert.equal(await uniform(), 1);
   });
 
+  it('keep the camera above the ground', async () => {
+    const place = (camera) => page.evaluate((at) => {
+      const before = terrace.globe.camera;
+      terrace.globe.camera = at;
+      return before;
+    }, camera);
+    const first = await place([-84.25, 36.3, 8000, 0, -30]);
+    await settled();
+    await page.locator('#globe').focus();
+    for (let i = 0; i < 40; ++i) await page.keyboard.press('+');
+    await page.waitForFunction(() => !terrace.globe.loading && terrace.globe.clearance >= 0 && terrace.globe.clearance < 1000, undefined, kWait);
+    await place([-84.25, 36.3, 100, 0, -30]);  // the ground is at 614 m
+    await page.waitForFunction(() => !terrace.globe.loading && terrace.globe.clearance >= 0, undefined, kWait);
+    await place(first);
+    await settled();
+  });
+
   it('measure a profile along the ground', async () => {
     await page.locator('#tool-distance').click();
     await page.waitForFunction(() => terrace.state.measure?.mode === 'distance', undefined, kWait);

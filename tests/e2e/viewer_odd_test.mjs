@@ -144,7 +144,7 @@ describe('the viewer', () => {
       terrace.state.draft.corners = [];
       for (const [longitude, latitude] of [[-84.39, 36.17], [-84.09, 36.17], [-84.25, 36.44]]) terrace.state.draft.add({ longitude, latitude, height: 400 });
     });
-    await page.locator('#draft-text').getByText(/^405.* km².*Raises the ground/).waitFor();  // 90 of the finest tiles
+    await page.locator('#draft-text').getByText(/^403\.9 km².*Raises the ground/).waitFor();  // 90 of the finest tiles
     await page.evaluate(() => terrace.state.draft.end());
     assert.deepEqual(page.wrongs, []);
   });

@@ -338,7 +338,6 @@ describe('datasets that need a token', { skip: process.env.TERRACE_URL ? 'needs 
     await page.keyboard.press('Enter');
     await page.waitForFunction(() => document.getElementById('token-card').hidden, undefined, { timeout: kSettleMs });
     assert.equal(await page.evaluate(() => document.activeElement.id), 'dataset');
-    assert.deepEqual(page.wrongs, []);
     await page.close();
   });
 
