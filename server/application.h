@@ -45,7 +45,7 @@ struct ApplicationParts {
 
 class TerrainApplication final : public Application, public ProcessState {
  public:
-  // Without a catalog (null) requests wait for the first Replace, except those about the process.
+  // Without a catalog (null) requests wait for the first Replace, except those of rows with needs_no_catalog.
   TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config);
 
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address& peer) override;

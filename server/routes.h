@@ -37,7 +37,8 @@ class RouteTable {
   explicit RouteTable(std::span<const RouteRow> rows);
 
   // `target` in origin form ("/maui/0/0/0.terrain?error=5") or absolute form ("http://host/...").
-  // kInvalidArgument: neither form, malformed percent-encoding, or percent-encoding in the name of a parameter.
+  // kInvalidArgument: neither form, a '#', malformed percent-encoding in the path, or percent-encoding in the name of a
+  // parameter (except of rows with takes_any_query).
   // kNotFound: not a URL of the server. A tile number that is not a plain decimal number, or that is outside the tiling
   // scheme, names no tile.
   Result<Route> Match(std::string_view target) const;
@@ -59,7 +60,7 @@ class RouteTable {
 
 const RouteTable& Routes();
 
-// Every row, one URL for each tile format, for /openapi.json.
+// For /openapi.json: one URL for each row; rows of tiles have one for each format of their folder.
 std::vector<DocumentedUrl> DocumentedUrls();
 
 }  // namespace terrace::server

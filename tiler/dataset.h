@@ -28,10 +28,11 @@ struct WaterOptions {
 
 // The source and encoding of textures of GLB tiles.
 struct ImageryOptions {
-  std::shared_ptr<const dem::Imagery> image;                   // null: none
-  proto::TextureFormat texture = proto::TextureFormat::kJpeg;  // for requests that name none
-  int side = 512;                                              // pixels along a tile's edge, at most
-  int quality = 80;                                            // of JPEG and lossy WebP: 1 .. 100
+  std::shared_ptr<const dem::Imagery> image;  // null: none
+  // TileRequest::texture of clients that name none, and of bakes. TilePipeline uses the request's.
+  proto::TextureFormat texture = proto::TextureFormat::kJpeg;
+  int side = 512;    // pixels along a tile's edge, at most
+  int quality = 80;  // of JPEG and lossy WebP: 1 .. 100
   std::string attribution;
 };
 
@@ -48,7 +49,9 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
-  proto::GlbOptions glb;                             // compression: for GLB requests that name none
+  // Of GLB tiles. `compression`: TileRequest::compression of clients that name none, and of bakes; TilePipeline uses
+  // the request's. It sets the copyright, the texture and both errors itself.
+  proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none
   std::vector<WatchedFile> baked_files;              // a change of one of them means that there is another archive

@@ -29,7 +29,7 @@ struct Encoder {
   TileFormat format;
   bool needs_refinement;
   // Sets the bytes and times.encode. Meshes also set both errors and the counts, and add to times.refine. Height PNGs
-  // set max_error_m. Formats without a refinement set refinement_use to kNone, and times.read.
+  // set max_error_m. Formats without a refinement set times.read.
   Result<void> (*encode)(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop);
 };
 

@@ -86,7 +86,7 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
                                             EncodedTile& encoded, const std::stop_token& stop) const {
   const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.model->EditsHash(key)};
   const RefinedTilePtr known = refinements_->Find(cache_key);
-  if (known) encoded.refinement_use = RefinementUse::kContinued;
+  encoded.refinement_use = known ? RefinementUse::kContinued : RefinementUse::kMade;
   if (known && known->error_m <= error_m) {
     encoded.refinement_use = RefinementUse::kReplayed;
     return known;

@@ -44,15 +44,15 @@ class TilePipeline {
 
   // Makes one tile: reads, refines, quantizes, measures, encodes and compresses it. Quantized-mesh and GLB share the
   // refinement; the other formats read heights or images of their own. Without sources, takes it from the archive.
-  // kNotFound: no such dataset; a quantized-mesh or GLB tile outside availability; heights, a hillshade, slopes or
-  // contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset without sources, a
-  // tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a source was replaced,
-  // so the dataset has to be opened again. kInvalidArgument: a member of the request has a value that TileRequest does
-  // not permit. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // kNotFound: no such dataset; a key that no level has; a quantized-mesh or GLB tile outside availability; heights, a
+  // hillshade, slopes or contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset
+  // without sources, a tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a
+  // source was replaced, so the dataset has to be opened again. kInvalidArgument: a member of the request has a value
+  // that TileRequest does not permit. kInternal: an encoder failed. kCancelled: `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
-  // ElevationModel::ReadPoints, with its preconditions, as for all points below. kNotFound, here and in ReadNormals,
-  // PlanArea and BuildArea: there is no such dataset, or it has no sources.
+  // As ElevationModel::ReadPoints. Its preconditions hold for the points of all functions below. kNotFound, here and in
+  // ReadNormals, PlanArea and BuildArea: there is no such dataset, or it has no sources.
   virtual Result<PointHeights> ReadPoints(std::uint32_t dataset, std::span<const dem::GeoPosition> points,
                                           dem::HeightDatum datum, std::stop_token stop) const;
 
@@ -69,9 +69,9 @@ class TilePipeline {
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
-  // ElevationModel::LookAlong. kInvalidArgument: together the
-  // rays cross too many samples; or, over the sources' surface, an edit changes the ground below a ray or near it
-  // (ElevationModel::LookAlong). Other errors: those of ReadPoints and ReadDrawnPoints.
+  // ElevationModel::LookAlong. kInvalidArgument: together the rays cross too many samples; or, over the sources'
+  // surface, an edit changes the ground below a ray or near it (ElevationModel::LookAlong). Other errors: those of
+  // ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,

@@ -46,7 +46,7 @@ enum class HeightDatum : std::uint8_t {
 class AveragesBudget;
 class CacheFolder;
 
-// The storage of statistics and averages of rasters, so that no raster is read completely twice.
+// The storage of statistics and averages of rasters. With a folder, later calls of Open read no raster completely.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
   // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
@@ -77,8 +77,8 @@ struct DemOptions {
 // One raster of a dataset.
 struct DemFile {
   std::string path;
-  // Where several sources have a height, the lowest rank wins, then the finer source, in steps of a sixteenth of an
-  // octave, then the path that sorts first. The order of the files has no effect.
+  // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
+  // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
   int rank = 0;
   bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
@@ -148,12 +148,12 @@ struct RasterInfo {
   std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
   std::string wide_blocks;            // why preparing it decodes blocks many times, with the remedy; empty: it does not
   std::string transform;              // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  int min_kept_factor = 0;            // smallest factor of stored averages; 0: none
+  int min_kept_factor = 0;            // of stored averages: samples along the side of the finest; 0: none
   bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;
 };
 
-// A dataset, as `terrace info` prints it and `/datasets` returns it.
+// A dataset, as `terrace info` prints it; `/datasets` returns a part of it.
 struct DemInfo {
   std::vector<RasterInfo> sources;  // in order of precedence
   GeoBounds bounds;
@@ -209,7 +209,7 @@ struct MeshDemands {
   std::vector<float> weights;        // the error counts this many times; at least 1
   std::vector<float> caps;           // metres: the error is at most this; infinite: no limit. As many as `weights`
   std::vector<std::uint8_t> forced;  // 1: a vertex of every mesh
-  // 1: in an edit `hole` (EditOp::kHole; not a void). A triangle is left out if each node that it covers, corners
+  // 1: in an edit with the operation "hole" (not a void). A triangle is left out if each node that it covers, corners
   // included, is in such a hole or forced, and at least one is in the hole.
   std::vector<std::uint8_t> no_triangles;
 

@@ -64,9 +64,9 @@ class ElevationModel {
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid. An edit's heights are not converted if
-  // all sources within its reach have the datum in which it states them; the same holds for ReadKnownMercator and
-  // ReadPoints.
+  // floor is converted to the datum of the last source that refers to a geoid. If all sources
+  // within an edit's reach have the datum in which it states heights, these are returned unchanged. ReadKnownMercator
+  // and ReadPoints do the same if asked for that datum.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
@@ -75,9 +75,8 @@ class ElevationModel {
 
   // Heights at pixel centres of a Web Mercator grid, row by row from the north-western pixel. The rules of tiles apply:
   // samples are averaged to the grid's resolution, voids are filled as DemOptions says, and the floor is used
-  // elsewhere. A height depends on depth and pixel alone. `depth`: of
-  // geo::MercatorGrid, 256 << depth pixels around the Earth; 0 .. geo::kMaxLevel. info().max_mercator_depth is the
-  // first as fine as the finest source.
+  // elsewhere. A height depends on depth and pixel alone. The grid has 256 << depth pixels around the Earth; depth is
+  // 0 .. geo::kMaxLevel. info().max_mercator_depth is the first as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
@@ -114,8 +113,8 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for the edges that end at this tile's corners and are not its own. By corner (south-west, south-east,
-  // north-east, north-west); one element for each such edge, for its nodes without the two ends.
+  // The same for edges of neighbouring tiles that meet this tile only in a corner. By corner (south-west, south-east,
+  // north-east, north-west); one element for each edge, without its two end nodes.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

@@ -104,8 +104,9 @@ struct Edit {
   double low_m = 0, high_m = 0;  // of the target heights
   double steepest = 0;           // of the target heights, metres per metre
   bool is_convex = false;
-  // Edges by bands in y, so that a row scans few of them. Band b begins at y = bands_from + b / bands_per_m. The edges
-  // within reach of it are band_edges[i] for band_begins[b] <= i < band_begins[b + 1], in the order of rings and edges.
+  // Edges of the outline by bands in y, so that a row scans few of them; without those that two rings share. Band b
+  // begins at y = bands_from + b / bands_per_m. The edges within reach of it are band_edges[i] for band_begins[b] <= i
+  // < band_begins[b + 1], in the order of rings and edges.
   struct EdgeNumber {
     std::uint32_t ring, edge;
     friend auto operator<=>(const EdgeNumber&, const EdgeNumber&) = default;

@@ -1,11 +1,13 @@
 #include "engine/edits/edit_shape.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <numeric>
 #include <span>
 #include <utility>
+#include <vector>
 
 #include "engine/geo/ellipsoid.h"
 
@@ -285,8 +287,33 @@ void AddUndulations(Edit& edit) {
   edit.steepest += std::hypot(east, north);
 }
 
+// The edges that two rings share, ascending, as where a polygon is divided at 180 degrees. The polygons lie on both
+// sides of them, or on none, so they are no part of the outline.
+std::vector<Edit::EdgeNumber> SharedEdges(const Edit& edit) {
+  std::vector<Edit::EdgeNumber> shared;
+  if (!edit.is_area || edit.rings.size() < 2) return shared;
+  std::vector<std::pair<std::array<double, 4>, Edit::EdgeNumber>> edges;
+  for (std::uint32_t r = 0; r < edit.rings.size(); ++r) {
+    const auto& ring = edit.rings[r];
+    for (std::uint32_t e = 0; e < ring.size(); ++e) {
+      std::array<double, 2> a{ring[e].x, ring[e].y};
+      std::array<double, 2> b{ring[(e + 1) % ring.size()].x, ring[(e + 1) % ring.size()].y};
+      if (b < a) std::swap(a, b);
+      edges.push_back({{a[0], a[1], b[0], b[1]}, {r, e}});
+    }
+  }
+  std::ranges::sort(edges);
+  for (std::size_t i = 1; i < edges.size(); ++i) {
+    if (edges[i].first != edges[i - 1].first) continue;
+    shared.insert(shared.end(), {edges[i - 1].second, edges[i].second});
+    ++i;
+  }
+  std::ranges::sort(shared);
+  return shared;
+}
+
 // As many bands as leave each edge in four on average: tall edges and wide blends are in many.
-void DivideIntoBands(Edit& edit, double south, double north) {
+void DivideIntoBands(Edit& edit, const std::vector<Edit::EdgeNumber>& shared, double south, double north) {
   const double reach = edit.reach_m();
   std::size_t edges = 0;
   for (std::size_t r = 0; r < edit.rings.size(); ++r) edges += EdgesOf(edit, r);
@@ -296,6 +323,7 @@ void DivideIntoBands(Edit& edit, double south, double north) {
     for (std::uint32_t r = 0; r < edit.rings.size(); ++r) {
       const auto& ring = edit.rings[r];
       for (std::uint32_t e = 0; e < EdgesOf(edit, r); ++e) {
+        if (std::ranges::binary_search(shared, Edit::EdgeNumber{r, e})) continue;
         const auto [low, high] = std::minmax(ring[e].y, ring[(e + 1) % ring.size()].y);
         visit(Edit::EdgeNumber{r, e}, BandOf(edit, low - reach, bands), BandOf(edit, high + reach, bands));
       }
@@ -320,8 +348,9 @@ void DivideIntoBands(Edit& edit, double south, double north) {
   });
 }
 
-void HashContent(Edit& edit) {
+void HashContent(Edit& edit, bool has_shared_edges) {
   ContentHasher hasher;
+  if (has_shared_edges) hasher.Add(std::uint8_t{1});  // of the rule about them
   hasher.Add(static_cast<std::uint8_t>(edit.op));
   if (edit.op == EditOp::kPrecision)
     hasher.Add(std::uint8_t{4});  // of the rules of borders and corners (tin::BorderOptions, proto::EdgeErrors)
@@ -366,11 +395,12 @@ void Complete(Edit& edit) {
                 plane.longitude + (east + reach) / plane.east_m, plane.latitude + (north + reach) / plane.north_m};
   constexpr double kSlack = 1e-9;
   edit.reach.Grow(kSlack, kSlack);
-  DivideIntoBands(edit, south, north);
+  const std::vector<Edit::EdgeNumber> shared = SharedEdges(edit);
+  DivideIntoBands(edit, shared, south, north);
   edit.is_convex = edit.is_area && edit.rings.size() == 1 && IsConvex(edit.rings.front());
   MeasureTarget(edit);
   AddUndulations(edit);
-  HashContent(edit);
+  HashContent(edit, !shared.empty());
 }
 
 }  // namespace terrace::dem

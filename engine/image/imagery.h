@@ -33,7 +33,7 @@ struct MapPicture {
 // Where an image lies, and the first levels of its map tiles whose pixels are as fine as its own.
 struct ImageExtent {
   GeoBounds bounds;
-  int max_mercator_depth = 1;  // of a geo::MercatorGrid
+  int max_mercator_depth = 1;  // depth d: a grid of 256 << d pixels around the Earth
   int max_geodetic_level = 0;  // of tiles of kMapSide pixels in the scheme of terrain tiles
 };
 

@@ -1,8 +1,9 @@
 // A folder of files with statistics and averages of rasters, with a limited total size.
-// Several processes may share it. Before a file grows, the least recently used files are removed until it fits. Loading
-// a file counts as use, and so do reads of averages, at most once an hour; the time of the last use is the file's
-// modification time. Files in use by this process are not removed. Other files are neither counted nor removed,
-// also not the hashes of files (file_content.h): a file is recognized by its name and its first bytes.
+// Several processes may share it. Before a file grows, the least recently used files are removed as far as needed to
+// keep an eighth of the limit free; only files in use may fill it. Loading a file counts as use, and so do reads of
+// averages, at most once an hour; the time of the last use is the file's modification time. Files in use by this
+// process are not removed. Other files are neither counted nor removed, also not the hashes of files (file_content.h):
+// a file is recognized by its name and its first bytes.
 #pragma once
 
 #include <chrono>
@@ -45,6 +46,7 @@ class CacheFolder {
 
     // Reports that the file can be neither stored nor read. `reason`: "cannot be written: No space left on device".
     void Fail(const std::string& reason) const;
+    // Withdraws the report of Fail.
     void Succeed() const;
 
    private:

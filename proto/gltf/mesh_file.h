@@ -38,12 +38,13 @@ struct MeshVertex {
 // y = t[3] + column t[4] + row t[5].
 using GridPlacement = std::array<double, 6>;
 
-// Appends the whole file to `out`, which must be in binary mode. With `placement`, x and y of the vertices are columns
-// and rows, and x, y and z are representable as 32-bit floats: a GLB stores them exactly, unless the raster is sheared,
-// which glTF nodes cannot express. kInvalidArgument: the mesh has no triangles, a coordinate is not finite, or the mesh
-// exceeds the format's limits; nothing is written. kUnavailable: writing failed, for example because the disk is full.
-// kCancelled: a stop was requested; part of the file may be written. Preconditions: every index is below
-// vertices.size(); `colors` is empty or has one entry per vertex.
+// Appends the whole file to `out`, which must be in binary mode. Precondition with `placement`: x and y of the
+// vertices are columns and rows, and all coordinates are representable as 32-bit floats. Then a GLB stores them
+// exactly, except for a sheared raster: a glTF node cannot express shear, so coordinates are rounded as without
+// `placement`. kInvalidArgument: the mesh has no triangles, a coordinate is not finite, or the mesh exceeds the
+// format's limits; nothing is written. kUnavailable: writing failed, for example because the disk is full. kCancelled:
+// a stop was requested; part of the file may be written. Preconditions: every index is below vertices.size(); `colors`
+// is empty or has one entry per vertex.
 Result<void> WriteMesh(std::ostream& out, MeshFileFormat format, std::vector<MeshVertex> vertices,
                        const std::vector<std::array<std::uint32_t, 3>>& triangles, const std::vector<Rgb>& colors = {},
                        const std::optional<GridPlacement>& placement = std::nullopt, const std::stop_token& stop = {});

@@ -64,7 +64,7 @@ Result<void> CheckHasKind(const DatasetView& dataset, tiler::TileFormat format, 
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);
 
 // The coding in `offered` with the highest quality, if that is at least the quality of identity; among equals the
-// first. Without Accept-Encoding: identity.
+// first. Identity that is not named has quality 0. Without Accept-Encoding: identity.
 tiler::Coding NegotiateCoding(std::string_view accept_encoding,
                               std::span<const tiler::Coding> offered = tiler::kCodings);
 

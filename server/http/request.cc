@@ -71,7 +71,7 @@ std::optional<std::int64_t> PlainLength(const Fields& fields) {
   return PlainDecimal(fields[http::field::content_length], /*max_digits=*/15);
 }
 
-// Returns null if the message ends with its head, or for a POST with Content-Length bytes after it. Beast treats a GET
+// Returns null if the message ends with its head or, for a POST, Content-Length bytes after it. Beast treats a GET
 // with `Transfer-Encoding: gzip` as having no body and parses the following bytes as another request; this check
 // prevents that.
 const char* FramingProblem(const Fields& fields) {

@@ -123,8 +123,8 @@ tl::expected<std::size_t, BadRequest> FindHeadEnd(std::string_view bytes, std::s
 // read; kOther and no target if they cannot. For the log and for the form of the reply. The request is not served.
 Request FirstLineOf(std::string_view bytes);
 
-// The header of a connection's last request without a body, as bytes. For a next request with the same header only the
-// first line is parsed.
+// The header of a connection's previous request, as bytes; none if that had a body or an unusual first line. For a next
+// request with the same header only the first line is parsed.
 struct HeadMemo {
   std::string bytes;  // all after the first line; empty: none
   bool keep_alive = true;
@@ -139,7 +139,8 @@ tl::expected<Request, BadRequest> ParseHead(std::string_view head, HeadMemo* mem
 // of ParseHead. Otherwise returns 0; call FindHeadEnd and ParseHead then.
 std::size_t TakeRepeated(std::string_view bytes, const HeadMemo& memo, Request& request);
 
-// Whether it is a host and port by RFC 3986, or empty. Clients whose URI has no authority send an empty value.
+// Whether it has only characters that a host and port may have (RFC 3986), or is empty. Clients whose URI has no
+// authority send an empty value.
 bool IsHostValue(std::string_view value);
 
 }  // namespace terrace::server

@@ -246,7 +246,7 @@ asio::awaitable<bool> Session::GiveUp() {
 }
 
 // Returns false if the body did not arrive; the client has been told, and the connection must be closed. Memory for the
-// whole body is taken once more than kFreeBytes of it have arrived: announcing a body takes no memory.
+// whole of a longer body is taken once kFreeBytes have arrived: announcing a body takes no memory.
 asio::awaitable<bool> Session::ReceiveBody() {
   Request& request = exchange_.request;
   auto body = std::make_shared<HeldBody>();

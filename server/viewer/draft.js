@@ -4,7 +4,7 @@ import {
   Cartesian3, Color, ColorGeometryInstanceAttribute, GeometryInstance, PerInstanceColorAppearance, PolygonGeometry,
   PolygonHierarchy, Primitive,
 } from "/viewer/cesium/index.js";
-import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from "/viewer/edit_shapes.js";
+import { crossesItself, earthwork, flattenGeoJson, isBeside, placesInside, signedArea } from "/viewer/edit_shapes.js";
 import { formatArea, formatHeight, formatVolume } from "/viewer/numbers.js";
 
 const kSamples = 400;
@@ -162,8 +162,8 @@ export class Draft {
 
   #describe() {
     byId("draft-undo").hidden = this.corners.length === 0;
-    const isOutside = this.ground?.every((height) => height === undefined);  // the server would refuse the file
-    byId("draft-save").disabled = !this.#isPolygon || isOutside;
+    // The server refuses a file with features outside the data.
+    byId("draft-save").disabled = !this.#isPolygon || isBeside(this.corners, this.dataset().bounds);
     byId("draft-text").textContent = this.#text();
   }
 
@@ -175,7 +175,7 @@ export class Draft {
     if (!ground) return `${size}.`;
     const { known, raised, lowered, fill, cut } = earthwork(ground, this.height, area);
     if (known === 0) return `${size}; no heights there.`;
-    const remark = known < 1 ? ` ${Math.ceil(100 * (1 - known))} % of the area has no heights and does not count.` : "";
+    const remark = known < 1 ? ` ${Math.max(1, Math.min(99, Math.round(100 * (1 - known))))} % of the area has no heights and does not count.` : "";
     return `${size}. Raises the ground by up to ${formatHeight(raised)}, ${formatVolume(fill)}; lowers it by up to ${formatHeight(lowered)}, ${formatVolume(cut)}.${remark}`;
   }
 

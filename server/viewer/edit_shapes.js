@@ -53,6 +53,17 @@ export function crossesItself(corners) {
   return false;
 }
 
+// Whether the box around a ring lies beside a box [west, south, east, north] in degrees; west may be above east.
+export function isBeside(corners, [west, south, east, north]) {
+  const ring = unwrapped(corners);
+  const [longitudes, latitudes] = ["longitude", "latitude"].map((name) => ring.map((corner) => corner[name]));
+  const first = Math.min(...longitudes);
+  const turn = (degrees) => degrees - 360 * Math.floor(degrees / 360);
+  const start = turn(first - west);  // degrees east of the box's western side
+  const isBesideInLongitude = start > (turn(east - west) || 360) && start + Math.max(...longitudes) - first < 360;
+  return isBesideInLongitude || Math.max(...latitudes) < south || Math.min(...latitudes) > north;
+}
+
 // About `count` places inside the ring, on a grid over its box, as {longitude, latitude}.
 export function placesInside(outline, count) {
   const corners = unwrapped(outline);

@@ -34,6 +34,10 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
     height[i] = -10000 + (data[4 * i] * 65536 + data[4 * i + 1] * 256 + data[4 * i + 2]) * kStep;
   }
   const water = waterline(heights);
+  // The sea is level, or follows the geoid in steps with level ground on both sides.
+  const isLevel = (i) => [i - 1, i + 1, i - width, i + width].every((k) => (height[k] ?? height[i]) === height[i]);
+  const isSea = (i) => height[i] < water && (isLevel(i) || [i - 1, i + 1, i - width, i + width].some((k) =>
+    Math.abs(height[k] - height[i]) < 1.5 * kStep && isLevel(k)));
   const relief = Math.max(1.2, Math.min(12, metres / 40));
   for (let y = 0; y < width; ++y) {
     for (let x = 0; x < width; ++x) {
@@ -44,9 +48,7 @@ function paint(pixels, width, { heights, metres, isInside, photo, interval }) {
       const light = (0.643 + 0.766 * (-0.707 * east + 0.707 * north)) / (0.643 * Math.hypot(east, north, 1));
       const shade = 0.45 + 0.55 * Math.max(0, Math.min(1.6, light));
       const isPhoto = photo?.data[4 * i + 3] > 0;
-      // The sea is level, or follows the geoid.
-      const isWater = height[i] < water && [w, e, n, s].every((beside) => Math.abs(beside - height[i]) < 1.5 * kStep);
-      const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : isWater ? kWater : heightColour(height[i], heights);
+      const colour = isPhoto ? photo.data.subarray(4 * i, 4 * i + 3) : isSea(i) ? kWater : heightColour(height[i], heights);
       // A line lies between two pixels on both sides of its height.
       const crossed = interval > 0 ? lineBetween(height[i], [e, s], interval) : undefined;
       const ink = crossed === undefined ? 1 : crossed % 5 === 0 ? 0.4 : 0.7;
@@ -76,15 +78,17 @@ class FlatMap {
   }
 
   async show(dataset) {
+    if (this.dataset?.name !== dataset.name) {  // nothing is drawn until this dataset's tiles are known
+      this.template = undefined;
+      this.canvas.width = 0;
+    }
     this.dataset = dataset;
-    this.template = undefined;
-    this.canvas.width = 0;  // nothing is drawn until this dataset's tiles are known
-    this.#tiles.clear();
     if (!dataset.urls.tiles_json) throw new Error(`${dataset.name} has no height images, of which the flat map is made.`);
     const reply = await fetch(dataset.urls.tiles_json, { headers: this.access.headers });
     if (!reply.ok) throw new Error(`the server answered ${reply.status} to tiles.json`);
     const description = await reply.json();
     if (this.dataset !== dataset) return;
+    this.#tiles.clear();
     this.template = description.tiles[0];
     this.maxLevel = description.maxzoom ?? 14;
     const [west, south, east, north] = dataset.bounds;
@@ -285,14 +289,17 @@ export async function startFlatMap() {
       byId("readout").hidden = false;
       byId("readout").textContent = height === undefined ? "No height there" : formatPosition({ longitude, latitude, height });
     };
-    addEventListener("hashchange", () => show(named()));
-    const wanted = named();
-    await show(wanted);
-    if (!wanted || wanted === map.dataset.name || !byId("message").hidden) return;
-    const pending = preparing.find(({ name }) => name === wanted);
-    if (pending) fail(pendingText(pending));
-    else if (moreWithToken) fail(`${wanted} needs a token, or is not on this server; this is ${map.dataset.name}.`);
-    else fail(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`);
+    const open = async () => {
+      const wanted = named();
+      await show(wanted);
+      if (!wanted || wanted === map.dataset.name || !byId("message").hidden) return;
+      const pending = preparing.find(({ name }) => name === wanted);
+      if (pending) fail(pendingText(pending));
+      else if (moreWithToken) fail(`${wanted} needs a token, or is not on this server; this is ${map.dataset.name}.`);
+      else fail(`There is no dataset ${wanted} on this server; this is ${map.dataset.name}.`);
+    };
+    addEventListener("hashchange", open);
+    await open();
   } catch (error) {
     fail(error);
   }

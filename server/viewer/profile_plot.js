@@ -4,7 +4,7 @@ import { drop } from "/viewer/ground_path.js";
 import { formatHeight, formatMetres } from "/viewer/numbers.js";
 import { svg } from "/viewer/overlay.js";
 
-const kMargin = { left: 62, right: 14, top: 10, bottom: 22 };
+const kMargin = { left: 76, right: 14, top: 10, bottom: 22 };
 const kKeys = { ArrowLeft: -1, ArrowRight: 1, PageDown: -10, PageUp: 10, Home: -Infinity, End: Infinity };
 
 // Round values between two ends, and the digits behind the point that tell them apart.

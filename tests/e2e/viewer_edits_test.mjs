@@ -7,7 +7,7 @@ import { after, before, describe, it } from 'node:test';
 import { assertAccessible } from './axe.mjs';
 import { end, openBrowser } from './browser.mjs';
 import { json, request, run, samples, serve } from './harness.mjs';
-import { crossesItself, earthwork, flattenGeoJson, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
+import { crossesItself, earthwork, flattenGeoJson, isBeside, placesInside, signedArea } from '../../server/viewer/edit_shapes.js';
 import { formatVolume } from '../../server/viewer/numbers.js';
 
 const kWait = { timeout: 120000, polling: 200 };
@@ -37,6 +37,12 @@ describe('shapes of edits', () => {
     const bracket = [at(0, 0), at(3, 0), at(3, 1), at(1, 1), at(1, 2), at(3, 2), at(3, 3), at(0, 3)];
     assert.ok(!crossesItself(bracket), 'two edges on one line');
     assert.ok(crossesItself([...bracket.slice(0, 6), at(3, 0.5), at(0, 3)]), 'two that overlap on one line');
+  });
+
+  it('lie in or beside the data', () => {
+    for (const data of [[-85, 36, -84, 37], [-180, -90, 180, 90], [170, 30, -84.295, 40], [-84.295, 30, -170, 40]]) assert.ok(!isBeside(square, data), `${data}`);
+    for (const data of [[-84, 36, -83, 37], [-85, 30, -84, 36], [170, 30, -170, 40], [-84.2, 30, -84.4, 40]]) assert.ok(isBeside(square, data), `${data}`);
+    assert.ok(!isBeside([at(179.9, 0), at(-179.9, 0), at(-179.9, 1)], [-179.95, 0, -170, 10]));
   });
 
   it('contain places', () => {

@@ -304,7 +304,7 @@ describe('features of the viewer', () => {
       await route.fulfill({ json: { ...list, datasets: [...list.datasets, { ...others, name: 'bare', urls }] } });
     });
     await flat.reload();
-    const isDrawn = (wanted) => flat.waitForFunction((is) => (document.querySelector('#globe canvas').width > 0) === is, wanted, kWait);
+    const isDrawn = (wanted) => flat.waitForFunction((is) => (document.querySelector('#globe canvas')?.width > 0) === is, wanted, kWait);
     await isDrawn(true);
     await flat.locator('#dataset').selectOption('bare');
     await flat.getByText('bare has no height images').waitFor({ timeout: 30000 });

@@ -267,7 +267,6 @@ Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPl
                                   std::stop_token stop) {
   const auto cancelled = [] { return MakeError(ErrorCode::kCancelled, "nobody waits for this mesh any more"); };
   EncodedTile encoded;
-  encoded.refinement_use = RefinementUse::kNone;
   Clock::time_point start = Clock::now();
   Result<std::vector<float>> heights = model.ReadNodes(plan.level, plan.window, stop);
   if (!heights) return tl::unexpected(std::move(heights).error());

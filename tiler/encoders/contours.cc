@@ -9,7 +9,6 @@ namespace terrace::tiler {
 
 // Heights are in the sources' datum, because a map's lines tell heights above the sea.
 Result<void> MakeContoursTile(const EncoderInput& input, EncodedTile& encoded, const std::stop_token& stop) {
-  encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, kSidesPx[0], kContourMargin);
   const auto heights = ReadMapHeights(*input.dataset.model, window, dem::HeightDatum::kSource, stop);

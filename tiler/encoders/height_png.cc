@@ -33,7 +33,6 @@ Result<void> MakeHeightPngTile(const EncoderInput& input, EncodedTile& encoded, 
   if (window.depth > dataset.model->info().max_mercator_depth) {
     return MakeError(ErrorCode::kNotFound, "{}: no such tile", geo::ToString(request.key));
   }
-  encoded.refinement_use = RefinementUse::kNone;
   auto start = std::chrono::steady_clock::now();
   const Result<std::vector<float>> heights = dataset.model->ReadMercator(window.depth, window.nodes, stop);
   if (!heights) return tl::unexpected(heights.error());

@@ -11,7 +11,6 @@ namespace {
 Result<void> EncodeMapPicture(Result<dem::MapPicture> read, std::chrono::steady_clock::time_point start,
                               const EncoderInput& input, EncodedTile& encoded) {
   if (!read) return tl::unexpected(std::move(read.error()));
-  encoded.refinement_use = RefinementUse::kNone;
   encoded.times.read = MicrosecondsSince(start);
   start = std::chrono::steady_clock::now();
   auto bytes = proto::EncodePhoto({read->side, read->side, proto::PixelKind::kRgba, read->rgba},

@@ -16,7 +16,6 @@ namespace {
 
 Result<std::vector<Gradient>> ReadGradients(const EncoderInput& input, EncodedTile& encoded,
                                             const std::stop_token& stop) {
-  encoded.refinement_use = RefinementUse::kNone;
   const auto start = std::chrono::steady_clock::now();
   const MapWindow window(input.request.key, input.request.side_px, kReliefMargin);
   const auto heights = ReadMapHeights(*input.dataset.model, window, dem::HeightDatum::kEllipsoid, stop);

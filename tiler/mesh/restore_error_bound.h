@@ -19,7 +19,7 @@ using MeasureMesh = std::function<proto::TileError(const tin::TinMesh&)>;
 // - at vertices whose rounded positions are not those of their samples, if all neighbouring samples are vertices: by
 //   the change of the ground over that offset;
 // - by the format's rounding of heights;
-// - on the edges of tiles, where `measure` names no samples because neighbours share them;
+// - on the edges of tiles and beside them, because `measure` names no samples on edges, which neighbours share;
 // - if the mesh would need more than `max_vertices`.
 // kCancelled: stopped.
 Result<proto::TileError> RestoreErrorBound(tin::TinMesh& mesh, const MeasureMesh& measure, std::size_t max_vertices,

@@ -21,6 +21,9 @@ Result<void> CheckMap(const TileRequest& request) {
   const MapParameters& map = request.map;
   const bool is_relief = request.format == TileFormat::kHillshade || request.format == TileFormat::kSlope;
   if (request.format == TileFormat::kContours && map.interval_cm == 0) return invalid("interval_cm: contours need one");
+  if (request.format == TileFormat::kHillshade && (map.azimuth_deg > 359 || map.altitude_deg > 90 ||
+                                                   map.z_factor_hundredths < 1 || map.z_factor_hundredths > 10000))
+    return invalid("azimuth_deg, altitude_deg or z_factor_hundredths: out of its range");
   if (is_relief && map.picture == proto::PictureFormat::kJpeg)
     return invalid("picture: hillshades and slopes are PNG or WebP");
   return {};

@@ -21,15 +21,15 @@ enum class RefinementUse : std::uint8_t {
   kMade,       // there was none: samples were inserted from the beginning
   kContinued,  // there was one for a larger error: its run was continued
   kReplayed,   // there was one for this error or a smaller one: no insertion
-  kNone,       // not used: formats without a mesh, meshes of areas
+  kNone,       // not used: formats without a mesh, meshes of areas, tiles that were not built
 };
 
 // Header lines of a response that depend on the tile and its TileRequest alone, not on the rest of the HTTP request or
 // on the configuration. Each ends with CR LF.
 struct HeaderLines {
   std::string text;
-  std::size_t body_line_bytes =
-      0;  // leading bytes of `text` that describe the body; responses without a body omit them
+  // The first bytes of `text`, which describe the body; responses without a body omit them.
+  std::size_t body_line_bytes = 0;
 };
 
 struct EncodedTile {
@@ -44,7 +44,7 @@ struct EncodedTile {
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
-  RefinementUse refinement_use = RefinementUse::kMade;
+  RefinementUse refinement_use = RefinementUse::kNone;
   const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
   HeaderLines header_lines;        // written by the HeaderWriter of TileTiers; empty without one
 };

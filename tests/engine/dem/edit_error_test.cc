@@ -99,6 +99,25 @@ TEST_F(EditErrors, AreNoLargerWhereAnEditIsConstant) {
   }
 }
 
+// Also where two parts meet, as those of a polygon that is divided at 180 degrees.
+TEST_F(EditErrors, AreNoLargerWherePartsMeet) {
+  const std::string parts =
+      R"({"type":"MultiPolygon","coordinates":[[[[10.05,50.05],[10.2,50.05],[10.2,50.35],[10.05,50.35],[10.05,50.05]]],)"
+      R"([[[10.2,50.05],[10.35,50.05],[10.35,50.35],[10.2,50.35],[10.2,50.05]]]]})";
+  const auto source =
+      Open(R"({"type":"Feature","properties":{"terrain":{"op":"flatten","height":777}},"geometry":)" + parts + "}");
+  ASSERT_NE(source, nullptr);
+  for (const double longitude : {10.19999, 10.2, 10.20001}) EXPECT_EQ(At(*source, longitude, 50.2), 777) << longitude;
+  EXPECT_NE(At(*source, 10.2, 50.36), 777);
+  for (int level = source->max_level() - 2; level <= source->max_level(); ++level) {
+    const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+    const auto tile =
+        source->Read({level, static_cast<std::int64_t>(190.2 / side), static_cast<std::int64_t>(140.2 / side)});
+    ASSERT_TRUE(tile.has_value());
+    EXPECT_LT(tile->source_error_m, 0.01) << level;
+  }
+}
+
 // A strip between two rows of nodes, with one row of samples. It has no blend, so that no node is within its reach.
 TEST_F(EditErrors, CoverEditsBetweenNodes) {
   constexpr double kPixel = 0.25 / 111'320;
