@@ -250,6 +250,10 @@ TEST(TilePipeline, RefusesValuesThatRequestsMayNotHave) {
            "invalid_argument side_px");
   }
   begins(refusal(TileFormat::kContours, [](TileRequest&) {}), "invalid_argument interval_cm");
+  begins(refusal(TileFormat::kHillshade, [](TileRequest& request) { request.map.azimuth_deg = 360; }),
+         "invalid_argument azimuth_deg");
+  begins(refusal(TileFormat::kHillshade, [](TileRequest& request) { request.map.z_factor_hundredths = 0; }),
+         "invalid_argument azimuth_deg");
   begins(
       refusal(TileFormat::kHillshade, [](TileRequest& request) { request.map.picture = proto::PictureFormat::kJpeg; }),
       "invalid_argument picture");
