@@ -22,10 +22,10 @@ const kCoarser = 8;  // between the errors on the left and on the right, at firs
 // `wanted`: a view of a dataset that the server prepares, or that may be there with a token; the address keeps it.
 // `right`: the fraction on the right of the line. `preparing`: datasets that the server has not opened yet. `sun`:
 // "2026-06-21T18:30" in the dataset's local mean time. `hasFailed`: tiles of the shown terrain are missing. `isGone`: the
-// server does not have this dataset any more. `shown`: the name of the dataset that was shown last.
+// server does not have this dataset any more. `isRefused`: it does not know the token. `shown`: the name of the dataset that was shown last.
 const state = { datasets: [], preparing: [], moreWithToken: false, dataset: undefined, fraction: 0.5, contours: false,
                 wireframe: false, tiles3d: false, edits: false, imagery: false, right: undefined, colouring: "height", sun: undefined,
-                hasFailed: false, isGone: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
+                hasFailed: false, isGone: false, isRefused: false, failures: 0, failedAt: 0, picked: undefined, drawn: undefined, ready: false, wanted: undefined,
                 refreshing: undefined, problems: [], shown: undefined };
 
 const panel = new Panel({
@@ -140,6 +140,7 @@ function refetch(fraction) {
 function lose(error) {
   if (error instanceof UnknownToken) {
     panel.setMessage(undefined);
+    state.isRefused = true;
     return ask("The server does not know the token of this page any more.");
   }
   panel.setMessage("The server does not answer. The page goes on as soon as it does.");
@@ -156,6 +157,8 @@ function tellPending() {
 // The server has answered with its list. Shows a dataset that was waited for. Shows the dataset anew if it has another version, or if tiles could not be read.
 function follow(wasLost) {
   const { dataset } = state;
+  if (state.isRefused) card.close();
+  state.isRefused = false;
   const isThere = state.datasets.some(({ name }) => name === state.wanted?.dataset);
   if (isThere || (!dataset && state.datasets.length > 0)) {
     panel.setMessage(undefined);

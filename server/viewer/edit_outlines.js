@@ -20,10 +20,11 @@ function subdivided(line, pieces) {
   });
 }
 
-// The box of a line: [west, south, east, north].
+// The box of a line: [west, south, east, north]. A line may have more places than a call may have arguments.
 function boxOf(line) {
-  const [longitudes, latitudes] = [0, 1].map((axis) => line.map((at) => at[axis]));
-  return [Math.min(...longitudes), Math.min(...latitudes), Math.max(...longitudes), Math.max(...latitudes)];
+  return line.reduce(([west, south, east, north], [longitude, latitude]) =>
+    [Math.min(west, longitude), Math.min(south, latitude), Math.max(east, longitude), Math.max(north, latitude)],
+  [Infinity, Infinity, -Infinity, -Infinity]);
 }
 
 // Places that are drawn at no height, as in a hole, take the height of the place before them.

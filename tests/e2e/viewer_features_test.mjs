@@ -242,9 +242,14 @@ describe('features of the viewer', () => {
     await page.getByText('The server does not answer').waitFor({ timeout: 30000 });
     await assertAccessible(page, 'a message');
     await page.locator('#tool-draft').click();
-    await page.getByText('The tool could not be loaded').waitFor({ timeout: 30000 });
-    const boxes = await page.evaluate(() => ['message', 'note'].map((id) => document.getElementById(id).getBoundingClientRect().toJSON()));
-    assert.ok(boxes[0].bottom <= boxes[1].top, `one below the other: ${JSON.stringify(boxes)}`);
+    // The note is there for four seconds.
+    const boxes = await page.waitForFunction(() => {
+      const [message, note] = ['message', 'note'].map((id) => document.getElementById(id));
+      return note.textContent.startsWith('The tool could not be loaded') && !note.hidden &&
+        [message.getBoundingClientRect().bottom, note.getBoundingClientRect().top];
+    }, undefined, kWait);
+    const [bottom, top] = await boxes.jsonValue();
+    assert.ok(bottom <= top, `one below the other: ${bottom}, ${top}`);
     server = await serve('--config', config, '--listen', `127.0.0.1:${port}`);
     await page.waitForFunction(() => document.getElementById('message').hidden, undefined, kWait);
     await page.locator('#fraction').focus();

@@ -343,7 +343,8 @@ std::string WrongPlace(const std::string& out) {
   return "--out: a bake is written into a folder, or into a bucket such as /vsis3/BUCKET/FOLDER";
 }
 
-// --error is a lower limit above the deepest level of the sources, and changes nothing if all levels exceed it.
+// Above the deepest level of the sources --error is a lower limit, and has no effect if the errors of all levels exceed
+// it.
 void WarnAboutUnusedError(const BakeArguments& arguments, const tiler::Dataset& dataset,
                           const std::vector<archive::Manifest>& manifests) {
   const auto mesh = std::ranges::find_if(manifests, [](const archive::Manifest& manifest) {
@@ -356,9 +357,9 @@ void WarnAboutUnusedError(const BakeArguments& arguments, const tiler::Dataset& 
   if (last >= deepest || arguments.error >= default_error) return;
   std::fprintf(
       stderr,
-      "terrace: --error %s has no effect: level %d has %.3g m and the levels above it more, and only level %d, "
-      "the deepest, would have it; --fraction makes all levels finer\n",
-      PlainNumber(arguments.error).c_str(), last, default_error, deepest);
+      "terrace: --error %s has no effect: it is below the default error of all levels, %.3g m at level %d and more "
+      "above it, and only level %d, the deepest of the sources, may be finer; --fraction changes all levels\n",
+      PlainNumber(arguments.error).c_str(), default_error, last, deepest);
 }
 
 // Combinations that make no sense; empty: none.
