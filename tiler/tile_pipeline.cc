@@ -52,7 +52,7 @@ Result<void> CheckHasSurface(const Dataset& dataset, const DrawnSurface& surface
                    has ? "leave out the parameter format" : "it has none");
 }
 
-// Dataset::generation of those that have none.
+// Gives datasets without a generation their number.
 std::vector<Dataset> Numbered(std::vector<Dataset> datasets) {
   for (std::size_t i = 0; i < datasets.size(); ++i) {
     if (datasets[i].generation == 0) datasets[i].generation = i + 1;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs clang-tidy over the product, on the unity sources of the sanitizer build: each header is parsed once for eight
-# sources, which takes a fifth of the time.
+# Runs clang-tidy over the product, on the unity sources of the sanitizer build: each header is parsed once for
+# all sources of a folder.
 #
 #   tools/tidy.sh [JOBS]
 set -euo pipefail

@@ -46,7 +46,8 @@ enum class HeightDatum : std::uint8_t {
 class AveragesBudget;
 class CacheFolder;
 
-// The storage of statistics and averages of rasters. With a folder, later calls of Open read no raster completely.
+// The storage of statistics of rasters, and of averages of blocks of samples, from which shallow tiles are read. With a
+// folder, later calls of Open read no raster completely.
 struct RasterCache {
   std::shared_ptr<CacheFolder> folder = {};  // the statistics cache (statistics/cache_folder.h); null: none
   // For averages that the folder does not keep (statistics/averages_budget.h); null: none.
@@ -67,7 +68,8 @@ struct DemOptions {
   // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
   // edges.
   double feather = 0;
-  // Called while Open reads the sources, with the share done, 0 .. 1; files have equal shares. May be empty.
+  // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
+  // equal shares. The share falls if a raster has to be read again. May be empty.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // makes Open return kCancelled
   // Called for every file that cannot be opened; Open checks all files before it fails. Empty: Open fails at the first.
@@ -148,7 +150,8 @@ struct RasterInfo {
   std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
   std::string wide_blocks;            // why preparing it decodes blocks many times, with the remedy; empty: it does not
   std::string transform;              // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  int min_kept_factor = 0;            // of stored averages: samples along the side of the finest; 0: none
+  // The finest stored averages are each of a square of this many samples a side; 0: none are stored.
+  int min_kept_factor = 0;
   bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;
 };

@@ -108,8 +108,8 @@ Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, cons
   return done;
 }
 
-// Converts a reading of a part to one of the window. Positions are known within the raster grid's footprint plus a
-// margin.
+// Converts a reading of a part to one of the window. It has positions only within the raster grid's footprint and
+// a margin.
 GridReading Widened(PartReading&& of_part, const RasterGrid& grid, const geo::Lattice& lattice,
                     const NodeWindow& window) {
   if (!of_part.part) return std::move(of_part.reading);
@@ -382,7 +382,7 @@ Result<std::vector<float>> ElevationModel::ReadKnownMercator(int depth, const No
   if (const auto done = impl_->ApplyEdits(grid, window, which, {datum, *undulations}, edited, stop); !done) {
     return tl::unexpected(done.error());
   }
-  // A void that is left in `known` was not set by an edit. One that fades into the floor shows there as well.
+  // A void that is left in `known` was not set by an edit. An edit that blends into the floor shows there as well.
   for (std::size_t i = 0; i < edited.size(); ++i) {
     if (IsVoid((*known)[i]) && edited[i] != unedited[i]) (*known)[i] = edited[i];
   }

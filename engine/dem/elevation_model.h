@@ -34,7 +34,8 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks the statistics of a
-  // raster, and all files have passed the other checks; or DemOptions::stop was requested.
+  // raster, and files that failed another check, if any, were reported to DemOptions::fault; or DemOptions::stop was
+  // requested.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -45,6 +46,7 @@ class ElevationModel {
   int max_level() const;
   // The deepest level without edits. Levels below it have tiles only around edits.
   int max_source_level() const;
+  // Precondition: 0 .. geo::kMaxLevel.
   geo::Lattice LatticeOf(int level) const;
 
   // The available tiles of a level, as ranges without overlap, sorted by row and column: tiles that overlap a source
@@ -59,14 +61,15 @@ class ElevationModel {
   // tiles outside all sources hold only the floor.
   HeightRange RangeBound(const geo::TileKey& key) const;
 
-  // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid.
+  // Reads and resamples one tile. Heights are in metres above the WGS 84 ellipsoid. Precondition: a valid key.
   // kUnavailable: a source cannot be read now. kChanged: a file was replaced. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid. If all sources
-  // within an edit's reach have the datum in which it states heights, these are returned unchanged. ReadKnownMercator
-  // and ReadPoints do the same if asked for that datum.
+  // floor is converted to the datum of the last source that refers to a geoid. Heights that an edit states are returned
+  // unchanged if all sources within its reach, and the floor, have the datum that they are stated in. Otherwise they
+  // are converted from the ellipsoid, which may change them by millimetres. ReadKnownMercator and ReadPoints do the
+  // same with HeightDatum::kSource, and with kOrthometric, where the floor does not count. Precondition: a valid key.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
@@ -109,12 +112,12 @@ class ElevationModel {
 
   // Edits (docs/edits.md). Without edits all of these except AvailabilityBelow are 0 or empty.
   //
-  // The requirements of edits for the mesh of a tile.
+  // The requirements of edits for the mesh of a tile. Precondition: a valid key.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for edges of neighbouring tiles that meet this tile only in a corner. By corner (south-west, south-east,
-  // north-east, north-west); one element for each edge, without its two end nodes.
+  // The same for the tile edges that end at a corner of this tile and are not its own. By corner (south-west,
+  // south-east, north-east, north-west); one element for each such edge, without its two end nodes.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

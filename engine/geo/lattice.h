@@ -21,7 +21,7 @@ struct Lattice {
   double StepDegrees() const;  // between samples, in both axes
 
   // Degrees of a global column, wrapped into -180 (inclusive) .. 180; degrees of a global row, clamped to the poles.
-  // Results for the same column or row are bit-equal.
+  // Columns a turn apart have the same longitude, bit for bit.
   double Longitude(std::int64_t column) const;
   double Latitude(std::int64_t row) const;
 

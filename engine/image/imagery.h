@@ -44,9 +44,9 @@ class Imagery {
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
   // Opens an image of 1 band (grey), 3 or 4 bands (red, green, blue, and alpha or anything else), or a palette, in 8 or
-  // 16 bits per band, with a georeference. kInvalidArgument, with the remedy: no raster
-  // that may be opened, no georeference, bands that are not colours, or an image outside `around`. Other errors: those
-  // of HashFiles (file_content.h).
+  // 16 bits per band, with a georeference. `around`: the bounds of the dataset (DemInfo::bounds).
+  // kInvalidArgument, with the remedy: no raster that may be opened, no georeference, bands that are not colours, or an
+  // image outside `around`. Other errors: those of HashFiles (file_content.h).
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();

@@ -20,8 +20,9 @@ class WaterRaster {
  public:
   static constexpr int kSide = 256;  // pixels along a tile's edge
 
-  // Opens band 1 of a georeferenced raster. kInvalidArgument, with the remedy: no raster that may be opened, no
-  // georeference, or a raster outside `around`. Other errors: those of HashFiles (file_content.h).
+  // Opens band 1 of a georeferenced raster. `around`: the bounds of the dataset (DemInfo::bounds). kInvalidArgument,
+  // with the remedy: no raster that may be opened, no georeference, or a raster outside `around`. Other errors: those
+  // of HashFiles (file_content.h).
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();

@@ -1,9 +1,9 @@
-// A folder of files with statistics and averages of rasters, with a limited total size.
+// A folder of files with statistics and averages of rasters. A budget limits their total size.
 // Several processes may share it. Before a file grows, the least recently used files are removed as far as needed to
-// keep an eighth of the limit free; only files in use may fill it. Loading a file counts as use, and so do reads of
-// averages, at most once an hour; the time of the last use is the file's modification time. Files in use by this
-// process are not removed. Other files are neither counted nor removed, also not the hashes of files (file_content.h):
-// a file is recognized by its name and its first bytes.
+// keep an eighth of the budget free; only files in use may take this eighth. Loading a file counts as use, and so do
+// reads of averages, at most once an hour; the time of the last use is the file's modification time. Files in use by
+// this process are not removed. Other files, such as the hashes of file_content.h, are neither counted
+// nor removed: a file is recognized by its name and its first bytes.
 #pragma once
 
 #include <chrono>

@@ -208,7 +208,7 @@ bool GreedyTriangulation::Impl::Run(const GreedyGoal& goal, const std::stop_toke
 }
 
 // A run to a coarser error has to be a prefix of a run to a finer one. A seed grid belongs to every mesh whose error is
-// below the grid's, so it is due when that error exceeds both the current and the requested one.
+// below the grid's, so it is due when its below_error exceeds both the current and the requested error.
 std::optional<GreedyTriangulation::Impl::Insertion> GreedyTriangulation::Impl::NextInsertion(const GreedyGoal& goal) {
   if (IsMet(goal)) return std::nullopt;
   if (seeds_.HasGrid()) {

@@ -42,7 +42,7 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "embed: %s cannot be written\n", arguments[6]);
     return 1;
   }
-  std::printf("%u triangles, at most %.3g m from the samples of the tile and %.3g m from those of the source\n",
+  std::printf("%u triangles, error %.6g m at the samples of the tile, %.6g m at those of the source\n",
               tile->triangles, tile->max_error_m, *tile->certified_error_m);
   return 0;
 }

@@ -1,4 +1,4 @@
-// Pictures of map tiles as WebP and JPEG. Deterministic, thread-safe. png.h has PNG.
+// Pictures of map tiles as PNG (png.h), WebP and JPEG. Deterministic, thread-safe.
 #pragma once
 
 #include <cstdint>
@@ -17,12 +17,13 @@ const char* MediaTypeOf(PictureFormat format);
 const char* ToString(PictureFormat format);
 
 // The samples unchanged, as PNG or as lossless WebP. WebP stores grey as RGB, and no alpha if all pixels are opaque;
-// colours of transparent pixels may change. kInternal: libwebp failed. Preconditions: those of EncodePng, not kJpeg.
+// colours of transparent pixels may change. kInternal: libwebp failed. Preconditions: those of EncodePng; `format` is
+// not kJpeg.
 Result<std::string> EncodeExactly(const PixelView& pixels, PictureFormat format);
 
 // A photograph. PNG keeps it unchanged. WebP keeps alpha unchanged and colours at `quality`, 1 .. 100. JPEG has colours
-// at `quality`, and `background` where pixels are transparent. Errors as above. Preconditions: those of EncodePng,
-// kRgba.
+// at `quality`, and `background` where pixels are transparent. Errors as above. Preconditions: those of EncodePng;
+// `pixels` are kRgba.
 Result<std::string> EncodePhoto(const PixelView& pixels, PictureFormat format, int quality,
                                 const std::array<std::uint8_t, 3>& background);
 

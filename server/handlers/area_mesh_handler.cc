@@ -82,10 +82,7 @@ Answer AnswerArea(const HandlerState& state, const RequestContext& context) {
   // The version of a dataset does not cover max_mesh_samples.
   const std::string request_text = fmt::format("level {} {}", plan->level, context.route.query);
   response.etag = tiler::RequestETag("mesh", view.name, view.generation, request_text, coding);
-  response.cache_control = state.cache_control;
-  if (!plan->depends_on_limit) {
-    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
-  }
+  response.cache_control = CacheControlOf(context.route.query, view, state.cache_control, !plan->depends_on_limit);
   response.vary = "Accept-Encoding";
   if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);
   return BuildArea(state, context, *dataset, *area, *plan, coding, std::move(response));

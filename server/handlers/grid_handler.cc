@@ -201,10 +201,10 @@ Answer AnswerGrid(const HandlerState& state, const RequestContext& context) {
   response.content_type = ContentTypeOf(query->format);
   response.content_encoding = tiler::NameOf(coding);
   if (!is_image) response.vary = "Accept-Encoding";
-  response.cache_control = state.cache_control;
   // The generation does not cover the files of PROJ: geoids, and grids of the shifts between reference systems.
-  if (query->datum == dem::HeightDatum::kEllipsoid && query->grid.epsg == dem::kWgs84) {
-    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
+  const bool is_versioned = query->datum == dem::HeightDatum::kEllipsoid && query->grid.epsg == dem::kWgs84;
+  response.cache_control = CacheControlOf(context.route.query, view, state.cache_control, is_versioned);
+  if (is_versioned) {
     response.etag = tiler::RequestETag("grid", view.name, view.generation, context.route.query, coding);
   }
   if (NamesEtag(request.fields->if_none_match, response.etag)) return Conditional(std::move(response), request);

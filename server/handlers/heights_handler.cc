@@ -98,9 +98,8 @@ asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestCo
     // The generation covers neither the geoid grid that orthometric heights depend on, nor the program that certified
     // errors depend on.
     const bool is_versioned = !parsed->certify_level && parsed->datum == dem::HeightDatum::kEllipsoid;
-    response.cache_control = state.cache_control;
+    response.cache_control = CacheControlOf(context.route.query, view, state.cache_control, is_versioned);
     if (is_versioned) {
-      response.cache_control = CacheControlOf(context.route.query, view, state.cache_control);
       response.etag = tiler::RequestETag("heights", view.name, view.generation, context.route.query, coding);
     }
     if (NamesEtag(request.fields->if_none_match, response.etag)) co_return Conditional(std::move(response), request);

@@ -25,7 +25,8 @@ enum class Method { kGet, kHead, kOptions, kPost, kOther };
 
 // The header fields of a request, without those of its framing.
 struct RequestFields {
-  // Several fields of one name are joined with ", ", except Host, Referer, User-Agent and Content-Type.
+  // Several fields of one name are joined with ", ", except Authorization, Host, Referer, User-Agent
+  // and Content-Type.
   std::string accept;
   std::string accept_encoding;
   std::string if_none_match;
@@ -61,7 +62,7 @@ class SharedFields {
 class RequestId {
  public:
   RequestId() = default;
-  static RequestId Next();  // unique across calls and processes
+  static RequestId Next();  // unique in the process, and very likely across processes
 
   operator std::string_view() const { return {digits_.data(), size_}; }  // NOLINT(google-explicit-constructor)
   bool empty() const { return size_ == 0; }

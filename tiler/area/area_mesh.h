@@ -38,7 +38,7 @@ struct AreaPlan {
 
 // kInvalidArgument, with a message for the client: a value that AreaRequest does not permit; the area does not
 // intersect the model, or does so in two parts (one east and one west of the antimeridian), or needs more than
-// `max_samples`.
+// `max_samples`, or more than 32,768 samples on a side.
 Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fraction, const AreaRequest& area,
                           std::size_t max_samples);
 

@@ -39,7 +39,7 @@ tl::unexpected<Error> Cancelled();
 // The samples of a tile without the halo.
 tin::HeightField FieldOf(const proto::TileSamples& samples);
 
-// Makes the mesh for the error: replays the refinement or, if that mesh has more vertices than the format allows,
+// Makes the mesh for the error: replays the refinement or, if it has more vertices than the format allows,
 // inserts anew with a larger error inside the tile but not on its edges. Then the drop pass (tin::DropVertices) if
 // MeshOptions::compact is set, and WithInnerVertices (inner_vertices.h). The mesh is not quantized yet. `refinement` as
 // for MeshTile. kCancelled: stopped.

@@ -12,8 +12,9 @@ namespace terrace::tiler {
 
 // The surface to read. The error and the rest are those of a tile's URL.
 struct DrawnSurface {
-  std::optional<int> level;  // nothing: LevelOf chooses the first level whose default error is at most the requested
-                             // one, or the deepest
+  // Nothing: the first level whose default error is at most requested.error_m; the deepest if there is none, or if
+  // error_m is not set.
+  std::optional<int> level;
   RequestedError requested;
   TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only

@@ -12,7 +12,7 @@ namespace terrace::tiler {
 // Heights of a dataset at points, NaN where it has none.
 struct PointHeights {
   std::vector<float> heights;
-  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled in; empty: none was, or drawn
+  std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty: of a drawn surface
   std::vector<std::array<float, 3>> normals = {};  // by point: unit, east, north, up; empty: not wanted
   // Of drawn surfaces: the tiles that were read, and the index of each point's tile. Empty: heights of the sources.
   std::vector<geo::TileKey> tiles = {};

@@ -45,7 +45,7 @@ struct EncodedTile {
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kNone;
-  const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: it was built
+  const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: Build made it
   HeaderLines header_lines;        // written by the HeaderWriter of TileTiers; empty without one
 };
 

@@ -46,7 +46,7 @@ struct TileRequest {
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
-  int side_px = kSidesPx[0];  // pixels along an edge: IsMercator(format), and kGeodeticImagery
+  int side_px = kSidesPx[0];  // pixels along an edge: kHeightPng, and map layers except kContours
   MapParameters map;          // IsMapLayer(format)
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
