@@ -31,7 +31,7 @@ struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
   // TileRequest::texture of clients that name none, and of bakes. TilePipeline uses the request's.
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;
-  int side = 512;    // pixels along a tile's edge, at most
+  int side = 512;    // pixels along a tile's edge, at most: a power of two from 64 to 1024
   int quality = 80;  // of JPEG and lossy WebP: 1 .. 100
   std::string attribution;
 };
@@ -59,7 +59,8 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
   // Identifies the dataset and its contents in caches: a hash of contents, of all options that change bytes, and of the
-  // encoders. 0: TilePipeline takes the dataset's number, which suffices if no other pipeline shares its cache.
+  // encoders. 0: TilePipeline sets the dataset's number in its copy, datasets(). That suffices if no other pipeline uses
+  // its RefinementCache, its TileTiers or a store of theirs, at the same time or later.
   std::uint64_t generation = 0;
   // The same without edits; 0: there are none. Caches are keyed by cache_generation() and by a hash of the edits, so
   // that tiles that no edit touches stay: TileEditsHash for tiles, ElevationModel::EditsHash for refinements.

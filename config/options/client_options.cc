@@ -242,7 +242,7 @@ const std::vector<Option<TokenConfig>>& TokenOptionTable() {
       {.key = "datasets",
        .value = "NAMES",
        .help = "Datasets that the token opens; an empty list is all",
-       .details = "The empty list opens `/metrics` as well",
+       .details = "The empty list opens `/metrics` and `/version` as well",
        .codec = List(&TokenConfig::datasets, CheckDatasetName, "[\"maui\"]", ListOf(TextLike(kNamePattern)))},
       {.key = "requests_per_second",
        .value = "N",

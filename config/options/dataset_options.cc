@@ -137,7 +137,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
        .value = "N",
        .help = "Speed of Draco for GLB tiles: 0 makes the smallest tiles, 10 is fastest",
        .details = "3 makes large tiles 8 % smaller, and encoding takes half as long again or more. 10 encodes each "
-                  "triangle separately, and tiles are three times as large",
+                  "triangle separately, and tiles are 2.5 to 3 times as large",
        .codec = Integer(&DatasetConfig::draco_speed, 0, 10)},
       {.key = "draco_normal_bits",
        .value = "N",
@@ -162,7 +162,7 @@ const std::vector<Option<DatasetConfig>>& DatasetOptionTable() {
       {.key = "public",
        .value = "true|false",
        .help = "Serve the dataset without a token, if the server has tokens",
-       .details = "[More](#tokens)",
+       .details = "A change needs a restart. [More](#tokens)",
        .codec = Switch(&DatasetConfig::is_public),
        .other_words = "open anonymous"},
       {.key = "metadata_availability",

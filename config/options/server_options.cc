@@ -330,9 +330,10 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "max_locations",
        .value = "N",
        .section = "load",
-       .help = "Largest number of points of one request for heights, or of one profile",
+       .help = "Largest number of points of one request for heights or of one profile, and of rays of one for lines of "
+               "sight",
        .details = "Requests with more get 400. The body of such a request may have 4096 bytes plus 64 for each point "
-                  "of this limit; larger bodies get 413",
+                  "of this limit, or 192 for each ray; larger bodies get 413",
        .codec = Integer(&Config::max_locations, 1, 1'000'000)},
       {.key = "max_mesh_samples",
        .value = "N",

@@ -133,7 +133,8 @@ struct RasterInfo {
   std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
   std::string height_unit;                   // as stated by the band; empty: none, metres assumed
   bool knows_height_unit = true;             // false: the stated unit is not known, metres assumed
-  std::string picture_color;                 // colour interpretation of a picture's band, "red"; empty: none
+  // GDAL's colour interpretation of the band, "Red", if it suggests a picture and not heights; empty: it does not.
+  std::string picture_color;
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // along the finer axis at the centre, metres on the ground

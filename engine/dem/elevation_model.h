@@ -68,8 +68,9 @@ class ElevationModel {
   // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
   // floor is converted to the datum of the last source that refers to a geoid. Heights that an edit states are returned
   // unchanged if all sources within its reach, and the floor, have the datum that they are stated in. Otherwise they
-  // are converted from the ellipsoid, which may change them by millimetres. ReadKnownMercator and ReadPoints do the
-  // same with HeightDatum::kSource, and with kOrthometric, where the floor does not count. Precondition: a valid key.
+  // are converted from the ellipsoid, which may change them by millimetres. The same holds for ReadKnownMercator and
+  // ReadPoints with HeightDatum::kSource. For ReadPoints with kOrthometric only the sources count, not the floor.
+  // Precondition: a valid key.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
@@ -82,8 +83,8 @@ class ElevationModel {
   // 0 .. geo::kMaxLevel. info().max_mercator_depth is the first as fine as the finest source.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
-  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. `datum`:
-  // kEllipsoid, or kSource for what a map calls elevation.
+  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. Precondition:
+  // `datum` is kEllipsoid, or kSource for what a map calls elevation.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 

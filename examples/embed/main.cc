@@ -14,7 +14,8 @@
 
 int main(int count, char** arguments) {
   using namespace terrace;
-  if (count != 7) {
+  const double error_m = count == 7 ? std::atof(arguments[5]) : 0;
+  if (!(error_m > 0)) {
     std::fputs("usage: embed DEM LEVEL X Y ERROR_M OUT.terrain\n", stderr);
     return 2;
   }
@@ -31,7 +32,7 @@ int main(int count, char** arguments) {
 
   tiler::TileRequest request;
   request.key = {std::atoi(arguments[2]), std::atoll(arguments[3]), std::atoll(arguments[4])};
-  request.error_step = geo::SnapToLadder(request.key.level, std::atof(arguments[5]), error_fraction);
+  request.error_step = geo::SnapToLadder(request.key.level, error_m, error_fraction);
   const Result<tiler::EncodedTile> tile = pipeline.Build(request, {});
   if (!tile) {
     std::fprintf(stderr, "embed: %s\n", tile.error().message.c_str());

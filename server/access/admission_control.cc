@@ -34,8 +34,8 @@ bool IsOutside(const Grant& grant, const Route& route) {
 
 bool HasName(const RequestContext& context) { return context.grant && !context.grant->name.empty(); }
 
-// The key of a client for rate limits: a token's name after a slash, with which no address begins, or what its
-// address counts as.
+// The key of a client for rate limits: "/" and the name of its token, or ClientIdentity::counted_as if it has no token
+// with a name. No address begins with "/".
 std::string Who(const RequestContext& context, const ClientIdentity& client) {
   return HasName(context) ? "/" + context.grant->name : client.counted_as;
 }

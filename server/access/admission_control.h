@@ -45,8 +45,8 @@ class AccessPolicy {
 
 // Removes every `token` parameter from the query of `target` and returns its decoded value; nothing if there is none.
 // Clients append the parameter each time they follow a link, so it may be repeated; if the values differ, the result is
-// a token that does not exist. Other spellings of the name are kept; they are refused with the request
-// (RouteTable::Match) or ignored.
+// a token that does not exist. A percent-encoded name (%74oken) stays: RouteTable::Match refuses such a
+// request, except of rows with takes_any_query, which ignore it.
 std::optional<std::string> TakeToken(std::string& target);
 
 // A client as it is logged and counted.

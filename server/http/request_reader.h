@@ -56,7 +56,7 @@ class RequestReader {
 
   Stream& stream_;
   const ReadTimeouts timeouts_;
-  std::string buffer_;  // grows, and is not cleared: that would take as long as parsing
+  std::string buffer_;  // never shrinks: growing it again would fill it with zeros, which takes as long as parsing
   // The bytes of buffer_ that were read and not consumed: pipelined requests.
   std::size_t begin_ = 0, end_ = 0;
   HeadMemo memo_;

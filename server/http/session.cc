@@ -117,7 +117,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
 
   // While a reply is being sent, there is nothing to release.
   void DisplaceHere() {
-    if (!has_upload_ && !is_receiving_) return;  // is_receiving_: the upload may have memory already
+    // ReceiveBody may have been granted memory and not have set has_upload_ yet.
+    if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
     if (is_receiving_ && has_upload_) stream_.Cancel();
     displacement_.cancel();

@@ -106,7 +106,7 @@ class CacheDir(unittest.TestCase):
                 self.assertEqual(kept_in(place), [])
                 with self.serve(environment=environment) as server:
                     self.assertEqual(server.get("/readyz")[1], b"ready\n")
-                    self.assertIn(f"cache_dir: {place}, for up to {8 << 30} bytes", server.log())
+                    self.assertIn(f"cache_dir: {place}, for up to 8192 MiB", server.log())
                     self.assertEqual(len(kept_in(place)), 1)
                 written = (place / kept_in(place)[0]).stat().st_ino
                 done = subprocess.run([BINARY, "info", self.dem], env=environment, capture_output=True, text=True, timeout=60)

@@ -25,8 +25,9 @@ namespace terrace::tiler {
 // generation identifies the dataset: keys stay valid while other datasets are added or removed.
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
-  std::uint64_t generation = 0;  // Dataset::cache_generation
-  std::uint64_t edits = 0;       // TileEditsHash: tiles that an edit does not touch stay valid when it changes
+  std::uint64_t generation = 0;  // Dataset::cache_generation of TilePipeline::datasets()
+  // TileEditsHash (tiler/dataset.h): tiles that an edit does not touch stay valid when it changes.
+  std::uint64_t edits = 0;
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;
 };
