@@ -59,8 +59,8 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
   // Identifies the dataset and its contents in caches: a hash of contents, of all options that change bytes, and of the
-  // encoders. 0: TilePipeline sets the dataset's number in its copy, datasets(). That suffices if no other pipeline uses
-  // its RefinementCache, its TileTiers or a store of theirs, at the same time or later.
+  // encoders. 0: TilePipeline sets the dataset's number in its copy, datasets(). That suffices if no other pipeline
+  // uses its RefinementCache, its TileTiers or a store of theirs, at the same time or later.
   std::uint64_t generation = 0;
   // The same without edits; 0: there are none. Caches are keyed by cache_generation() and by a hash of the edits, so
   // that tiles that no edit touches stay: TileEditsHash for tiles, ElevationModel::EditsHash for refinements.

@@ -126,13 +126,13 @@ struct RasterInfo {
   std::string path;
   std::string driver;  // GDAL's short name: "GTiff"
   std::int64_t width = 0, height = 0;
-  std::string data_type;                     // "Int16"
-  std::string crs;                           // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
-  std::string vertical_datum;                // as stated by the CRS; empty: not stated
-  std::string datum_in_use;                  // the vertical datum in use; empty: unknown
-  std::string vertical_operation;            // PROJ operation to ellipsoidal heights; empty: none needed
-  std::string height_unit;                   // as stated by the band; empty: none, metres assumed
-  bool knows_height_unit = true;             // false: the stated unit is not known, metres assumed
+  std::string data_type;           // "Int16"
+  std::string crs;                 // name and code: "WGS 84 / UTM zone 11N (EPSG:32611)"
+  std::string vertical_datum;      // as stated by the CRS; empty: not stated
+  std::string datum_in_use;        // the vertical datum in use; empty: unknown
+  std::string vertical_operation;  // PROJ operation to ellipsoidal heights; empty: none needed
+  std::string height_unit;         // as stated by the band; empty: none, metres assumed
+  bool knows_height_unit = true;   // false: the stated unit is not known, metres assumed
   // GDAL's colour interpretation of the band, "Red", if it suggests a picture and not heights; empty: it does not.
   std::string picture_color;
   double pixel_width = 0, pixel_height = 0;  // in units of the CRS

@@ -43,7 +43,7 @@ int main(int count, char** arguments) {
     std::fprintf(stderr, "embed: %s cannot be written\n", arguments[6]);
     return 1;
   }
-  std::printf("%u triangles, error %.6g m at the samples of the tile, %.6g m at those of the source\n",
-              tile->triangles, tile->max_error_m, *tile->certified_error_m);
+  std::printf("%u triangles, error %.6g m at the samples of the tile, %.6g m at those of the source\n", tile->triangles,
+              tile->max_error_m, *tile->certified_error_m);
   return 0;
 }

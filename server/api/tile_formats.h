@@ -26,9 +26,9 @@ struct TileFormatRow {
   std::string_view suffix;  // of the URL: ".terrain"
   std::string_view (*media_type)(const tiler::TileRequest& tile);
   std::string_view (*vary)(const tiler::TileRequest& tile);  // the headers that a reply depends on, as in Response
-  // Reads the parameters of a URL into the request. The caller has set its key, its format, and for pictures map.picture.
-  // kNotFound: the dataset has no such tile. kInvalidArgument: that of the parser in server/query; for contours also an
-  // interval below tiler::MinIntervalCm.
+  // Reads the parameters of a URL into the request. The caller has set its key, its format, and for pictures
+  // map.picture. kNotFound: the dataset has no such tile. kInvalidArgument: that of the parser in server/query; for
+  // contours also an interval below tiler::MinIntervalCm.
   Result<void> (*read)(std::string_view query, const RequestFields& fields, const DatasetView& dataset,
                        tiler::TileRequest& tile);
   proto::PictureFormat picture = proto::PictureFormat::kPng;  // of pictures for maps
