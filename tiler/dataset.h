@@ -50,7 +50,7 @@ struct Dataset {
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
   // Of GLB tiles. `compression`: TileRequest::compression of clients that name none, and of bakes; TilePipeline uses
-  // the request's. It sets the copyright, the texture and both errors itself.
+  // the request's. It sets the copyright, the texture, `draco.uv` and both errors itself.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none

@@ -33,8 +33,8 @@ struct NodeRange {
   }
 };
 
-// The nodes of a window that may get heights from a raster grid, plus `around` more on each side. Never empty, because
-// the grid's files are checked in any case.
+// The nodes of a window that may get heights from a raster grid, plus `around` more on each side. Where there are
+// none, a window of one node: reading it checks the grid's files.
 template <typename NodeGrid>
 NodeWindow PartOf(const RasterGrid& grid, const NodeGrid& node_grid, const NodeWindow& window, int around) {
   const Footprint& reach = grid.reach();

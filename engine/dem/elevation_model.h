@@ -33,9 +33,10 @@ class ElevationModel {
   // for the whole process (docs/embedding.md).
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
-  // Open without reading a raster: all statistics come from the cache. kCancelled: the cache lacks the statistics of a
-  // raster, and files that failed another check, if any, were reported to DemOptions::fault; or DemOptions::stop was
-  // requested.
+  // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
+  // are opened as by Open, which may take long. kCancelled: the cache lacks the statistics of a raster, or
+  // DemOptions::stop was requested. Other files are checked all the same: what fails is reported to DemOptions::fault
+  // or, without it, returned instead.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -69,7 +70,8 @@ class ElevationModel {
   // floor is converted to the datum of the last source that refers to a geoid. Heights that an edit states are returned
   // unchanged if all sources within its reach, and the floor, have the datum that they are stated in. Otherwise they
   // are converted from the ellipsoid, which may change them by millimetres. The same holds for ReadKnownMercator and
-  // ReadPoints with HeightDatum::kSource. For ReadPoints with kOrthometric only the sources count, not the floor.
+  // ReadPoints with HeightDatum::kSource. ReadPoints with kOrthometric returns them
+  // unchanged if all sources within reach have that datum, whatever the floor has.
   // Precondition: a valid key.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
@@ -143,8 +145,8 @@ class ElevationModel {
 
   // A hash of everything that the heights and range bounds of tiles from `top` down to level `deepest` depend on:
   // samples within reach, positions, voids, options, and the bounds of the tiles around. Equal hashes: Read gives the
-  // same bits for every tile at or below `top`, and RangeBound the same ranges for these and for their neighbours.
-  // Below max_source_level() this holds for available tiles only. A change of a source near the tiles may change the
+  // same bits for each of these tiles, and RangeBound the same ranges for them and their neighbours. On levels deeper
+  // than max_source_level() this holds for available tiles only. A change of a source near the tiles may change the
   // hash although no height changes. Precondition: top is a valid key, top.level <= deepest <= geo::kMaxLevel.
   ContentHash ContentBelow(const geo::TileKey& top, int deepest) const;
 

@@ -24,7 +24,7 @@ using JobClock = std::chrono::steady_clock;
 
 // What decides when one job runs.
 struct JobTerms {
-  std::uint64_t client = 0;
+  std::uint64_t client = 0;  // whose turn it is (Request::client); 0: no client in particular
   int level = 0;         // a client's job of a lower level runs first, even if it arrives shortly after: shallow tiles
                          // cover the area of deep tiles. Deep tiles are not delayed indefinitely
   bool is_long = false;  // takes seconds; a bounded number of long jobs runs at a time

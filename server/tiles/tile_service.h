@@ -51,7 +51,7 @@ class TileService {
 
   // For tiles that Find has not found: joins a flight, or starts one. Errors: those of TilePipeline::Build, and
   // kOverloaded, kCancelled, kUnavailable of SingleFlight::Join. Errors are not cached. The coroutine must run on a
-  // single thread. `client`: as in JobTerms. Precondition: the request names one of the datasets.
+  // single thread. `client`: of JobTerms (fair_queue.h). Precondition: the request names one of the datasets.
   asio::awaitable<Result<ServedTile>> Build(CatalogPtr catalog, tiler::TileRequest request,
                                             JobClock::time_point deadline, std::uint64_t client = 0);
 

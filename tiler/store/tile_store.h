@@ -87,7 +87,8 @@ class Store : public StoreBase {
   // Replaces the value of an existing key.
   virtual void Insert(const Key& key, std::shared_ptr<const Value> value) = 0;
 
-  // Tells that no Insert follows a Find that found nothing: the build failed or was cancelled.
+  // Called by TileTiers, not by RefinementCache: no Insert follows a Find that found nothing, because the build failed
+  // or was cancelled.
   virtual void GiveUp(const Key&) {}
 };
 
