@@ -38,6 +38,17 @@ class EditErrors : public TerrainEdits {
     }
     return largest;
   }
+
+  // Expects that the deepest tiles at 10.2, 50.2 are within a centimetre.
+  static void ExpectSmall(const ElevationModel& model) {
+    for (int level = model.max_level() - 2; level <= model.max_level(); ++level) {
+      const double side = 180.0 / static_cast<double>(geo::TileRows(level));
+      const auto tile =
+          model.Read({level, static_cast<std::int64_t>(190.2 / side), static_cast<std::int64_t>(140.2 / side)});
+      ASSERT_TRUE(tile.has_value());
+      EXPECT_LT(tile->source_error_m, 0.01) << level;
+    }
+  }
 };
 
 // A void that is open to the north, so that it is not a hole, and narrower than a cell of coarse levels.
@@ -89,13 +100,7 @@ TEST_F(EditErrors, AreNoLargerWhereAnEditIsConstant) {
     SCOPED_TRACE(terrain);
     const auto source = Open(Rectangle(terrain, 10.05, 50.05, 10.35, 50.35));
     ASSERT_NE(source, nullptr);
-    for (int level = source->max_level() - 2; level <= source->max_level(); ++level) {
-      const double side = 180.0 / static_cast<double>(geo::TileRows(level));
-      const auto tile =
-          source->Read({level, static_cast<std::int64_t>(190.2 / side), static_cast<std::int64_t>(140.2 / side)});
-      ASSERT_TRUE(tile.has_value());
-      EXPECT_LT(tile->source_error_m, 0.01) << level;
-    }
+    ExpectSmall(*source);
   }
 }
 
@@ -109,13 +114,7 @@ TEST_F(EditErrors, AreNoLargerWherePartsMeet) {
   ASSERT_NE(source, nullptr);
   for (const double longitude : {10.19999, 10.2, 10.20001}) EXPECT_EQ(At(*source, longitude, 50.2), 777) << longitude;
   EXPECT_NE(At(*source, 10.2, 50.36), 777);
-  for (int level = source->max_level() - 2; level <= source->max_level(); ++level) {
-    const double side = 180.0 / static_cast<double>(geo::TileRows(level));
-    const auto tile =
-        source->Read({level, static_cast<std::int64_t>(190.2 / side), static_cast<std::int64_t>(140.2 / side)});
-    ASSERT_TRUE(tile.has_value());
-    EXPECT_LT(tile->source_error_m, 0.01) << level;
-  }
+  ExpectSmall(*source);
 }
 
 // A strip between two rows of nodes, with one row of samples. It has no blend, so that no node is within its reach.
