@@ -11,12 +11,12 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 build_packages=(
   g++ cmake ninja-build make git pkg-config ccache ca-certificates gzip python3
-  libgdal-dev libproj-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
+  libgdal-dev libproj-dev libgeos-dev gdal-bin nlohmann-json3-dev libspdlog-dev libfmt-dev libexpected-dev libcli11-dev prometheus-cpp-dev
   libssl-dev libdeflate-dev zlib1g-dev libbrotli-dev libzstd-dev libxxhash-dev libhwy-dev libdraco-dev libmeshoptimizer-dev
   libjpeg62-turbo-dev libwebp-dev libprotozero-dev librocksdb-dev libsystemd-dev libhiredis-dev
 )
 runtime_packages=(
-  ca-certificates libgdal32 libproj25 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 zlib1g libbrotli1 libzstd1
+  ca-certificates libgdal32 libproj25 libgeos-c1v5 libspdlog1.10 libfmt9 libprometheus-cpp-core1.0 libssl3 libdeflate0 zlib1g libbrotli1 libzstd1
   libxxhash0 librocksdb7.8 libhwy1 libdraco7 libmeshoptimizer2d libjpeg62-turbo libwebp7 libsystemd0 libhiredis0.14
 )
 test_packages=(
