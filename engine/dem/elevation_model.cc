@@ -149,6 +149,36 @@ Result<std::vector<RasterGrid>> GridsOf(const std::vector<DemFile>& files, const
   return grids;
 }
 
+// Leaves out rasters without heights, except parts of holes: without them, these would be collars. Moves their names
+// with the reason to `left_out`.
+Result<std::vector<RasterGrid>> GridsOfHeights(std::vector<DemFile>& files, Rasters& rasters,
+                                               const GridOptions& options, std::vector<std::string>& left_out) {
+  auto grids = GridsOf(files, rasters, options);
+  if (!grids) return grids;
+  std::set<const RasterSource*> useless;
+  for (const RasterGrid& grid : *grids) {
+    for (std::size_t i = 0; i < grid.members().size(); ++i) {
+      const RasterSource& raster = *grid.members()[i].raster;
+      if (!raster.has_heights() && !grid.HasPartOfHole(i)) useless.insert(&raster);
+    }
+  }
+  if (useless.empty()) return grids;
+  std::vector<DemFile> kept;
+  std::vector<std::string> texts;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (useless.contains(rasters[i].get())) {
+      texts.push_back(rasters[i]->DescribeLackOfHeights());
+    } else {
+      kept.push_back(std::move(files[i]));
+    }
+  }
+  std::erase_if(rasters, [&](const auto& raster) { return useless.contains(raster.get()); });
+  files = std::move(kept);
+  LogLeftOut(texts);
+  std::ranges::move(texts, std::back_inserter(left_out));
+  return GridsOf(files, rasters, options);
+}
+
 // The smallest box that contains all footprints.
 GeoBounds BoundsOf(const Rasters& rasters) {
   if (rasters.size() == 1) return rasters.front()->info().bounds;
@@ -237,9 +267,9 @@ Result<std::unique_ptr<ElevationModel>> ElevationModel::OpenAs(std::vector<DemFi
   if (auto checked = CheckOptions(options); !checked)
     return MakeError(checked.error().code, "{}: {}", files.front().path, checked.error().message);
   std::vector<std::string> left_out;
-  const auto rasters = OpenRasters(files, options, left_out, only_cached);
+  auto rasters = OpenRasters(files, options, left_out, only_cached);
   if (!rasters) return tl::unexpected(rasters.error());
-  auto grids = GridsOf(files, *rasters, {options.max_void_gap, options.voids, options.feather});
+  auto grids = GridsOfHeights(files, *rasters, {options.max_void_gap, options.voids, options.feather}, left_out);
   if (!grids) return tl::unexpected(grids.error());
 
   auto impl = std::make_unique<Impl>();

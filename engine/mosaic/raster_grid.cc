@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <utility>
 
 #include "engine/crs/node_positions.h"
@@ -149,12 +150,14 @@ Result<RasterGrid> RasterGrid::Make(GridPlan plan, const GridOptions& options) {
 void RasterGrid::IndexMembers() {
   const std::int64_t turn = wraps_ ? columns_ : 0;
   alignment_ = 1 << 22;  // AveragingFactor's largest
-  heights_ = members_.front().raster->info().heights;
+  heights_ = {std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   std::vector<BoxIndex::Entry> entries;
   for (std::size_t i = 0; i < members_.size(); ++i) {
     const GridMember& member = members_[i];
-    const HeightRange& heights = member.raster->info().heights;
-    heights_ = {std::min(heights_.min, heights.min), std::max(heights_.max, heights.max)};
+    if (member.raster->has_heights()) {
+      const HeightRange& heights = member.raster->info().heights;
+      heights_ = {std::min(heights_.min, heights.min), std::max(heights_.max, heights.max)};
+    }
     while (member.column % alignment_ != 0 || member.row % alignment_ != 0 || (turn > 0 && turn % alignment_ != 0)) {
       alignment_ /= 2;
     }

@@ -7,6 +7,7 @@
 // threads.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -80,6 +81,10 @@ class RasterGrid {
   static Result<RasterGrid> Make(GridPlan plan, const GridOptions& options);
 
   const std::vector<GridMember>& members() const { return members_; }
+  // Whether voids along the rim of a member are part of a hole. False with HoleFill::kFloor.
+  bool HasPartOfHole(std::size_t member) const {
+    return std::ranges::find(voids_.HoleRegions(member), 1) != voids_.HoleRegions(member).end();
+  }
   // Returns the indices of the members that meet a box of pixels, ascending. Box::min_y is its first row.
   std::vector<std::size_t> MembersAt(const Box& pixels) const { return member_index_.Find(pixels); }
   const Georeference& georeference() const { return georeference_; }

@@ -53,7 +53,7 @@ std::optional<LeftOut> LeftOutOf(const DemFile& file) {
   return LeftOut{false, file.path};
 }
 
-void LogLeftOut(spdlog::level::level_enum level, const std::vector<std::string>& names) {
+void LogFiles(spdlog::level::level_enum level, const std::vector<std::string>& names) {
   constexpr std::size_t kMaxNamed = 5;
   if (names.empty()) return;
   const auto end = names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMaxNamed));
@@ -66,8 +66,8 @@ struct LeftOutFiles {
   std::vector<std::string> missed, others;  // look like rasters; do not
 
   void Log() const {
-    LogLeftOut(spdlog::level::warn, missed);
-    LogLeftOut(spdlog::level::debug, others);
+    LogFiles(spdlog::level::warn, missed);
+    LogFiles(spdlog::level::debug, others);
   }
 };
 
@@ -102,6 +102,10 @@ unsigned ThreadsOfEach(std::size_t files) {
   return static_cast<unsigned>(std::clamp<std::size_t>(std::thread::hardware_concurrency() / files, 1, kMaxThreads));
 }
 
+tl::unexpected<Error> LackOfHeights(const RasterSource& raster) {
+  return MakeError(ErrorCode::kNotFound, "{}", raster.DescribeLackOfHeights());
+}
+
 // Opens files from several threads.
 class Opening {
  public:
@@ -128,8 +132,9 @@ class Opening {
     Opened opened = RasterSource::Open(files_[i].path, files_[i].options.value_or(options_.source), options_.cache,
                                        ProgressOf(i), stop.get_token(), pages_, threads_, only_cached_);
     if (options_.progress) AddProgress(i, 1);
-    const bool goes_on = opened || IsNothing(i, opened) || LacksStatistics(opened) ||
-                         (options_.fault && !options_.stop.stop_requested());
+    // Datasets that are split into files may have files without a height.
+    if (opened && !(*opened)->has_heights() && !files_[i].skip_if_no_raster) opened = LackOfHeights(**opened);
+    const bool goes_on = opened || LacksStatistics(opened) || (options_.fault && !options_.stop.stop_requested());
     const std::lock_guard lock(mutex_);
     running_.erase(i);
     if (!goes_on) {
@@ -137,11 +142,6 @@ class Opening {
     }
     opened_[i] = std::move(opened);
     return goes_on;
-  }
-
-  // Datasets that are split into files may have files without a height.
-  bool IsNothing(std::size_t i, const Opened& opened) const {
-    return !opened && opened.error().code == ErrorCode::kNotFound && files_[i].skip_if_no_raster;
   }
 
   bool LacksStatistics(const Opened& opened) const {
@@ -196,15 +196,13 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
   ParallelFor(files.size(), [&opening](std::size_t i) { return opening.Open(i); });
   Rasters rasters;
   std::vector<DemFile> kept;
-  std::vector<std::string> without_height;
   std::optional<Error> fault;    // the first
   std::optional<Error> lacking;  // the first file without statistics
   for (std::size_t i = 0; i < files.size() && opening.opened()[i]; ++i) {
     Opening::Opened& opened = *opening.opened()[i];
-    const bool is_last = kept.empty() && i + 1 == files.size();
-    if (opening.IsNothing(i, opened) && !is_last) {
-      without_height.push_back(opened.error().message);
-      continue;
+    if (opened && !lacking && !fault && i + 1 == files.size() && !(*opened)->has_heights() &&
+        std::ranges::none_of(rasters, [](const auto& raster) { return raster->has_heights(); })) {
+      opened = LackOfHeights(**opened);
     }
     if (opened) {
       rasters.push_back(*std::move(opened));
@@ -220,12 +218,12 @@ Result<Rasters> OpenRasters(std::vector<DemFile>& files, const DemOptions& optio
   }
   if (lacking) return tl::unexpected(*std::move(lacking));
   if (only_cached) others.Log(), opening.Log();
-  LogLeftOut(spdlog::level::warn, without_height);
   left_out = std::move(others.missed);
-  left_out.insert(left_out.end(), without_height.begin(), without_height.end());
   if (fault) return tl::unexpected(*std::move(fault));
   files = std::move(kept);
   return rasters;
 }
+
+void LogLeftOut(const std::vector<std::string>& texts) { LogFiles(spdlog::level::warn, texts); }
 
 }  // namespace terrace::dem

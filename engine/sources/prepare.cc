@@ -182,6 +182,7 @@ class Preparer {
   Result<RasterStatistics> WithoutFoundVoids(RasterStatistics statistics) {
     const SampleRules& rules = key_.layout.rules;
     const bool has_collar = statistics.zeros.IsCollar(key_.layout.width, key_.layout.height);
+    if (statistics.valid == 0) return statistics;
     if (!MayHideVoids(rules, statistics.lowest, statistics.highest, statistics.voids > 0, has_collar))
       return statistics;
     auto detected = FindVoids(*dataset_.GetRasterBand(1), rules, has_collar, key_.layout.coast_step_m, options_.stop);

@@ -277,7 +277,7 @@ void RasterSource::FillInfo(GDALDataset& dataset, const std::string& path, const
   info_.spacing_m = spacing_.finer;
   info_.bounds = footprint_.Bounds();
   info_.heights = {statistics.lowest, statistics.highest};
-  info_.heights_doubted = DoubtsOf(info_.heights);
+  if (statistics.valid > 0) info_.heights_doubted = DoubtsOf(info_.heights);
   info_.valid_samples = statistics.valid;
   info_.void_samples = statistics.voids;
   info_.enclosed_samples = statistics.enclosed_samples;
@@ -290,6 +290,22 @@ void RasterSource::LogOpened(GDALDataset& dataset) const {
     LogSource(SourceLog::Level::kWarn, info_.path,
               "voids that it does not declare: {}; `nodata` of the configuration decides otherwise", info_.found_voids);
   }
+}
+
+std::string RasterSource::DescribeLackOfHeights() const {
+  const SampleRules& rules = layout_.rules;
+  return fmt::format(
+      "{}: has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
+      "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
+      "need `-a_scale FACTOR`, the metres of one{}{}",
+      info_.path, PlainNumber(kMaxAbsHeight),
+      MetresPerUnit(rules.unit)
+          ? ""
+          : fmt::format("; the file's unit \"{}\" is not known, and counts as metres", rules.unit),
+      rules.extra_nodata.empty() && rules.void_margin <= 0
+          ? ""
+          : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
+            "configuration \"nodata\": \"declared\") they are not");
 }
 
 bool StatisticsPages::Admit(std::size_t bytes) {

@@ -80,6 +80,9 @@ class RasterSource {
   ~RasterSource();
 
   const RasterInfo& info() const { return info_; }
+  bool has_heights() const { return info_.valid_samples > 0; }
+  // Why a raster without heights cannot be used, with the remedy. Names the file.
+  std::string DescribeLackOfHeights() const;
   const Georeference& georeference() const { return georeference_; }
   // The vertical datum of the samples. They are not converted here.
   const VerticalDatum& vertical() const { return vertical_; }

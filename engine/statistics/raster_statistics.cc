@@ -342,26 +342,13 @@ Result<void> StatisticsAssembler::AddOverviews(GDALDataset& dataset, const std::
 Result<RasterStatistics> StatisticsAssembler::Finish(GDALDataset& dataset, const std::stop_token& stop) {
   statistics_.voids =
       static_cast<std::uint64_t>(layout_.width) * static_cast<std::uint64_t>(layout_.height) - statistics_.valid;
-  if (statistics_.valid == 0) {
-    return MakeError(
-        ErrorCode::kNotFound,
-        "has no valid sample, only voids; check its nodata value with gdalinfo and correct it with "
-        "`gdal_translate -a_nodata VALUE in out`; heights beyond {} m are voids too: those in another unit "
-        "need `-a_scale FACTOR`, the metres of one{}{}",
-        PlainNumber(kMaxAbsHeight),
-        MetresPerUnit(layout_.rules.unit)
-            ? ""
-            : fmt::format("; the file's unit \"{}\" is not known, and counts as metres", layout_.rules.unit),
-        layout_.rules.extra_nodata.empty() && layout_.rules.void_margin <= 0
-            ? ""
-            : "; heights that the file does not declare to be voids were taken for such: with --nodata declared (in a "
-              "configuration \"nodata\": \"declared\") they are not");
-  }
   statistics_.rim_voids = voids_.Finish();
   if (statistics_.rim_voids.is_everything()) statistics_.enclosed_samples = 0;
   const BlockRange samples = statistics_.table.OfFinest();
-  statistics_.lowest = samples.min;
-  statistics_.highest = samples.max;
+  if (statistics_.valid > 0) {
+    statistics_.lowest = samples.min;
+    statistics_.highest = samples.max;
+  }
   statistics_.edge_row_means = {MeanOf(first_row_), MeanOf(last_row_)};
   if (auto coarse = FinishCoarse(dataset, stop); !coarse) return tl::unexpected(coarse.error());
   if (auto overviews = AddOverviews(dataset, stop); !overviews) return tl::unexpected(overviews.error());

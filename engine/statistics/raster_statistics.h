@@ -49,7 +49,7 @@ class CoarseAverages {
 struct RasterStatistics {
   ContentHash content;            // of all heights, including those of overviews that are read
   RangeTable table;               // overviews that are read count too: their resampling may overshoot the samples
-  float lowest = 0, highest = 0;  // of the samples
+  float lowest = 0, highest = 0;  // of the samples; 0 if all are voids
   // An overview that is read has a height far outside the range of the raster's samples around it: it was made of
   // nodata values, or of other samples.
   bool has_stray_overviews = false;
@@ -74,8 +74,8 @@ class StatisticsAssembler {
 
   void Add(const Chunk& chunk, const ChunkStatistics& chunk_statistics);
 
-  // Reads overviews where the raster has some. kUnavailable: they cannot be read. kNotFound: nothing but voids.
-  // kCancelled: stopped. Errors do not name the file.
+  // Reads overviews where the raster has some. kUnavailable: they cannot be read. kCancelled: stopped. Errors do not
+  // name the file.
   Result<RasterStatistics> Finish(GDALDataset& dataset, const std::stop_token& stop);
 
  private:

@@ -173,7 +173,7 @@ TEST(ElevationModel, LeavesNoFilesBesideTheSource) {
 
 TEST(ElevationModel, LeavesFilesWithoutAHeightOutOfAFolder) {
   const TempDir dir;
-  RasterSpec empty{.nodata = -1};
+  RasterSpec empty{.geo_transform = {40, 1, 0, 0, 0, -1}, .nodata = -1};
   empty.value = [](int, int) { return -1.0; };
   const std::string good = WriteRaster(dir, {}, "good.tif"), none = WriteRaster(dir, empty, "none.tif");
   const auto source = ElevationModel::Open({{none, 0, true}, {good, 0, true}, {none, 0, true}});

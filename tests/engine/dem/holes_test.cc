@@ -1,4 +1,6 @@
 // Large voids: holes are filled with a smooth surface, collars show the floor.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -271,6 +273,82 @@ TEST(Holes, GoAcrossRastersOfAGrid) {
 }
 
 // A coarse source below has priority in a hole over the surface. Narrow voids are filled from the fine source.
+// Pieces of a raster, each 100 samples a side, as files of a folder.
+std::vector<DemFile> WritePieces(const TempDir& dir, int columns, int rows, const VoidAt& is_void) {
+  std::vector<DemFile> files;
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      RasterSpec piece = Raster(
+          100, 100, [=](int c, int r) { return Rough(c + 100 * x, r + 100 * y); },
+          [=](int c, int r) { return is_void(c + 100 * x, r + 100 * y); });
+      piece.geo_transform[0] += 100 * x * kPixel;
+      piece.geo_transform[3] -= 100 * y * kPixel;
+      files.push_back({WriteRaster(dir, piece, fmt::format("{}-{}.tif", y, x)), 0, true});
+    }
+  }
+  return files;
+}
+
+// Files of nothing but voids are used where they are part of a hole.
+TEST(Holes, GoAcrossFilesWithoutAHeight) {
+  struct Case {
+    const char* name;
+    VoidAt is_void;
+    int files_left_out;
+    Place first, last;  // in files without a height
+  };
+  const std::vector<Case> cases = {
+      {"one file", Box(80, 80, 140, 140), 0, {105, 105}, {195, 195}},
+      {"two files side by side", Box(80, 80, 240, 140), 0, {105, 105}, {295, 195}},
+      {"as large as the file", Box(200, 100, 100, 100), 0, {205, 105}, {295, 195}},
+      {"to the rim", Box(80, 80, 140, 220), 2, {105, 105}, {195, 295}},
+      {"beside the data", Box(300, 200, 100, 100), 1, {305, 205}, {395, 295}},
+  };
+  for (const Case& a_case : cases) {
+    SCOPED_TRACE(a_case.name);
+    const TempDir dir;
+    const auto whole = OpenOrFail(WriteRaster(dir, Raster(400, 300, Rough, a_case.is_void)), {.floor = kFloor});
+    const std::vector<DemFile> files = WritePieces(dir, 4, 3, a_case.is_void);
+    const DemOptions options{.floor = kFloor, .cache = CacheIn(dir.File("cache"))};
+    const auto pieces = OpenOrFail(files, options);
+    const auto from_cache = ElevationModel::OpenFromCache(files, options);
+    ASSERT_TRUE(whole && pieces && from_cache);
+    EXPECT_EQ(pieces->info().left_out.size(), static_cast<std::size_t>(a_case.files_left_out));
+    EXPECT_EQ(pieces->info().sources.size(), static_cast<std::size_t>(12 - a_case.files_left_out));
+    EXPECT_EQ(pieces->info().heights.min, whole->info().heights.min);
+    EXPECT_EQ(pieces->info().heights.max, whole->info().heights.max);
+    const bool is_hole = a_case.files_left_out == 0;
+    int in_void = 0;
+    for (const geo::TileKey& key : SomeTiles(*pieces, kLevel, 100)) {
+      const auto a = whole->Read(key), b = pieces->Read(key), c = (*from_cache)->Read(key);
+      ASSERT_TRUE(a && b && c);
+      EXPECT_EQ(b->heights, c->heights);
+      const HeightRange bound = pieces->RangeBound(key);
+      for (int j = 0; j <= a->lattice.cells; ++j) {
+        for (int i = 0; i <= a->lattice.cells; ++i) {
+          if (is_hole) {
+            ASSERT_TRUE(IsSame(a->At(i, j), b->At(i, j))) << geo::ToString(key) << ", node " << i << ", " << j;
+          }
+          ASSERT_TRUE(b->At(i, j) >= bound.min && b->At(i, j) <= bound.max);
+          if (!PlaceOf(*a, key, i, j).IsIn(a_case.first.x, a_case.first.y, a_case.last.x, a_case.last.y)) continue;
+          ++in_void;
+          ASSERT_EQ(b->At(i, j) == kFloor, !is_hole);
+        }
+      }
+    }
+    EXPECT_GT(in_void, 100);
+  }
+}
+
+// Where holes show the floor, files without a height are not needed.
+TEST(Holes, NeedNoFilesWithoutAHeightForTheFloor) {
+  const TempDir dir;
+  const auto model =
+      OpenOrFail(WritePieces(dir, 4, 3, Box(80, 80, 140, 140)), {.floor = kFloor, .voids = HoleFill::kFloor});
+  ASSERT_NE(model, nullptr);
+  EXPECT_EQ(model->info().sources.size(), 11u);
+}
+
 TEST(Holes, ShowASourceBelow) {
   const TempDir dir;
   const auto one_sample = Box(30, 30, 1, 1), large = Box(100, 100, 200, 200);

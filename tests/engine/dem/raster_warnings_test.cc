@@ -239,7 +239,7 @@ TEST(RasterWarnings, UnitsWithNumbersOrWithoutLettersAreNotKnown) {
   const TempDir dir;
   RasterSpec spec{.geo_transform = {7, .01, 0, 46, 0, -.01}, .unit = "furlongs"};
   spec.value = [](int, int) { return 1e6; };
-  const auto refused = RasterSource::Open(WriteRaster(dir, spec));
+  const auto refused = ElevationModel::Open(WriteRaster(dir, spec));
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("unit \"furlongs\" is not known"), std::string::npos)
       << refused.error().message;
