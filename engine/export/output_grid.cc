@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -59,10 +60,12 @@ Result<void> SetCrs(int epsg, OutputGrid& grid) {
   return {};
 }
 
-// The number of nodes along a side, and its end.
-Result<std::int64_t> NodesAlong(double length, const std::optional<std::int64_t>& given, double spacing,
+// The number of nodes along a side from `low` to `high`.
+Result<std::int64_t> NodesAlong(double low, double high, const std::optional<std::int64_t>& given, double spacing,
                                 const char* name) {
-  const double nodes = given ? static_cast<double>(*given) : std::floor(length / spacing * (1 + 1e-12)) + 1;
+  // A side of whole steps, as decimals: its ends and the spacing are rounded.
+  const double rounding = 4 * std::numeric_limits<double>::epsilon() * std::max(std::abs(low), std::abs(high));
+  const double nodes = given ? static_cast<double>(*given) : std::floor((high - low + rounding) / spacing) + 1;
   if (nodes < 2) return Invalid(fmt::format("{}: a grid has at least 2 nodes on each side", name));
   return static_cast<std::int64_t>(std::min(nodes, 1e15));
 }
@@ -133,9 +136,9 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
   }
   const double spacing = request.spacing.value_or(1);
   const auto columns =
-      NodesAlong(grid.east - grid.west, request.columns, spacing, request.spacing ? "spacing" : "width");
+      NodesAlong(grid.west, grid.east, request.columns, spacing, request.spacing ? "spacing" : "width");
   if (!columns) return tl::unexpected(columns.error());
-  const auto rows = NodesAlong(grid.north - grid.south, request.rows, spacing, request.spacing ? "spacing" : "height");
+  const auto rows = NodesAlong(grid.south, grid.north, request.rows, spacing, request.spacing ? "spacing" : "height");
   if (!rows) return tl::unexpected(rows.error());
   grid.columns = *columns, grid.rows = *rows;
   constexpr std::int64_t kLongestSide = 65536;

@@ -125,34 +125,49 @@ SightBlocks::SightBlocks(const RasterGrid& grid) : grid_(grid), geoid_(grid.vert
   is_fine_ = std::max(grid.spacing().east, grid.spacing().north) <= kUndulationStep;
 }
 
-// Linear between positions at most kUndulationStep apart.
+// Linear between positions at most kUndulationStep apart; at each sample where a line of the geoid's grid crosses the
+// window, because undulations have a kink there.
 Result<std::vector<float>> SightBlocks::UndulationsOf(const GridWindow& window) const {
   if (geoid_ == nullptr || !is_fine_) return std::vector<float>();
   const double spacing_m = std::max(grid_.spacing().east, grid_.spacing().north);
-  const auto step = std::max<std::int64_t>(1, static_cast<std::int64_t>(kUndulationStep / spacing_m));
-  const std::int64_t columns = (window.columns + step - 2) / step + 1, rows = (window.rows + step - 2) / step + 1;
-  std::vector<Position> positions;
-  for (std::int64_t row = 0; row < rows; ++row) {
-    for (std::int64_t column = 0; column < columns; ++column) {
-      positions.push_back({static_cast<double>(window.column + column * step) + 0.5,
-                           static_cast<double>(window.row + row * step) + 0.5});
+  auto step = std::max<std::int64_t>(1, static_cast<std::int64_t>(kUndulationStep / spacing_m));
+  const auto count = [&](std::int64_t samples) { return (samples + step - 2) / step + 1; };
+  const auto positions_of = [&] {
+    std::vector<Position> positions;
+    for (std::int64_t row = 0; row < count(window.rows); ++row) {
+      for (std::int64_t column = 0; column < count(window.columns); ++column) {
+        positions.push_back({static_cast<double>(window.column + column * step) + 0.5,
+                             static_cast<double>(window.row + row * step) + 0.5});
+      }
     }
-  }
-  grid_.georeference().ToDegrees(positions);
+    grid_.georeference().ToDegrees(positions);
+    return positions;
+  };
   std::vector<double> known;
-  known.reserve(positions.size());
   if (const UndulationGrid* const grid = geoid_->grid()) {
     std::vector<AxisPosition> x, y;
-    for (const Position& degrees : positions) {
-      x.push_back(grid->AtColumn(grid->ColumnOf(degrees.x)));
-      y.push_back(grid->AtRow(grid->RowOf(degrees.y)));
+    const auto locate = [&] {
+      x.clear(), y.clear();
+      for (const Position& degrees : positions_of()) {
+        x.push_back(grid->AtColumn(grid->ColumnOf(degrees.x)));
+        y.push_back(grid->AtRow(grid->RowOf(degrees.y)));
+      }
+    };
+    locate();
+    const auto are_in_one_cell = [](const std::vector<AxisPosition>& places) {
+      return std::ranges::all_of(places, [&](const AxisPosition& at) { return at.node == places.front().node; });
+    };
+    if (step > 1 && !(are_in_one_cell(x) && are_in_one_cell(y))) {
+      step = 1;
+      locate();
     }
     const auto patch = UndulationPatch::Read(*grid, x, y);
     if (!patch) return tl::unexpected(patch.error());
     for (std::size_t i = 0; i < x.size(); ++i) known.push_back(patch->At(x[i], y[i]));
   } else {
-    for (const Position& degrees : positions) known.push_back(reader_->At(degrees));
+    for (const Position& degrees : positions_of()) known.push_back(reader_->At(degrees));
   }
+  const std::int64_t columns = count(window.columns), rows = count(window.rows);
   std::vector<float> undulations;
   undulations.reserve(static_cast<std::size_t>(window.columns * window.rows));
   const auto stride = static_cast<std::size_t>(columns);

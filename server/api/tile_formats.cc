@@ -12,6 +12,7 @@
 #include "engine/core/check.h"
 #include "engine/core/parse_number.h"
 #include "engine/geo/error_ladder.h"
+#include "engine/geo/mercator_grid.h"
 #include "proto/format_error_up.h"
 #include "proto/mesh/tile_metadata.h"
 #include "server/api/map_formats.h"
@@ -183,6 +184,12 @@ proto::TileExtensions WantedExtensions(std::string_view accept, const std::vecto
 }
 
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format) {
+  const bool is_polar =
+      dataset.bounds.south >= geo::kMercatorLatitude || dataset.bounds.north <= -geo::kMercatorLatitude;
+  if (tiler::IsMercator(format) && is_polar) {
+    return MakeError(ErrorCode::kNotFound,
+                     "the dataset lies beyond 85.05 degrees of latitude, where Web Mercator ends");
+  }
   if (!dataset.only_archive) return {};
   const std::vector<tiler::TileFormat>& formats = dataset.only_archive->extent().formats;
   if (std::ranges::find(formats, format) != formats.end()) return {};

@@ -39,10 +39,10 @@ std::vector<NamedUrl> UrlsOf(const DatasetView& dataset) {
   add(has_terrain, "sight", "/sight");
   add(has_sources, "mesh", "/mesh");
   add(dataset.edits_hash != nullptr, "edits", "/edits.geojson");
-  add(has_sources, "hillshade", "/hillshade/tiles.json");
-  add(has_sources, "slope", "/slope/tiles.json");
-  add(has_sources, "contours", "/contours/tiles.json");
-  add(dataset.imagery.has_value(), "imagery", "/imagery/tiles.json");
+  add(has(tiler::TileFormat::kHillshade), "hillshade", "/hillshade/tiles.json");
+  add(has(tiler::TileFormat::kSlope), "slope", "/slope/tiles.json");
+  add(has(tiler::TileFormat::kContours), "contours", "/contours/tiles.json");
+  add(dataset.imagery && has(tiler::TileFormat::kImagery), "imagery", "/imagery/tiles.json");
   add(dataset.imagery.has_value(), "imagery_geodetic", "/imagery/geodetic/{z}/{x}/{y}.webp" + version);
   return urls;
 }

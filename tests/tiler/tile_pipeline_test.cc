@@ -5,18 +5,22 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "engine/geo/error_ladder.h"
+#include "tests/engine/dem/dem_fixture.h"
 #include "tests/support/scratch_directory.h"
 #include "tests/tiler/fetched_tile.h"
+#include "tiler/tile/check_request.h"
 
 namespace terrace::tiler {
 namespace {
@@ -257,6 +261,12 @@ TEST(TilePipeline, RefusesValuesThatRequestsMayNotHave) {
   begins(
       refusal(TileFormat::kHillshade, [](TileRequest& request) { request.map.picture = proto::PictureFormat::kJpeg; }),
       "invalid_argument picture");
+  TileRequest deepest;  // with 512 pixels, those of a deeper grid
+  deepest.format = TileFormat::kImagery;
+  deepest.key.level = geo::kMaxLevel;
+  EXPECT_TRUE(CheckRequest(deepest));
+  deepest.side_px = 512;
+  EXPECT_EQ(CheckRequest(deepest).error().code, ErrorCode::kNotFound);
 }
 
 TEST(TilePipeline, HasNoOtherDatasets) {
@@ -268,6 +278,29 @@ TEST(TilePipeline, HasNoOtherDatasets) {
   EXPECT_EQ(pipeline.LookAlong(number, {}, {}, {}, {}).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(pipeline.PlanArea(number, {}, 1).error().code, ErrorCode::kNotFound);
   EXPECT_EQ(pipeline.BuildArea(number, {}, {}, {}).error().code, ErrorCode::kNotFound);
+}
+
+// A plane on the map around the South Pole, which rises towards 90 degrees east.
+TEST(TilePipeline, NormalsAtAPolePointIntoOneDirection) {
+  const dem::TempDir dir;
+  dem::RasterSpec spec{
+      .width = 500, .height = 500, .geo_transform = {-1.25e6, 5000, 0, 1.25e6, 0, -5000}, .crs = "EPSG:3031"};
+  spec.value = [](int column, int) { return 50.0 * column; };  // 0.01 of the map's metres
+  const TilePipeline pipeline({OpenDataset("pole", dem::WriteRaster(dir, spec))});
+  constexpr double kScale = 0.97276901;  // metres of the map in one on the ground, at the pole
+  for (const double latitude : {-90.0, -89.995, -89.98, -89.5}) {
+    std::vector<dem::GeoPosition> points;
+    for (int longitude = -180; longitude <= 180; longitude += 15) points.push_back({double(longitude), latitude});
+    const auto normals = pipeline.ReadNormals(0, points, {});
+    ASSERT_TRUE(normals) << normals.error().message;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double meridian = points[i].longitude * std::numbers::pi / 180;
+      EXPECT_NEAR((*normals)[i][0], -0.01 * kScale * std::cos(meridian), 3e-5)
+          << points[i].longitude << ' ' << latitude;
+      EXPECT_NEAR((*normals)[i][1], -0.01 * kScale * std::sin(meridian), 3e-5)
+          << points[i].longitude << ' ' << latitude;
+    }
+  }
 }
 
 TEST(TilePipeline, DrawnPointsMayBeATurnAway) {

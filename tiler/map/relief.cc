@@ -61,9 +61,17 @@ std::vector<Gradient> GradientsOf(const MapHeights& heights, const MapWindow& wi
         *out = {own, own};
         continue;
       }
+      // At the rim of the data, the ground goes on as on the other side.
+      const auto beside = [&](int east, int south) -> double {
+        const float height = heights.At(column + east, row + south);
+        if (!std::isnan(height)) return height;
+        const float opposite = heights.At(column - east, row - south);
+        return std::isnan(opposite) ? own : 2.0 * own - opposite;
+      };
       const auto at = [&](int east, int south) -> double {
         const float height = heights.At(column + east, row + south);
-        return std::isnan(height) ? own : height;
+        if (!std::isnan(height)) return height;
+        return east == 0 || south == 0 ? beside(east, south) : beside(east, 0) + beside(0, south) - own;
       };
       const double rise_east = at(1, -1) + 2 * at(1, 0) + at(1, 1) - (at(-1, -1) + 2 * at(-1, 0) + at(-1, 1));
       const double rise_north = at(-1, -1) + 2 * at(0, -1) + at(1, -1) - (at(-1, 1) + 2 * at(0, 1) + at(1, 1));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "engine/geo/ellipsoid.h"
@@ -15,6 +16,33 @@ double Slope(double before, double here, double after, double reach_m) {
   return (std::isnan(after) ? here - before : after - here) / reach_m;
 }
 
+// The positions `reach_m` west, east, south and north of a point.
+std::array<dem::GeoPosition, 4> PositionsAround(const dem::GeoPosition& point, double reach_m) {
+  const double longitude = point.longitude, latitude = point.latitude;
+  const double north = reach_m / geo::MetresPerDegreeNorth(latitude);
+  const double east = reach_m / geo::MetresPerDegreeEast(latitude);
+  constexpr double kMaxEast = 1;  // degrees
+  if (east < kMaxEast) {
+    const auto turned = [](double degrees) { return std::remainder(degrees, 360); };
+    return {{{turned(longitude - east), latitude},
+             {turned(longitude + east), latitude},
+             {longitude, latitude - north},
+             {longitude, latitude + north}}};
+  }
+  // Parallels are too curved here. The surroundings of the pole are a plane, in degrees of latitude from it. Rounded,
+  // because results of the C library differ between processors.
+  const geo::SinCos meridian = geo::RoundedSinCos(longitude);
+  const double pole = latitude < 0 ? -1 : 1;
+  const auto rounded = [](double degrees) { return std::round(std::ldexp(degrees, 30)) / (1 << 30); };
+  const auto place = [&](double to_east, double to_north) {
+    const double from_pole = 90 - std::abs(latitude) - pole * to_north;
+    const double x = from_pole * meridian.cos - to_east * meridian.sin;
+    const double y = from_pole * meridian.sin + to_east * meridian.cos;
+    return dem::GeoPosition{rounded(geo::ToDegrees(std::atan2(y, x))), rounded(pole * (90 - std::hypot(x, y)))};
+  };
+  return {{place(-north, 0), place(north, 0), place(0, -north), place(0, north)}};
+}
+
 }  // namespace
 
 Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::ElevationModel& model,
@@ -25,16 +53,8 @@ Result<std::vector<std::array<float, 3>>> SourceNormals(const dem::ElevationMode
   constexpr std::size_t kSides = 4;  // west, east, south, north
   std::vector<dem::GeoPosition> around;
   around.reserve(points.size() * kSides);
-  for (const auto& [longitude, latitude] : points) {
-    // Near a pole half a sample may be more than a turn.
-    const double east = std::min(90.0, reach_m / std::max(1.0, geo::MetresPerDegreeEast(latitude)));
-    const double north = reach_m / geo::MetresPerDegreeNorth(latitude);
-    const auto turned = [](double degrees) { return std::remainder(degrees, 360); };
-    around.push_back({turned(longitude - east), latitude});
-    around.push_back({turned(longitude + east), latitude});
-    around.push_back({longitude, std::max(latitude - north, -90.0)});
-    around.push_back({longitude, std::min(latitude + north, 90.0)});
-  }
+  for (const dem::GeoPosition& point : points)
+    std::ranges::copy(PositionsAround(point, reach_m), std::back_inserter(around));
   const Result<std::vector<float>> sides = model.ReadPoints(around, dem::HeightDatum::kEllipsoid, stop);
   if (!sides) return tl::unexpected(sides.error());
   const Result<std::vector<float>> here = model.ReadPoints(points, dem::HeightDatum::kEllipsoid, stop);

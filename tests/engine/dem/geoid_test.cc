@@ -129,5 +129,33 @@ TEST(Geoid, RefusesGridFilesWithTheReason) {
   EXPECT_NE(message.find("is 467 m; undulations are"), std::string::npos) << message;
 }
 
+// The undulations of a grid have kinks at its lines, here as strong as the strongest of EGM96.
+TEST(Geoid, HasItsLinesInTheSurfaceOfSight) {
+  const TempDir dir;
+  const std::string geoid =
+      WriteGtx(dir, "kinks.gtx", {.west = 9.5, .south = 44.5, .step = 0.25, .value = [](int column, int row) {
+                                    return 3.9f * static_cast<float>(column % 2 + row % 2);
+                                  }});
+  DemOptions options;
+  options.source.vertical = geoid;
+  const auto model = OpenOrFail(
+      WriteRaster(dir, {.width = 300, .height = 300, .geo_transform = {9.96, 1 / 3600.0, 0, 45.29, 0, -1 / 3600.0}}),
+      options);
+  ASSERT_NE(model, nullptr);
+  std::vector<GeoPosition> points;
+  for (int i = 0; i < 400; ++i) points.push_back({9.9985 + i * 1e-5, 45.2485 + i % 37 * 1e-4});
+  const auto ground = model->ReadPoints(points);
+  ASSERT_TRUE(ground);
+  std::vector<SightRay> rays;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto [longitude, latitude] = points[i];
+    rays.push_back({{longitude, latitude, (*ground)[i]}, {longitude, latitude, (*ground)[i] + 100}});
+  }
+  const auto answers = model->LookAlong(rays, {});
+  ASSERT_TRUE(answers);
+  // Between two samples, the surface of sight is linear across a kink.
+  for (std::size_t i = 0; i < rays.size(); ++i) EXPECT_NEAR((*answers)[i].clearance_m, 0, 3e-3) << i;
+}
+
 }  // namespace
 }  // namespace terrace::dem

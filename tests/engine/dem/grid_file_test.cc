@@ -40,6 +40,29 @@ TEST(GridFile, RefusesSystemsThatAGeoTiffCannotState) {
       CheckGeoTiff(*PlanOutputGrid({.west = 7, .south = 46, .east = 8, .north = 47, .columns = 2, .rows = 2}, 100)));
 }
 
+// 0.1 and the ends of the boxes are not whole binary numbers.
+TEST(GridFile, HasAllNodesOfABoxOfWholeSteps) {
+  for (int i = 0; i < 2'000; ++i) {
+    const double west = 7'406'718 + i, south = 40'142'372 + 3 * i;  // tenths of a metre
+    const int columns = 2 + i % 97, rows = 2 + i % 89;
+    const auto plan = PlanOutputGrid({.epsg = 32616,
+                                      .west = west / 10,
+                                      .south = south / 10,
+                                      .east = (west + columns - 1) / 10,
+                                      .north = (south + rows - 1) / 10,
+                                      .spacing = 0.1},
+                                     100'000);
+    ASSERT_TRUE(plan) << plan.error().message;
+    ASSERT_EQ(plan->columns, columns) << i;
+    ASSERT_EQ(plan->rows, rows) << i;
+  }
+  const auto wider =
+      PlanOutputGrid({.west = 10, .south = 49, .east = 10.00099, .north = 49.001, .spacing = 0.0001}, 1000);
+  ASSERT_TRUE(wider);
+  EXPECT_EQ(wider->columns, 10);
+  EXPECT_EQ(wider->rows, 11);
+}
+
 // EPSG:3411 is on an ellipsoid of its own, its successor 3413 on that of WGS 84: up to 57 m apart.
 TEST(GridFile, OfADeprecatedSystemIsReadAsThatSystem) {
   const auto plan = PlanOutputGrid(

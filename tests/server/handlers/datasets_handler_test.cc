@@ -51,6 +51,17 @@ TEST(DatasetsHandler, ListsWhatAClientNeeds) {
                                              {"mesh", base + "/mesh"}}));
 }
 
+TEST(DatasetsHandler, ListsNoTilesForMapsWhereWebMercatorEnds) {
+  std::array<DatasetView, 1> datasets = Datasets();
+  datasets[0].bounds = {-180, 86, 180, 90};
+  const auto list = nlohmann::json::parse(DatasetsJson(datasets));
+  const nlohmann::json& urls = list["datasets"][0]["urls"];
+  EXPECT_TRUE(urls.contains("layer") && urls.contains("tileset"));
+  for (const char* name : {"tiles_json", "hillshade", "slope", "contours"}) EXPECT_FALSE(urls.contains(name)) << name;
+  datasets[0].bounds.south = 85;
+  EXPECT_TRUE(nlohmann::json::parse(DatasetsJson(datasets))["datasets"][0]["urls"].contains("tiles_json"));
+}
+
 // An archive that only has formats.
 class BakedFormats final : public tiler::BakedTiles {
  public:

@@ -66,6 +66,31 @@ TEST(Relief, SlopesOfPlanesAreTrueSlopes) {
   }
 }
 
+TEST(Relief, SlopesOfPlanesAreTheSameAtTheRimOfTheData) {
+  const MapWindow window({12, 2100, 1100}, 256, kReliefMargin);
+  const auto plane = [&](std::int64_t column, std::int64_t row) {
+    return 7.0 * static_cast<double>(column - window.nodes.column) - 5.0 * static_cast<double>(row - window.first_row);
+  };
+  const std::vector<Gradient> whole = GradientsOf(HeightsOf(window, plane), window);
+  const std::vector<Gradient> part = GradientsOf(HeightsOf(window,
+                                                           [&](std::int64_t column, std::int64_t row) {
+                                                             const std::int64_t x = column - window.nodes.column;
+                                                             const std::int64_t y = row - window.first_row;
+                                                             const bool is_known =
+                                                                 x > 40 && x < 200 && y > 50 && y < 90;
+                                                             return is_known ? plane(column, row) : kNoHeight;
+                                                           }),
+                                                 window);
+  int known = 0;
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    if (std::isnan(part[i].east)) continue;
+    ++known;
+    ASSERT_NEAR(part[i].east, whole[i].east, 1e-9) << i;
+    ASSERT_NEAR(part[i].north, whole[i].north, 1e-9) << i;
+  }
+  EXPECT_EQ(known, 159 * 39);
+}
+
 TEST(Relief, StepsAreTheNearestHalfDegrees) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> angle(0, 90);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/engine/dem/dem_fixture.h"
+#include "tiler/surface/drawn_tiles.h"
 #include "tiler/tile_pipeline.h"
 
 namespace terrace::tiler {
