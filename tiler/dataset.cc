@@ -1,6 +1,10 @@
 #include "tiler/dataset.h"
 
+#include <fmt/format.h>
+#include <xxhash.h>
+
 #include "engine/common/content_hash.h"
+#include "tiler/encoder_version.h"
 #include "tiler/map/contour_tile.h"
 #include "tiler/map/map_heights.h"
 #include "tiler/map/relief.h"
@@ -22,6 +26,20 @@ std::uint64_t Mixed(std::uint64_t edits, std::uint64_t deeper) {
 ErrorScale Dataset::error_scale() const {
   if (model) return {error_fraction, model->max_source_level()};
   return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
+}
+
+std::uint64_t GenerationOf(const Dataset& dataset, std::string_view version, std::uint64_t heights) {
+  const WaterOptions& water = dataset.water;
+  const ImageryOptions& imagery = dataset.imagery;
+  const std::string text = fmt::format(
+      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, EncoderText(), heights,
+      dataset.error_fraction, static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
+      static_cast<int>(dataset.glb.compression), dataset.glb.draco.speed, dataset.glb.draco.normal_bits,
+      water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
+      dataset.metadata_availability, imagery.image ? imagery.image->fingerprint() : 0,
+      static_cast<int>(imagery.texture), imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution,
+      dataset.attribution.size(), dataset.attribution);
+  return XXH3_64bits(text.data(), text.size());
 }
 
 std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request) {

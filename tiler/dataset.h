@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "engine/dem/elevation_model.h"
@@ -58,17 +59,22 @@ struct Dataset {
   WaterOptions water;
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
-  // Identifies the dataset and its contents in caches: a hash of contents, of all options that change bytes, and of the
-  // encoders. 0: TilePipeline sets the dataset's number in its copy, datasets(). That suffices if no other pipeline
-  // uses its RefinementCache, its TileTiers or a store of theirs, at the same time or later.
+  // Identifies the dataset and its contents in caches: GenerationOf with ElevationModel::fingerprint. 0: TilePipeline
+  // sets the dataset's number in its copy, datasets(). That suffices if no other pipeline uses its RefinementCache, its
+  // TileTiers or a store of theirs, at the same time or later.
   std::uint64_t generation = 0;
-  // The same without edits; 0: there are none. Caches are keyed by cache_generation() and by a hash of the edits, so
-  // that tiles that no edit touches stay: TileEditsHash for tiles, ElevationModel::EditsHash for refinements.
+  // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
+  // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,
+  // ElevationModel::EditsHash for refinements.
   std::uint64_t unedited_generation = 0;
   std::uint64_t cache_generation() const { return unedited_generation != 0 ? unedited_generation : generation; }
   ErrorScale error_scale() const;  // without a model, its `default_steps` is a view into `baked`
-  std::uint64_t options_hash = 0;  // of everything in `generation` that ElevationModel::fingerprint leaves out
+  std::uint64_t options_hash = 0;  // GenerationOf with 0; bakes use it
 };
+
+// A hash of `heights`, of all options of the dataset that change bytes, of the encoders with their libraries, and of
+// `version`, the program's own text. Equal for copies of the files.
+std::uint64_t GenerationOf(const Dataset& dataset, std::string_view version, std::uint64_t heights);
 
 // A hash of the edits that the tile of a request depends on; 0: none.
 std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request);

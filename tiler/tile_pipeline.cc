@@ -14,6 +14,8 @@
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/sample_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
+#include "tiler/store/refinement_cache.h"
+#include "tiler/surface/drawn_mesh_cache.h"
 #include "tiler/surface/drawn_points.h"
 #include "tiler/surface/drawn_sight.h"
 #include "tiler/surface/quantized_mesh_triangles.h"
@@ -70,22 +72,12 @@ HasTile TilesOf(const Dataset& dataset) {
   return [&available = AvailableIn(dataset)](const geo::TileKey& key) { return geo::IsAvailable(available, key); };
 }
 
-}  // namespace
-
-TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
-    : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
-
-TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
-    : datasets_(Numbered(std::move(datasets))),
-      drawn_(std::make_unique<DrawnMeshCache>(kDrawnMeshBytes)),
-      refinements_(std::move(refinements)) {}
-
 // Returns the cached refinement if it reaches the error. Else continues it, or reads heights and refines them. Caches
 // the result if it reaches the error.
-Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::TileKey& key, double error_m,
-                                            EncodedTile& encoded, const std::stop_token& stop) const {
+Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& dataset, const geo::TileKey& key,
+                              double error_m, EncodedTile& encoded, const std::stop_token& stop) {
   const RefinedTileKey cache_key{dataset.cache_generation(), key, dataset.model->EditsHash(key)};
-  const RefinedTilePtr known = refinements_->Find(cache_key);
+  const RefinedTilePtr known = refinements.Find(cache_key);
   encoded.refinement_use = known ? RefinementUse::kContinued : RefinementUse::kMade;
   if (known && known->error_m <= error_m) {
     encoded.refinement_use = RefinementUse::kReplayed;
@@ -116,12 +108,66 @@ Result<RefinedTilePtr> TilePipeline::Refine(const Dataset& dataset, const geo::T
   encoded.times.refine = MicrosecondsSince(start);
   // A refinement that ended at the format's limit of vertices does not reach the error. Another build may have stored a
   // longer one meanwhile.
-  const RefinedTilePtr other = refinements_->FindInMemory(cache_key);
+  const RefinedTilePtr other = refinements.FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
-    refinements_->Insert(cache_key, refined);
+    refinements.Insert(cache_key, refined);
   }
   return RefinedTilePtr(std::move(refined));
 }
+
+// The triangles that a client decodes from the tile of the request, which is quantized-mesh or GLB.
+Result<DrawnTriangles> TrianglesOf(RefinementCache& refinements, const Dataset& dataset, const TileRequest& request,
+                                   const std::stop_token& stop) {
+  if (!dataset.model) {
+    const Result<EncodedTile> baked = TakeBaked(dataset, request);
+    if (!baked) return tl::unexpected(baked.error());
+    return DecodeTriangles(baked->bytes, request.key);
+  }
+  const double error_m =
+      SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+  EncodedTile encoded;
+  Result<RefinedTilePtr> refined = Refine(refinements, dataset, request.key, error_m, encoded, stop);
+  if (!refined) return tl::unexpected(std::move(refined).error());
+  const EncoderInput input{dataset, request, refined->get(), error_m};
+  return request.format == TileFormat::kGlb ? GlbTriangles(input, stop) : QuantizedMeshTriangles(input, stop);
+}
+
+// Returns a function that finds the meshes of a surface, or makes them. It must not outlive the arguments.
+FindMesh MeshFinder(DrawnMeshCache& drawn, RefinementCache& refinements, const Dataset& dataset,
+                    const DrawnSurface& surface, const std::stop_token& stop) {
+  return [&drawn, &refinements, &dataset, &surface,
+          &stop](const geo::TileKey& key) -> Result<std::shared_ptr<const DrawnMesh>> {
+    TileRequest request;
+    request.key = key;
+    request.error_step = ErrorStep(surface.requested, key.level, dataset.error_scale());
+    request.format = surface.format;
+    request.compression = surface.compression;
+    const bool is_glb = surface.format == TileFormat::kGlb;
+    const DrawnMeshKey cache_key{dataset.generation, key, request.error_step, is_glb,
+                                 is_glb ? proto::WidthOf(surface.compression) : proto::PositionWidth::kFloat};
+    if (std::shared_ptr<const DrawnMesh> known = drawn.Find(cache_key)) return known;
+    Result<DrawnTriangles> triangles = TrianglesOf(refinements, dataset, request, stop);
+    if (!triangles) return tl::unexpected(std::move(triangles).error());
+    auto mesh = std::make_shared<const DrawnMesh>(key, *std::move(triangles));
+    drawn.Insert(cache_key, mesh);
+    return mesh;
+  };
+}
+
+}  // namespace
+
+TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::size_t refinement_cache_bytes)
+    : TilePipeline(std::move(datasets), std::make_shared<RefinementCache>(refinement_cache_bytes)) {}
+
+TilePipeline::TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements)
+    : datasets_(Numbered(std::move(datasets))),
+      drawn_(std::make_unique<DrawnMeshCache>(kDrawnMeshBytes)),
+      refinements_(std::move(refinements)) {}
+
+TilePipeline::~TilePipeline() = default;
+
+ByteCacheStats TilePipeline::drawn_meshes() const { return drawn_->stats(); }
+ByteCacheStats TilePipeline::refinements() const { return refinements_->stats(); }
 
 Result<const Dataset*> TilePipeline::Find(std::uint32_t dataset) const {
   if (dataset >= datasets_.size()) return MakeError(ErrorCode::kNotFound, "there is no dataset {}", dataset);
@@ -151,7 +197,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
     error_m = SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
-    Result<RefinedTilePtr> made = Refine(dataset, request.key, error_m, encoded, stop);
+    Result<RefinedTilePtr> made = Refine(*refinements_, dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);
   }
@@ -186,48 +232,6 @@ Result<std::vector<std::array<float, 3>>> TilePipeline::ReadNormals(std::uint32_
   return SourceNormals(**model, points, stop);
 }
 
-Result<std::shared_ptr<const DrawnMesh>> TilePipeline::MeshOf(const Dataset& dataset, const TileRequest& request,
-                                                              const std::stop_token& stop) const {
-  const bool is_glb = request.format == TileFormat::kGlb;
-  const DrawnMeshKey cache_key{dataset.generation, request.key, request.error_step, is_glb,
-                               is_glb ? proto::WidthOf(request.compression) : proto::PositionWidth::kFloat};
-  if (std::shared_ptr<const DrawnMesh> known = drawn_->Find(cache_key)) return known;
-  if (!dataset.model) {
-    const Result<EncodedTile> baked = TakeBaked(dataset, request);
-    if (!baked) return tl::unexpected(baked.error());
-    Result<DrawnTriangles> decoded = DecodeTriangles(baked->bytes, request.key);
-    if (!decoded) return tl::unexpected(std::move(decoded).error());
-    auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(decoded));
-    drawn_->Insert(cache_key, mesh);
-    return std::shared_ptr<const DrawnMesh>(std::move(mesh));
-  }
-  const double error_m =
-      SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
-  EncodedTile encoded;
-  Result<RefinedTilePtr> refined = Refine(dataset, request.key, error_m, encoded, stop);
-  if (!refined) return tl::unexpected(std::move(refined).error());
-  const EncoderInput input{dataset, request, refined->get(), error_m};
-  Result<DrawnTriangles> drawn = is_glb ? GlbTriangles(input, stop) : QuantizedMeshTriangles(input, stop);
-  if (!drawn) return tl::unexpected(std::move(drawn).error());
-  auto mesh = std::make_shared<const DrawnMesh>(request.key, *std::move(drawn));
-  drawn_->Insert(cache_key, mesh);
-  return std::shared_ptr<const DrawnMesh>(std::move(mesh));
-}
-
-FindMesh TilePipeline::MeshFinder(std::uint32_t dataset, const DrawnSurface& surface,
-                                  const std::stop_token& stop) const {
-  return [this, dataset, surface, stop](const geo::TileKey& key) {
-    const Dataset& of = datasets_[dataset];
-    TileRequest request;
-    request.dataset = dataset;
-    request.key = key;
-    request.error_step = ErrorStep(surface.requested, key.level, of.error_scale());
-    request.format = surface.format;
-    request.compression = surface.compression;
-    return MeshOf(of, request, stop);
-  };
-}
-
 Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                    std::span<const dem::GeoPosition> points, bool normals,
                                                    std::stop_token stop) const {
@@ -241,7 +245,8 @@ Result<PointHeights> TilePipeline::ReadDrawnPoints(std::uint32_t dataset, const 
   for (dem::GeoPosition& point : wrapped) {
     if (std::abs(point.longitude) > 180) point.longitude = std::remainder(point.longitude, 360);
   }
-  return tiler::ReadDrawnPoints(TilesOf(of), *level, wrapped, normals, MeshFinder(dataset, surface, stop), stop);
+  return tiler::ReadDrawnPoints(TilesOf(of), *level, wrapped, normals,
+                                MeshFinder(*drawn_, *refinements_, of, surface, stop), stop);
 }
 
 Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t dataset,
@@ -264,7 +269,8 @@ Result<std::vector<dem::SightAnswer>> TilePipeline::LookAlong(std::uint32_t data
   if (!of.model) {
     if (const Result<void> bounded = CheckSamplesAlong(*level, rays); !bounded) return tl::unexpected(bounded.error());
   }
-  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshFinder(dataset, *surface, stop), stop);
+  return LookAlongDrawn(TilesOf(of), *level, rays, options, MeshFinder(*drawn_, *refinements_, of, *surface, stop),
+                        stop);
 }
 
 Result<AreaPlan> TilePipeline::PlanArea(std::uint32_t dataset, const AreaRequest& area, std::size_t max_samples) const {

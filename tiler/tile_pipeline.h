@@ -14,31 +14,33 @@
 #include "engine/dem/elevation_model.h"
 #include "tiler/area/area_mesh.h"
 #include "tiler/dataset.h"
-#include "tiler/store/refined_tile.h"
-#include "tiler/store/refinement_cache.h"
-#include "tiler/surface/drawn_mesh_cache.h"
+#include "tiler/store/byte_cache.h"
 #include "tiler/surface/drawn_surface.h"
-#include "tiler/surface/drawn_tiles.h"
 #include "tiler/surface/point_heights.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
 
+class DrawnMeshCache;
+class RefinementCache;
+
 // Thread-safe: all functions may run on any number of threads at once. `dataset` is an index into datasets(). Functions
 // that compute results are virtual, so that tests can replace them.
 //
-// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`. Another format, coding or
-// larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion. Formats without
-// a mesh do not use the cache. The bytes of a tile do not depend on it.
+// Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. Another format,
+// coding or larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion.
+// Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of ReadDrawnPoints and
+// LookAlong take up to 32 MiB besides. Functions that compute results may throw std::bad_alloc.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
                         std::size_t refinement_cache_bytes = kDefaultRefinementCacheBytes);
-  // Uses a cache that other pipelines may share, and that may outlive this one.
+  // Uses a cache that other pipelines may share, and that may outlive this one (tiler/store/refinement_cache.h, which
+  // is not installed).
   TilePipeline(std::vector<Dataset> datasets, std::shared_ptr<RefinementCache> refinements);
   static constexpr std::size_t kDefaultRefinementCacheBytes = std::size_t{128} << 20;
-  virtual ~TilePipeline() = default;
+  virtual ~TilePipeline();
 
   const std::vector<Dataset>& datasets() const { return datasets_; }
 
@@ -62,16 +64,16 @@ class TilePipeline {
                                                                 std::stop_token stop) const;
 
   // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. `normals`:
-  // also normals. Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in too
-  // many tiles. Other errors: those of Build.
+  // also normals. Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in
+  // more than 64 tiles. Other errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
 
   // Lines of sight over the sources' surface or a drawn one; one answer for each ray. Preconditions: those of
-  // ElevationModel::LookAlong. kInvalidArgument: together the rays cross too many samples; or, over the sources'
-  // surface, an edit changes the ground below a ray or near it (ElevationModel::LookAlong). Other errors: those of
-  // ReadPoints and ReadDrawnPoints.
+  // ElevationModel::LookAlong. kInvalidArgument: together the rays cross more than 2 x 10^8 samples; over
+  // the sources' surface, an edit changes the ground below a ray or near it (ElevationModel::LookAlong); over a drawn
+  // one, they cross more than 64 tiles. Other errors: those of ReadPoints and ReadDrawnPoints.
   virtual Result<std::vector<dem::SightAnswer>> LookAlong(std::uint32_t dataset,
                                                           const std::optional<DrawnSurface>& surface,
                                                           std::span<const dem::SightRay> rays,
@@ -82,21 +84,13 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
-  ByteCacheStats drawn_meshes() const { return drawn_->stats(); }
-  ByteCacheStats refinements() const { return refinements_->stats(); }
+  ByteCacheStats drawn_meshes() const;
+  ByteCacheStats refinements() const;
 
  private:
   // kNotFound: there is no such dataset, or it has no sources.
   Result<const Dataset*> Find(std::uint32_t dataset) const;
   Result<const dem::ElevationModel*> FindModel(std::uint32_t dataset) const;
-
-  Result<RefinedTilePtr> Refine(const Dataset& dataset, const geo::TileKey& key, double error_m, EncodedTile& encoded,
-                                const std::stop_token& stop) const;
-
-  // Returns a function that calls MeshOf for tiles of this surface.
-  FindMesh MeshFinder(std::uint32_t dataset, const DrawnSurface& surface, const std::stop_token& stop) const;
-  Result<std::shared_ptr<const DrawnMesh>> MeshOf(const Dataset& dataset, const TileRequest& request,
-                                                  const std::stop_token& stop) const;
 
   const std::vector<Dataset> datasets_;
   const std::unique_ptr<DrawnMeshCache> drawn_;

@@ -40,7 +40,11 @@ enum class HoleFill : std::uint8_t {
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  kSource,       // the source's own
+  // The source's own; the floor has that of the last source that refers to a geoid. Heights that an edit states are
+  // returned unchanged if all sources within its reach, and the floor, have the datum that they are stated in; with
+  // kOrthometric, whatever the floor has. Otherwise they are converted from the ellipsoid and back, which may change
+  // them by millimetres.
+  kSource,
 };
 
 class AveragesBudget;
@@ -72,7 +76,8 @@ struct DemOptions {
   // equal shares. The share falls if a raster has to be read again. May be empty.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // makes Open return kCancelled
-  // Called for every file that cannot be opened; Open checks all files before it fails. Empty: Open fails at the first.
+  // Called for every file that cannot be opened; Open checks all files before it returns the first of these errors.
+  // Empty: Open fails at the first.
   std::function<void(const Error&)> fault = {};
 };
 
@@ -139,7 +144,7 @@ struct RasterInfo {
   std::string pixel_unit;                    // "degree", "metre"
   double spacing_m = 0;                      // along the finer axis at the centre, metres on the ground
   GeoBounds bounds;                          // of the pixels' area
-  HeightRange heights;                       // of all valid samples, in the source's datum
+  HeightRange heights;                       // of all valid samples, in the source's datum; 0 if all are voids
   std::string heights_doubted;               // why they may not be metres, with the remedy; empty: plausible
   HeightRange ellipsoidal;                   // contains all ellipsoidal heights
   std::uint64_t valid_samples = 0, void_samples = 0;
@@ -192,6 +197,7 @@ struct TileHeights {
   // Set by Read, metres: an upper bound of the vertical distance between the surface that is bilinear between the
   // tile's samples, without the halo, and every valid full-resolution sample of the sources. Where sources are blended,
   // it bounds the distance from the blended heights as well. Where edits apply, the samples count after the same edits.
+  // Infinite: no bound is known.
   double source_error_m = std::numeric_limits<double>::infinity();
 
   // i, j in -1 .. cells + 1: columns from the west, rows from the SOUTH.

@@ -3,7 +3,7 @@
 // errors. The file that calls a library catches its exceptions.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <string>
 #include <string_view>

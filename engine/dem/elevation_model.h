@@ -28,15 +28,16 @@ namespace terrace::dem {
 class ElevationModel {
  public:
   // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
-  // raster; a raster that may have undeclared voids takes up to four passes. Errors name the file, the fault and the
-  // remedy. Relative paths are resolved at each use: the working directory must not change. The first call sets up GDAL
-  // for the whole process (docs/embedding.md).
+  // raster; a raster that may have undeclared voids takes up to four passes. Relative paths are resolved at each use:
+  // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
+  // Errors name the file, the fault and the remedy. kNotFound: there is no such file, no raster in a folder, or no
+  // height in a raster. kInvalidArgument: an option, a reference system, a raster or an edit that cannot be used.
+  // kUnavailable: a file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. kCancelled: the cache lacks the statistics of a raster, or
-  // DemOptions::stop was requested. Other files are checked all the same: what fails is reported to DemOptions::fault
-  // or, without it, returned instead.
+  // are opened as by Open, which may take long. Errors: those of Open. If no file fails, but the cache lacks the
+  // statistics of a raster: kCancelled.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -66,27 +67,24 @@ class ElevationModel {
   // kUnavailable: a source cannot be read now. kChanged: a file was replaced. kCancelled: stopped.
   Result<TileHeights> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
-  // The same nodes, with heights in each source's own vertical datum. Use it to compare heights with a sea level. The
-  // floor is converted to the datum of the last source that refers to a geoid. Heights that an edit states are returned
-  // unchanged if all sources within its reach, and the floor, have the datum that they are stated in. Otherwise they
-  // are converted from the ellipsoid, which may change them by millimetres. The same holds for ReadKnownMercator and
-  // ReadPoints with HeightDatum::kSource. ReadPoints with kOrthometric returns them
-  // unchanged if all sources within reach have that datum, whatever the floor has.
-  // Precondition: a valid key.
+  // The same nodes, with heights in each source's own vertical datum (HeightDatum::kSource). Use it to compare heights
+  // with a sea level. `source_error_m` stays infinite. Precondition: a valid key. Errors: those of Read.
   Result<TileHeights> ReadInSourceDatum(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // Heights at nodes of a level's lattice, row by row from the south-western node. Bit-equal to the heights of tiles.
-  // Levels 0 .. geo::kMaxLevel. Columns wrap at 360 degrees. Precondition: rows lie within the lattice.
+  // Levels 0 .. geo::kMaxLevel. Columns wrap at 360 degrees. Preconditions: the window is not empty, and its rows lie
+  // within the lattice. Errors: those of Read.
   Result<std::vector<float>> ReadNodes(int level, const NodeWindow& window, std::stop_token stop = {}) const;
 
   // Heights at pixel centres of a Web Mercator grid, row by row from the north-western pixel. The rules of tiles apply:
   // samples are averaged to the grid's resolution, voids are filled as DemOptions says, and the floor is used
   // elsewhere. A height depends on depth and pixel alone. The grid has 256 << depth pixels around the Earth; depth is
-  // 0 .. geo::kMaxLevel. info().max_mercator_depth is the first as fine as the finest source.
+  // 0 .. geo::kMaxLevel. info().max_mercator_depth is the first as fine as the finest source. Columns wrap at 360
+  // degrees. Preconditions: the window is not empty, and its rows lie within the grid. Errors: those of Read.
   Result<std::vector<float>> ReadMercator(int depth, const NodeWindow& window, std::stop_token stop = {}) const;
 
-  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. Precondition:
-  // `datum` is kEllipsoid, or kSource for what a map calls elevation.
+  // The same pixels for maps: NaN instead of the floor where neither a source nor an edit has a height. Preconditions:
+  // as above; `datum` is kEllipsoid, or kSource for what a map calls elevation. Errors: those of Read.
   Result<std::vector<float>> ReadKnownMercator(int depth, const NodeWindow& window, HeightDatum datum,
                                                std::stop_token stop = {}) const;
 
@@ -95,7 +93,7 @@ class ElevationModel {
   // `filled` has one element for each point, or none; an element is 1 if the sample nearest to the point is void in the
   // source that gives the height, and 0 elsewhere. Edits apply: NaN in holes that they cut. Outside the sources,
   // heights that they set count if `datum` is kEllipsoid; in other datums they are NaN. A height does not depend on the
-  // other points. Precondition: finite longitudes, latitudes in -90 .. 90.
+  // other points. Preconditions: finite longitudes, latitudes in -90 .. 90. Errors: those of Read.
   Result<std::vector<float>> ReadPoints(std::span<const GeoPosition> points,
                                         HeightDatum datum = HeightDatum::kEllipsoid, std::stop_token stop = {},
                                         std::span<std::uint8_t> filled = {}) const;

@@ -63,8 +63,8 @@ class Imagery {
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
   // Pictures for maps, by the rules of Read: `side` x `side` pixels of a Web Mercator grid, the first in `column` and
-  // `row`, or of a tile in the scheme of terrain tiles. Transparent where the image has no colour. Preconditions: the
-  // pixels lie in the grid; a valid key; a side as above. Errors: those of Read.
+  // `row`, or of a tile in the scheme of terrain tiles. Transparent where the image has no colour. Preconditions: a
+  // depth of 0 .. geo::kMaxLevel; the pixels lie in the grid; a valid key; a side as above. Errors: those of Read.
   Result<MapPicture> ReadMercator(int depth, std::int64_t column, std::int64_t row, int side,
                                   std::stop_token stop = {}) const;
   Result<MapPicture> ReadGeodetic(const geo::TileKey& key, int side, std::stop_token stop = {}) const;

@@ -13,6 +13,8 @@
 #include <optional>
 #include <utility>
 
+#include "engine/common/open_file.h"
+
 namespace terrace::dem {
 namespace {
 
@@ -40,7 +42,7 @@ struct Folder {
 };
 
 struct Found {
-  FileIdentity identity;
+  std::uint64_t device = 0, inode = 0;
   std::uint64_t bytes = 0;
   std::int64_t modified_ns = 0;
 };
@@ -55,8 +57,7 @@ std::optional<Found> LookAt(int folder, const char* name) {
     return std::nullopt;
   }
   constexpr std::int64_t kNanoseconds = 1'000'000'000;
-  return Found{{status.st_dev, status.st_ino},
-               static_cast<std::uint64_t>(status.st_size),
+  return Found{status.st_dev, status.st_ino, static_cast<std::uint64_t>(status.st_size),
                status.st_mtim.tv_sec * kNanoseconds + status.st_mtim.tv_nsec};
 }
 
@@ -115,7 +116,8 @@ void CacheFolder::Scan() {
     if (!found) continue;
     bytes_ += found->bytes;
     if (IsInUse(name)) continue;
-    oldest_first_.emplace(found->modified_ns, File{name, found->identity, found->bytes, found->modified_ns});
+    oldest_first_.emplace(found->modified_ns,
+                          File{name, found->device, found->inode, found->bytes, found->modified_ns});
   }
 }
 
@@ -130,7 +132,10 @@ void CacheFolder::Evict(std::uint64_t bytes) {
     const OpenFile opened(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
     const bool is_written = opened.is_open() && ::flock(opened.get(), LOCK_EX | LOCK_NB) != 0;
     const auto now = LookAt(AT_FDCWD, path.c_str());
-    if (!now || is_written || now->identity != file.identity || now->modified_ns != file.modified_ns) continue;
+    if (!now || is_written || now->device != file.device || now->inode != file.inode ||
+        now->modified_ns != file.modified_ns) {
+      continue;
+    }
     if (::unlink(path.c_str()) != 0) continue;
     spdlog::debug("cache_dir {}: {} was not used for longest and is removed", path_, file.name);
     gone += file.bytes;

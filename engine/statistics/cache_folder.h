@@ -1,4 +1,9 @@
 // A folder of files with statistics and averages of rasters. A budget limits their total size.
+//
+// A program passes it to models as RasterCache::folder, and calls Trim after it has opened them. The folder is created
+// when the first file is written. If that fails, models open nevertheless, and problem() has the reason. All other
+// functions are for engine/statistics.
+//
 // Several processes may share it. Before a file grows, the least recently used files are removed as far as needed to
 // keep an eighth of the budget free; only files in use may take this eighth. Loading a file counts as use, and so do
 // reads of averages, at most once an hour; the time of the last use is the file's modification time. Files in use by
@@ -16,7 +21,6 @@
 #include <string>
 #include <string_view>
 
-#include "engine/common/open_file.h"
 #include "engine/core/result.h"
 
 namespace terrace::dem {
@@ -67,7 +71,7 @@ class CacheFolder {
  private:
   struct File {
     std::string name;  // in the folder
-    FileIdentity identity;
+    std::uint64_t device = 0, inode = 0;
     std::uint64_t bytes = 0;
     std::int64_t modified_ns = 0;
   };

@@ -4,6 +4,7 @@
 //
 // Tiles are those of EPSG:4326 in the TMS scheme: two at level 0, y from the south. The engine's messages about the
 // model go to spdlog's default logger.
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -15,7 +16,7 @@
 int main(int count, char** arguments) {
   using namespace terrace;
   const double error_m = count == 7 ? std::atof(arguments[5]) : 0;
-  if (!(error_m > 0)) {
+  if (!std::isfinite(error_m) || error_m <= 0) {
     std::fputs("usage: embed DEM LEVEL X Y ERROR_M OUT.terrain\n", stderr);
     return 2;
   }

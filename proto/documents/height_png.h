@@ -7,17 +7,9 @@
 #include <span>
 #include <string>
 
-#include "engine/core/names.h"
+#include "proto/documents/picture_types.h"
 
 namespace terrace::proto {
-
-enum class HeightEncoding : std::uint8_t {
-  kMapbox,    // -10000 + (R * 65536 + G * 256 + B) * 0.1 metres
-  kTerrarium  // R * 256 + G + B / 256 - 32768 metres
-};
-
-inline constexpr Names<HeightEncoding, 2> kHeightEncodingNames = {
-    {{"mapbox", HeightEncoding::kMapbox}, {"terrarium", HeightEncoding::kTerrarium}}};
 
 // The code nearest to a height, clamped to the first and the last code. Precondition: finite.
 std::uint32_t EncodeHeight(double metres, HeightEncoding encoding);

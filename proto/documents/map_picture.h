@@ -5,11 +5,10 @@
 #include <string>
 
 #include "engine/core/result.h"
+#include "proto/documents/picture_types.h"
 #include "proto/documents/png.h"
 
 namespace terrace::proto {
-
-enum class PictureFormat : std::uint8_t { kPng, kWebp, kJpeg };
 
 // "image/png", "image/webp", "image/jpeg".
 const char* MediaTypeOf(PictureFormat format);

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "engine/geo/geo_bounds.h"
-#include "proto/documents/height_png.h"
+#include "proto/documents/picture_types.h"
 
 namespace terrace::proto {
 

@@ -1,4 +1,4 @@
-// Enumerations that describe GLB tiles.
+// Enumerations that describe GLB tiles and mesh files.
 #pragma once
 
 #include <cstdint>
@@ -39,5 +39,8 @@ enum class TextureFormat : std::uint8_t {
 
 inline constexpr Names<TextureFormat, 3> kTextureFormatNames = {
     {{"jpeg", TextureFormat::kJpeg}, {"webp", TextureFormat::kWebp}, {"none", TextureFormat::kNone}}};
+
+// Wavefront OBJ, PLY and binary glTF (mesh_file.h).
+enum class MeshFileFormat : std::uint8_t { kObj, kPly, kGlb };
 
 }  // namespace terrace::proto

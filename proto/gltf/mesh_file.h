@@ -22,10 +22,9 @@
 
 #include "engine/core/color.h"
 #include "engine/core/result.h"
+#include "proto/gltf/gltf_types.h"
 
 namespace terrace::proto {
-
-enum class MeshFileFormat { kObj, kPly, kGlb };
 
 // Selects the format by the extension of a file name, ignoring case. kInvalidArgument: unknown extension.
 Result<MeshFileFormat> MeshFileFormatOf(std::string_view file_name);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "proto/documents/map_picture.h"
 #include "tiler/map/contour_tile.h"
 #include "tiler/tile/tile_bounds.h"
 

@@ -19,11 +19,11 @@ struct TileFormatRow;  // tile_formats.h
 struct Operation;      // server/openapi/operation.h
 
 struct Route {
-  const RouteRow* row = nullptr;          // null: not a URL of the server
-  std::string dataset;                    // the first segment of the URL, decoded, if it is a dataset
-  geo::TileKey key;                       // of tiles and subtrees: valid in the tiling scheme of the format
-  geo::TileKey root;                      // of subtrees: root of the URL's tree, an ancestor of `key`
-  int subtree_levels = 0;                 // of subtrees: 1 .. proto::kMaxServedSubtreeLevels
+  const RouteRow* row = nullptr;  // null: not a URL of the server
+  std::string dataset;            // the first segment of the URL, decoded, if it is a dataset
+  geo::TileKey key;               // of tiles and subtrees: valid in the tiling scheme of the format
+  geo::TileKey root;              // of subtrees and implicit tiles: root of the URL's tree, an ancestor of `key`
+  int subtree_levels = 0;         // of subtrees: 1 .. proto::kMaxServedSubtreeLevels
   const TileFormatRow* format = nullptr;  // of tiles: by the suffix
   std::string file;                       // of the viewer: relative to its folder, decoded: "index.html" for "/"
   std::string query;                      // without '?', not decoded
@@ -42,7 +42,7 @@ struct RouteRow {
   std::string_view label;    // in logs and metrics
   std::string_view pattern;  // "/{dataset}/layer.json": '{' in a segment matches any; "..." at the end: one or more
   Answer (*handle)(const HandlerState& state, const RequestContext& context);
-  // What /openapi.json says about the URL; of tiles see TileFormatRow::operation. Null: a test fails.
+  // What /openapi.json says about the URL. Null if the pattern ends in {suffix}: TileFormatRow::operation has it.
   const Operation* operation = nullptr;
   // Reads what the URL names besides its dataset. Returns false if the URL names nothing. Null: nothing to read.
   bool (*read)(const Segments& segments, Route& route) = nullptr;

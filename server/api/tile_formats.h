@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "engine/core/result.h"
-#include "proto/documents/map_picture.h"
+#include "proto/documents/picture_types.h"
 #include "proto/media_type.h"
 #include "server/api/request_context.h"
 #include "server/query/tile_query.h"

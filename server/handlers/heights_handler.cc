@@ -21,6 +21,7 @@
 #include "server/handlers/handlers.h"
 #include "server/handlers/point_reply.h"
 #include "server/http/http_error.h"
+#include "tiler/surface/drawn_tiles.h"
 #include "tiler/tile/strong_etag.h"
 
 namespace terrace::server {

@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "proto/documents/map_picture.h"
 #include "proto/documents/tile_json.h"
 #include "server/api/caching.h"
 #include "server/api/map_formats.h"

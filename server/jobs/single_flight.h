@@ -51,11 +51,11 @@ class SingleFlight {
   SingleFlight(const SingleFlight&) = delete;
   SingleFlight& operator=(const SingleFlight&) = delete;
 
-  // Waits for the flight of `key`. If there is none, starts one, which runs `build` with the given `terms`. `name` is
-  // for messages. An exception of `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the
-  // flight's job. kCancelled: the deadline passed, the awaiting coroutine was cancelled, or the pool
-  // was cancelled before `build` began. kUnavailable: the pool was cancelled before this call. Otherwise the result of
-  // `build`.
+  // Waits for the flight of `key`, or starts one. Each client that joins queues its own `build` with its `terms`, and
+  // the first that a worker takes runs: builds of one key must be equivalent. `name` is for messages. An exception of
+  // `build` counts as kUnavailable. kOverloaded: the pool refused or dropped the flight's job. kCancelled: the deadline
+  // passed, the awaiting coroutine was cancelled, or the pool was cancelled before `build` began. kUnavailable: the
+  // pool was cancelled before this call. Otherwise the result of `build`.
   asio::awaitable<FlightResult> Join(Key key, std::string name, Build build, JobTerms terms);
 
   std::size_t in_flight() const {

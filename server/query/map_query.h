@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "engine/core/result.h"
-#include "proto/documents/map_picture.h"
+#include "proto/documents/picture_types.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::server {

@@ -10,6 +10,7 @@
 
 #include "config/config.h"
 #include "engine/core/result.h"
+#include "tiler/store/refinement_cache.h"
 #include "tiler/store/tile_store.h"
 
 namespace terrace::server {

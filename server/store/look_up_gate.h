@@ -28,7 +28,7 @@ class LookUpGate {
     shares_[key_class].store(share - share / kMemory + (found ? kOne / kMemory : 0), std::memory_order_relaxed);
   }
 
-  static constexpr std::size_t kClasses = 256;
+  static constexpr std::size_t kClasses = 512;
   static constexpr std::uint32_t kSample = 16;
 
  private:

@@ -6,7 +6,7 @@
 
 #include "engine/core/result.h"
 #include "engine/dem/elevation_model.h"
-#include "proto/gltf/mesh_file.h"
+#include "proto/gltf/gltf_types.h"
 #include "tiler/tile/encoded_tile.h"
 
 namespace terrace::tiler {
@@ -44,8 +44,9 @@ Result<AreaPlan> PlanArea(const dem::ElevationModel& model, double error_fractio
 
 // Reads, meshes, measures and encodes. EncodedTile::max_error_m is the largest vertical distance between a sample and
 // the flat triangles of the file. They are flat in the file's coordinates: in space, or for kGeographic in longitude,
-// latitude and height. Rounding to 32 bits in a GLB is not included. Errors: those of PlanArea and ElevationModel;
-// kCancelled: stopped.
+// latitude and height. Rounding to 32 bits in a GLB is not included. Precondition: `plan` is PlanArea's for this model
+// and area. kInvalidArgument: all of the area lies in a hole that edits cut, or the mesh exceeds the limits of the file
+// format. Other errors: those of ElevationModel::ReadNodes.
 Result<EncodedTile> BuildAreaMesh(const dem::ElevationModel& model, const AreaPlan& plan, const AreaRequest& area,
                                   std::stop_token stop);
 

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "proto/documents/map_picture.h"
+#include "proto/documents/picture_types.h"
 
 namespace terrace::tiler {
 
@@ -16,7 +16,8 @@ struct MapParameters {
   std::uint8_t altitude_deg = 45;           // of the light above the horizon, 0 .. 90
   std::uint16_t z_factor_hundredths = 100;  // heights are multiplied by it, 1 .. 10000
   SlopeStyle slope_style = SlopeStyle::kColors;
-  std::uint32_t interval_cm = 0;  // of contours; not 0 in their requests
+  // Of contours: not 0 in their requests. Multiplied by 5 until the tile has few enough points.
+  std::uint32_t interval_cm = 0;
 
   friend bool operator==(const MapParameters&, const MapParameters&) = default;
 };

@@ -8,7 +8,7 @@
 #include "engine/dem/elevation_model.h"
 #include "engine/geo/tile_key.h"
 #include "engine/tin/refinement.h"
-#include "tiler/store/byte_cache.h"
+#include "tiler/store/tile_selection.h"
 #include "tiler/tile/tile_request.h"
 
 namespace terrace::tiler {
@@ -40,5 +40,9 @@ struct RefinedTileKeyHash {
     return TileRequestHash{}(request) ^ static_cast<std::size_t>(key.generation ^ key.edits);
   }
 };
+
+inline bool IsSelected(const TileSelection& selection, const RefinedTileKey& key) {
+  return selection.Contains(key.generation, key.key, /*is_mercator=*/false);
+}
 
 }  // namespace terrace::tiler

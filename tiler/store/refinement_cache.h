@@ -8,9 +8,12 @@
 #include <utility>
 #include <vector>
 
+#include "tiler/store/refined_tile.h"
 #include "tiler/store/tile_store.h"
 
 namespace terrace::tiler {
+
+using RefinementStore = Store<RefinedTileKey, RefinedTile>;
 
 class RefinementCache {
  public:

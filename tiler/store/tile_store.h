@@ -1,7 +1,6 @@
-// The interface of a cache tier for tiles and refinements. To add a tier, write a class that implements it, and pass an
-// object to TileTiers, or to RefinementCache if it keeps refinements. The server passes those in
-// ServerOptions::tile_stores (server/server.h) to TileTiers; server/cli/serve passes the store of refinements to
-// RefinementCache.
+// The interface of a cache tier. To add a tier, write a class that implements TileStore, and pass an object to
+// TileTiers. The server passes those in ServerOptions::tile_stores (server/server.h). A tier for refinements implements
+// RefinementStore (refinement_cache.h).
 //
 // Implementations are thread-safe. Find, Erase and Flush may block on a disk or a network, and Insert if the tier is
 // told to wait for room. The others return at once.
@@ -14,7 +13,6 @@
 
 #include "engine/core/result.h"
 #include "tiler/store/byte_cache.h"
-#include "tiler/store/refined_tile.h"
 #include "tiler/store/tile_selection.h"
 #include "tiler/tile/encoded_tile.h"
 #include "tiler/tile/tile_request.h"
@@ -40,9 +38,6 @@ struct CacheKeyHash {
 
 inline bool IsSelected(const TileSelection& selection, const CacheKey& key) {
   return selection.Contains(key.generation, key.request.key, IsMercator(key.request.format));
-}
-inline bool IsSelected(const TileSelection& selection, const RefinedTileKey& key) {
-  return selection.Contains(key.generation, key.key, /*is_mercator=*/false);
 }
 
 // The tier in memory.
@@ -81,7 +76,8 @@ class StoreBase {
 template <typename Key, typename Value>
 class Store : public StoreBase {
  public:
-  // Returns a copy, or nothing if the key is absent.
+  // Returns a copy, or nothing if the key is absent. Of a tile, stores keep `bytes`, `etag`, both errors and both
+  // counts; TileTiers sets `found_in` and `header_lines`, and the rest has its defaults.
   virtual std::optional<Value> Find(const Key& key) = 0;
 
   // Replaces the value of an existing key.
@@ -93,6 +89,5 @@ class Store : public StoreBase {
 };
 
 using TileStore = Store<CacheKey, EncodedTile>;
-using RefinementStore = Store<RefinedTileKey, RefinedTile>;
 
 }  // namespace terrace::tiler

@@ -24,10 +24,18 @@ Result<TilePtr> TileTiers::FindOrBuild(const CacheKey& key, const std::function<
     found->found_in = stores_[i]->name();
     return Keep(key, *std::move(found), i);
   }
-  Result<EncodedTile> built = build();
-  if (built) return Keep(key, *std::move(built), stores_.size());
-  for (const auto& store : stores_) store->GiveUp(key);
-  return tl::unexpected(std::move(built.error()));
+  const auto give_up = [&] {
+    for (const auto& store : stores_) store->GiveUp(key);
+  };
+  try {
+    Result<EncodedTile> built = build();
+    if (built) return Keep(key, *std::move(built), stores_.size());
+    give_up();
+    return tl::unexpected(std::move(built.error()));
+  } catch (...) {
+    give_up();
+    throw;
+  }
 }
 
 // The tile as it is sent, after it was inserted into memory and the first `stores_above` stores.

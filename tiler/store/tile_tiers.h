@@ -36,7 +36,7 @@ class TileTiers {
   TileCache& memory() { return memory_; }
   const TileCache& memory() const { return memory_; }
 
-  // `build` is called if no tier has the tile. It must not throw. Its error is returned and not kept. Blocks.
+  // `build` is called if no tier has the tile. Its error is returned and not kept; its exceptions pass. Blocks.
   Result<TilePtr> FindOrBuild(const CacheKey& key, const std::function<Result<EncodedTile>()>& build);
 
   // Erases these tiles from all tiers; builds that have begun insert their tiles afterwards. Blocks. Errors: those of

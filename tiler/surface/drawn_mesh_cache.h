@@ -33,7 +33,10 @@ struct DrawnMeshKeyHash {
   }
 };
 
-using DrawnMeshCache = ByteCache<DrawnMeshKey, DrawnMeshKeyHash, DrawnMesh>;
+class DrawnMeshCache : public ByteCache<DrawnMeshKey, DrawnMeshKeyHash, DrawnMesh> {
+ public:
+  using ByteCache::ByteCache;
+};
 
 // A mesh of the most vertices that a tile may have takes about 5 MB, one at the default error about 100 KB.
 inline constexpr std::size_t kDrawnMeshBytes = std::size_t{32} << 20;

@@ -15,7 +15,7 @@ struct DrawnSurface {
   // Nothing: the first level whose default error is at most requested.error_m; the deepest if there is none, or if
   // error_m is not set.
   std::optional<int> level;
-  RequestedError requested;
+  RequestedError requested = {};
   TileFormat format = TileFormat::kQuantizedMesh;                     // or kGlb
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
 };

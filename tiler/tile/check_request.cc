@@ -9,9 +9,12 @@
 namespace terrace::tiler {
 namespace {
 
-bool IsValidKey(const geo::TileKey& key, TileFormat format) {
-  if (!IsMercator(format)) return geo::IsValid(key);
-  if (key.level < 0 || key.level > geo::kMaxLevel) return false;
+bool IsValidKey(const TileRequest& request) {
+  const geo::TileKey& key = request.key;
+  if (!IsMercator(request.format)) return geo::IsValid(key);
+  // The pixels of larger tiles are those of a deeper grid.
+  const int depth = key.level + (request.side_px > kSidesPx[0] ? 1 : 0);
+  if (key.level < 0 || depth > geo::kMaxLevel) return false;
   const std::int64_t tiles = std::int64_t{1} << key.level;
   return key.x >= 0 && key.x < tiles && key.y >= 0 && key.y < tiles;
 }
@@ -32,7 +35,7 @@ Result<void> CheckMap(const TileRequest& request) {
 }  // namespace
 
 Result<void> CheckRequest(const TileRequest& request) {
-  if (!IsValidKey(request.key, request.format)) {
+  if (!IsValidKey(request)) {
     return MakeError(ErrorCode::kNotFound, "{}: no level has such a tile", geo::ToString(request.key));
   }
   const bool has_mesh = request.format == TileFormat::kQuantizedMesh || request.format == TileFormat::kGlb;

@@ -7,7 +7,8 @@
 namespace terrace::tiler {
 
 // Whether a tile of the format can exist and the parameters that the format uses have values that TileRequest permits.
-// The dataset is not considered. kNotFound: no level has such a tile. kInvalidArgument: another member; the message
+// The dataset is not considered. kNotFound: no level has such a tile, or its pixels are finer
+// than geo::kMaxLevel. kInvalidArgument: another member; the message
 // names it.
 Result<void> CheckRequest(const TileRequest& request);
 

@@ -39,14 +39,15 @@ struct EncodedTile {
   // of heights to colours; of area meshes, measured before encoding.
   double max_error_m = 0;
   // Metres, an upper bound of the distance to every sample of the sources, after the edits that apply to it: the
-  // Terrain-Certified-Error header. Set for quantized-mesh and GLB tiles only.
+  // Terrain-Certified-Error header. Set for quantized-mesh and GLB tiles only. Infinite: no bound is known.
   std::optional<double> certified_error_m = {};
   std::uint32_t vertices = 0;
   std::uint32_t triangles = 0;
   StageTimes times;  // of the build
   RefinementUse refinement_use = RefinementUse::kNone;
-  const char* found_in = nullptr;  // the tier that it was read from (StoreBase::name); null: Build made it
-  HeaderLines header_lines;        // written by the HeaderWriter of TileTiers; empty without one
+  // The store that it came from when TileTiers put it into memory (StoreBase::name); null: Build made it.
+  const char* found_in = nullptr;
+  HeaderLines header_lines;  // written by the HeaderWriter of TileTiers; empty without one
 };
 
 inline std::size_t BytesOf(const EncodedTile& tile) { return tile.bytes.size() + tile.header_lines.text.size(); }

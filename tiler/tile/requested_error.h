@@ -9,11 +9,11 @@
 
 namespace terrace::tiler {
 
-// All members are optional.
+// At most one of error_m and fraction is set.
 struct RequestedError {
   std::optional<double> error_m;   // finite, > 0
   std::optional<double> fraction;  // of geo::LevelError, the error that clients assume for the level; finite, > 0
-  bool at_least = false;           // the larger of error_m and the level's default error is used
+  bool at_least = false;           // with error_m: the larger of error_m and geo::DefaultError is used
 };
 
 // What a dataset's steps depend on besides the request.

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "engine/geo/tile_key.h"
-#include "proto/documents/height_png.h"
+#include "proto/documents/picture_types.h"
 #include "proto/gltf/gltf_types.h"
 #include "proto/media_type.h"
 #include "tiler/map/map_parameters.h"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
-#include <xxhash.h>
 
 #include <filesystem>
 #include <system_error>
@@ -13,7 +12,6 @@
 #include "engine/gdal/file_content.h"
 #include "engine/statistics/cache_folder.h"
 #include "server/cli/common/open_baked.h"
-#include "tiler/encoder_version.h"
 
 namespace terrace::cli {
 namespace {
@@ -70,23 +68,6 @@ Result<tiler::ImageryOptions> OpenImagery(const config::ImageryConfig& wanted, c
   return imagery;
 }
 
-// Changes when a layer or an option that changes bytes does, with the encoders, and with `heights`; equal for equal
-// contents, wherever they lie.
-std::uint64_t GenerationOf(const config::DatasetConfig& wanted, const tiler::Dataset& dataset,
-                           const std::string& version, std::uint64_t heights) {
-  const tiler::WaterOptions& water = dataset.water;
-  const tiler::ImageryOptions& imagery = dataset.imagery;
-  const std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, tiler::EncoderText(), heights,
-      dataset.error_fraction, static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
-      static_cast<int>(wanted.glb_compression), wanted.draco_speed, wanted.draco_normal_bits,
-      water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
-      dataset.metadata_availability, imagery.image ? imagery.image->fingerprint() : 0,
-      static_cast<int>(imagery.texture), imagery.side, imagery.quality, imagery.attribution.size(), imagery.attribution,
-      dataset.attribution.size(), dataset.attribution);
-  return XXH3_64bits(text.data(), text.size());
-}
-
 }  // namespace
 
 Result<std::unique_ptr<dem::ElevationModel>> OpenModel(const config::DatasetConfig& wanted,
@@ -136,11 +117,11 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_availability = wanted.metadata_availability;
-  dataset.generation = GenerationOf(wanted, dataset, version, dataset.model->fingerprint());
+  dataset.generation = GenerationOf(dataset, version, dataset.model->fingerprint());
   if (dataset.model->info().edits > 0) {
-    dataset.unedited_generation = GenerationOf(wanted, dataset, version, dataset.model->unedited_fingerprint());
+    dataset.unedited_generation = GenerationOf(dataset, version, dataset.model->unedited_fingerprint());
   }
-  dataset.options_hash = GenerationOf(wanted, dataset, version, 0);
+  dataset.options_hash = GenerationOf(dataset, version, 0);
   return dataset;
 }
 

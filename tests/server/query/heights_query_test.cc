@@ -9,6 +9,7 @@
 
 #include "server/handlers/handlers.h"
 #include "server/query/heights_parameters.h"
+#include "tiler/surface/drawn_tiles.h"
 
 namespace terrace::server {
 namespace {
