@@ -28,12 +28,13 @@ ErrorScale Dataset::error_scale() const {
   return {error_fraction, baked->extent().max_source_level, baked->extent().error_steps};
 }
 
-std::uint64_t GenerationOf(const Dataset& dataset, std::string_view version, std::uint64_t heights) {
+std::uint64_t GenerationOf(const Dataset& dataset, std::uint64_t heights) {
   const WaterOptions& water = dataset.water;
   const ImageryOptions& imagery = dataset.imagery;
   const std::string text = fmt::format(
-      "{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", version, EncoderText(), heights,
-      dataset.error_fraction, static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
+      "{}:{} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {} {}:{} {}:{}", dataset.glb.generator.size(),
+      dataset.glb.generator, EncoderText(), heights, dataset.error_fraction,
+      static_cast<int>(dataset.mesh_options.criterion), dataset.mesh_options.compact,
       static_cast<int>(dataset.glb.compression), dataset.glb.draco.speed, dataset.glb.draco.normal_bits,
       water.mask ? water.mask->fingerprint() : 0, water.sea_level_m ? fmt::format("{}", *water.sea_level_m) : "none",
       dataset.metadata_availability, imagery.image ? imagery.image->fingerprint() : 0,

@@ -5,7 +5,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "engine/dem/elevation_model.h"
@@ -27,7 +26,7 @@ struct WaterOptions {
   bool any() const { return mask != nullptr || sea_level_m.has_value(); }
 };
 
-// The source and encoding of textures of GLB tiles.
+// The image of textures of GLB tiles and of map tiles. `texture` and `side` are of GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
   // TileRequest::texture of clients that name none, and of bakes. TilePipeline uses the request's.
@@ -72,9 +71,9 @@ struct Dataset {
   std::uint64_t options_hash = 0;  // GenerationOf with 0; bakes use it
 };
 
-// A hash of `heights`, of all options of the dataset that change bytes, of the encoders with their libraries, and of
-// `version`, the program's own text. Equal for copies of the files.
-std::uint64_t GenerationOf(const Dataset& dataset, std::string_view version, std::uint64_t heights);
+// A hash of `heights`, of all options of the dataset that change bytes, and of the encoders with their libraries. Equal
+// for copies of the files.
+std::uint64_t GenerationOf(const Dataset& dataset, std::uint64_t heights);
 
 // A hash of the edits that the tile of a request depends on; 0: none.
 std::uint64_t TileEditsHash(const dem::ElevationModel& model, const TileRequest& request);

@@ -31,7 +31,7 @@ class RefinementCache;
 // Keeps heights and refinements of tiles between builds, up to `refinement_cache_bytes`; 0: none. Another format,
 // coding or larger error of a kept tile costs a replay and an encoding; a smaller error continues the insertion.
 // Formats without a mesh do not use the cache. The bytes of a tile do not depend on it. Meshes of ReadDrawnPoints and
-// LookAlong take up to 32 MiB besides. Functions that compute results may throw std::bad_alloc.
+// LookAlong take up to 32 MiB besides.
 class TilePipeline {
  public:
   explicit TilePipeline(std::vector<Dataset> datasets,
@@ -49,8 +49,9 @@ class TilePipeline {
   // kNotFound: no such dataset; a key that no level has; a quantized-mesh or GLB tile outside availability; heights, a
   // hillshade, slopes or contours deeper than max_mercator_depth; imagery of a dataset without an image; in a dataset
   // without sources, a tile that its archive lacks. kUnavailable: a source cannot be read now. kChanged: a file of a
-  // source was replaced, so the dataset has to be opened again. kInvalidArgument: a member of the request has a value
-  // that TileRequest does not permit. kInternal: an encoder failed. kCancelled: `stop` was requested.
+  // source, of the water mask or of the image was replaced, so the dataset has to be opened again. kInvalidArgument: a
+  // member of the request has a value that TileRequest does not permit. kInternal: an encoder failed. kCancelled:
+  // `stop` was requested.
   virtual Result<EncodedTile> Build(const TileRequest& request, std::stop_token stop) const;
 
   // As ElevationModel::ReadPoints. Its preconditions hold for the points of all functions below. kNotFound, here and in
@@ -63,9 +64,10 @@ class TilePipeline {
                                                                 std::span<const dem::GeoPosition> points,
                                                                 std::stop_token stop) const;
 
-  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. `normals`:
-  // also normals. Keeps meshes between calls. kInvalidArgument: the dataset has no such level, or the points lie in
-  // more than 64 tiles. Other errors: those of Build.
+  // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
+  // level has no tile, of the deepest available ancestor. `normals`: also normals. Keeps meshes between calls.
+  // kInvalidArgument: the dataset has no such level, or the points lie in more than 64 tiles. Other errors: those of
+  // Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
@@ -88,7 +90,7 @@ class TilePipeline {
   ByteCacheStats refinements() const;
 
  private:
-  // kNotFound: there is no such dataset, or it has no sources.
+  // kNotFound: there is no such dataset; for FindModel also: it has no sources.
   Result<const Dataset*> Find(std::uint32_t dataset) const;
   Result<const dem::ElevationModel*> FindModel(std::uint32_t dataset) const;
 

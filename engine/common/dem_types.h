@@ -40,12 +40,11 @@ enum class HoleFill : std::uint8_t {
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
-  // The source's own; the floor has that of the last source that refers to a geoid. Heights that an edit states are
-  // returned unchanged if all sources within its reach, and the floor, have the datum that they are stated in; with
-  // kOrthometric, whatever the floor has. Otherwise they are converted from the ellipsoid and back, which may change
-  // them by millimetres.
-  kSource,
+  kSource,       // the source's own; the floor has that of the last source that refers to a geoid
 };
+// In kOrthometric and kSource, heights that an edit states are returned as stated if all sources within its reach have
+// the datum that they are stated in and, for kSource, the floor has it too. Otherwise they are converted to the
+// ellipsoid and back, which may change them by millimetres.
 
 class AveragesBudget;
 class CacheFolder;
@@ -60,17 +59,18 @@ struct RasterCache {
 
 struct DemOptions {
   SourceOptions source = {};    // for files without options of their own, and for the rasters of edits
-  double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume
-  // Metres: the deepest level is the first whose default error is at most this.
+  double error_fraction = 0.5;  // default error of a level, as a share of the level error that clients assume; > 0
+  // Metres, > 0: the deepest level is the first whose default error is at most this.
   std::optional<double> finest_error = {};
   std::optional<double> floor = {};    // metres above the ellipsoid, used outside the sources, in collars, and with
                                        // HoleFill::kFloor in holes; default: a height at or below the lowest one
   HoleFill voids = HoleFill::kSmooth;  // in holes; other voids follow `max_void_gap` and `floor`
-  int max_void_gap = 64;               // samples: voids narrower than this along a row, column or diagonal are filled
+  // Samples, 0 .. 4096: voids narrower than this along a row, column or diagonal are filled.
+  int max_void_gap = 64;
   RasterCache cache = {};
   std::vector<std::string> edits = {};  // GeoJSON files (docs/edits.md), in order; later edits over earlier ones
-  // Mosaics, metres: within this distance of its edges and voids a source is blended with the sources below. 0: hard
-  // edges.
+  // Mosaics, metres, 0 .. 10^6: within this distance of its edges and voids a source is blended with the sources below.
+  // 0: hard edges.
   double feather = 0;
   // Called while Open reads the sources, on its threads, one call at a time, with the share done, 0 .. 1. Files have
   // equal shares. The share falls if a raster has to be read again. May be empty.

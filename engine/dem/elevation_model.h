@@ -30,14 +30,16 @@ class ElevationModel {
   // Opens and checks rasters. Their statistics come from DemOptions::cache, or else from a pass over all samples of the
   // raster; a raster that may have undeclared voids takes up to four passes. Relative paths are resolved at each use:
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
-  // Errors name the file, the fault and the remedy. kNotFound: there is no such file, no raster in a folder, or no
-  // height in a raster. kInvalidArgument: an option, a reference system, a raster or an edit that cannot be used.
+  // Paths name files; a program lists the files of a folder itself and sets DemFile::skip_if_no_raster.
+  // Errors name the file, the fault and the remedy. kNotFound: there is no such file, all files were skipped, or a
+  // raster has no height. kInvalidArgument: an option, a reference system, a raster or an edit that cannot be used.
   // kUnavailable: a file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. If no file fails, but the cache lacks the
-  // statistics of a raster: kCancelled.
+  // are opened as by Open, which may take long. Errors: those of Open. If the cache lacks the statistics of
+  // a raster: kCancelled, after the faults of all files were reported to DemOptions::fault. Without that function, the
+  // first fault is returned instead.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 

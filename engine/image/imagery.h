@@ -43,10 +43,11 @@ class Imagery {
   // The colour of parts of a tile that the image does not show: a middle grey in sRGB.
   static constexpr std::array<std::uint8_t, 3> kNoPicture = {188, 188, 188};
 
-  // Opens an image of 1 band (grey), 3 or 4 bands (red, green, blue, and alpha or anything else), or a palette, in 8 or
-  // 16 bits per band, with a georeference. `around`: the bounds of the dataset (DemInfo::bounds).
-  // kInvalidArgument, with the remedy: no raster that may be opened, no georeference, bands that are not colours, or an
-  // image outside `around`. Other errors: those of HashFiles (file_content.h).
+  // Opens an image in 8 or 16 bits per band, with a georeference: grey with or without alpha, a palette, bands that
+  // state red, green and blue, or else 3 or 4 bands. `around`: the bounds of the dataset (DemInfo::bounds). `path` is
+  // resolved at each use. kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be
+  // opened, no georeference, bands that are not colours, or an image outside `around`. Other errors: those of HashFiles
+  // (file_content.h).
   static Result<std::unique_ptr<Imagery>> Open(const std::string& path, const GeoBounds& around,
                                                const FileContentOptions& content = {});
   ~Imagery();
@@ -59,7 +60,8 @@ class Imagery {
   // Returns the picture of a tile, `side` x `side` pixels; nothing if the image shows no part of the tile. A pixel is
   // interpolated bilinearly at its centre, between averages of image pixels if the image is finer. Uses overviews that
   // are fine enough. A pixel depends only on its level, `side` and global position. Preconditions: a valid key; a side
-  // as above. kUnavailable: the image cannot be read now. kCancelled: stopped.
+  // as above. kUnavailable: the image cannot be read now. kChanged: a file was replaced. kCancelled:
+  // stopped.
   Result<std::optional<TilePicture>> Read(const geo::TileKey& key, int side, std::stop_token stop = {}) const;
 
   // Pictures for maps, by the rules of Read: `side` x `side` pixels of a Web Mercator grid, the first in `column` and

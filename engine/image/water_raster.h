@@ -20,9 +20,9 @@ class WaterRaster {
  public:
   static constexpr int kSide = 256;  // pixels along a tile's edge
 
-  // Opens band 1 of a georeferenced raster. `around`: the bounds of the dataset (DemInfo::bounds). kInvalidArgument,
-  // with the remedy: no raster that may be opened, no georeference, or a raster outside `around`. Other errors: those
-  // of HashFiles (file_content.h).
+  // Opens band 1 of a georeferenced raster. `around`: the bounds of the dataset (DemInfo::bounds). `path` is resolved
+  // at each use. kNotFound: there is no such file. kInvalidArgument, with the remedy: no raster that may be opened, no
+  // georeference, or a raster outside `around`. Other errors: those of HashFiles (file_content.h).
   static Result<std::unique_ptr<WaterRaster>> Open(const std::string& path, const GeoBounds& around,
                                                    const FileContentOptions& content = {});
   ~WaterRaster();
@@ -32,7 +32,8 @@ class WaterRaster {
   // depends only on its level and global position. If the raster is finer than the pixels, its samples are averaged. If
   // it is coarser, samples are interpolated, and the coast is the line where they are one half, as sharp as the pixels
   // allow. Overviews are used. Make them with `gdaladdo -r nearest` or `-r mode`, because every nonzero sample counts
-  // as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kCancelled: stopped.
+  // as water. Precondition: a valid key. kUnavailable: the raster cannot be read now. kChanged: a file was replaced.
+  // kCancelled: stopped.
   Result<std::vector<std::uint8_t>> Read(const geo::TileKey& key, std::stop_token stop = {}) const;
 
   // A hash of the bytes of its files and of their georeference. Copies have the same hash.

@@ -1,8 +1,8 @@
 // A folder of files with statistics and averages of rasters. A budget limits their total size.
 //
-// A program passes it to models as RasterCache::folder, and calls Trim after it has opened them. The folder is created
-// when the first file is written. If that fails, models open nevertheless, and problem() has the reason. All other
-// functions are for engine/statistics.
+// The path is resolved at each use. A program passes the folder to models as RasterCache::folder, and calls Trim after
+// it has opened them. The folder is created when the first file is written. If that fails, models open nevertheless,
+// and problem() has the reason. All other functions are for engine/statistics.
 //
 // Several processes may share it. Before a file grows, the least recently used files are removed as far as needed to
 // keep an eighth of the budget free; only files in use may take this eighth. Loading a file counts as use, and so do

@@ -71,7 +71,7 @@ asio::awaitable<Result<ServedTile>> TileService::Build(CatalogPtr catalog, tiler
     if (flight.value.error().code == ErrorCode::kOverloaded) refused_.fetch_add(1, std::memory_order_relaxed);
     co_return tl::unexpected(std::move(flight.value.error()));
   }
-  // If an earlier flight had just put the tile into memory: as that flight found it.
+  // A tile that an earlier flight had just put into memory gets the status of that flight.
   const CacheStatus found = (*flight.value)->found_in != nullptr ? CacheStatus::kStore : CacheStatus::kMiss;
   co_return ServedTile(std::move(*flight.value), flight.joined ? CacheStatus::kJoined : found);
 }

@@ -97,6 +97,7 @@ Result<MeshedGlb> MeshGlb(const Dataset& dataset, const proto::TileSamples& samp
 // requested or the image shows no part of the tile.
 Result<void> AddTexture(const ImageryOptions& imagery, const TileRequest& request, proto::GlbOptions& options,
                         const std::stop_token& stop) {
+  options.texture = std::nullopt;
   if (!imagery.image || request.texture == proto::TextureFormat::kNone) return {};
   const int side = imagery.image->SideOf(request.key.level, imagery.side);
   const Result<std::optional<dem::TilePicture>> picture = imagery.image->Read(request.key, side, stop);

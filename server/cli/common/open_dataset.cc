@@ -117,11 +117,11 @@ Result<tiler::Dataset> MakeDataset(const config::DatasetConfig& wanted,
   dataset.water = *std::move(water);
   dataset.imagery = *std::move(imagery);
   dataset.metadata_availability = wanted.metadata_availability;
-  dataset.generation = GenerationOf(dataset, version, dataset.model->fingerprint());
+  dataset.generation = GenerationOf(dataset, dataset.model->fingerprint());
   if (dataset.model->info().edits > 0) {
-    dataset.unedited_generation = GenerationOf(dataset, version, dataset.model->unedited_fingerprint());
+    dataset.unedited_generation = GenerationOf(dataset, dataset.model->unedited_fingerprint());
   }
-  dataset.options_hash = GenerationOf(dataset, version, 0);
+  dataset.options_hash = GenerationOf(dataset, 0);
   return dataset;
 }
 
