@@ -149,9 +149,9 @@ Result<OutputGrid> PlanOutputGrid(const GridRequest& request, std::size_t max_no
         "a side; ask for fewer, ask for parts of the area, or start the server with a larger --max-mesh-samples",
         grid.columns, grid.rows, max_nodes, kLongestSide));
   }
-  if (request.spacing) {
-    grid.east = grid.west + spacing * static_cast<double>(grid.columns - 1);
-    grid.south = grid.north - spacing * static_cast<double>(grid.rows - 1);
+  if (request.spacing) {  // rounded, the last nodes of whole steps may be beyond the box, and beyond a pole
+    grid.east = std::min(grid.east, grid.west + spacing * static_cast<double>(grid.columns - 1));
+    grid.south = std::max(grid.south, grid.north - spacing * static_cast<double>(grid.rows - 1));
   }
   return grid;
 }

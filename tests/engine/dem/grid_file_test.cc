@@ -61,6 +61,13 @@ TEST(GridFile, HasAllNodesOfABoxOfWholeSteps) {
   ASSERT_TRUE(wider);
   EXPECT_EQ(wider->columns, 10);
   EXPECT_EQ(wider->rows, 11);
+  for (const double spacing : {0.1, 0.3, 0.7, 0.9}) {
+    const auto world =
+        PlanOutputGrid({.west = -180, .south = -90, .east = 180, .north = 90, .spacing = spacing}, 10'000'000);
+    ASSERT_TRUE(world);
+    EXPECT_GE(world->south, -90);
+    EXPECT_LE(world->east, 180);
+  }
 }
 
 // EPSG:3411 is on an ellipsoid of its own, its successor 3413 on that of WGS 84: up to 57 m apart.
