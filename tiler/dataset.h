@@ -71,8 +71,8 @@ struct Dataset {
   std::uint64_t options_hash = 0;  // GenerationOf with 0; bakes use it
 };
 
-// A hash of `heights`, of all options of the dataset that change bytes, and of the encoders with their libraries. Equal
-// for copies of the files.
+// A hash of `heights`, which is a fingerprint of the model, of all options of the dataset that change bytes, and of the
+// encoders with their libraries. Equal for copies of the files.
 std::uint64_t GenerationOf(const Dataset& dataset, std::uint64_t heights);
 
 // A hash of the edits that the tile of a request depends on; 0: none.

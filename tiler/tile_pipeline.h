@@ -86,7 +86,7 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
-  ByteCacheStats drawn_meshes() const;
+  ByteCacheStats drawn_meshes() const;  // hits and misses are 0
   ByteCacheStats refinements() const;
 
  private:

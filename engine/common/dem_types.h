@@ -76,8 +76,8 @@ struct DemOptions {
   // equal shares. The share falls if a raster has to be read again. May be empty.
   std::function<void(double)> progress = {};
   std::stop_token stop = {};  // makes Open return kCancelled
-  // Called for every file that cannot be opened; Open checks all files before it returns the first of these errors.
-  // Empty: Open fails at the first.
+  // Called on the thread of Open for every file of the list that cannot be opened; Open checks all files before it
+  // returns the first of these errors. Empty: Open fails at the first.
   std::function<void(const Error&)> fault = {};
 };
 
@@ -87,7 +87,7 @@ struct DemFile {
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
   // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
   int rank = 0;
-  bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster
+  bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster; may have no heights
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 
@@ -181,7 +181,7 @@ struct KeptBlocks {
   std::size_t count = 0, bytes = 0;
 };
 
-// Numbers of samples read for tiles, at the resolution that they were read at.
+// Numbers of samples read for nodes and pixels, at the resolution that they were read at.
 struct SampleCounts {
   std::uint64_t measured = 0;
   std::uint64_t filled = 0;  // voids filled from the heights around them

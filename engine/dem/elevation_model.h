@@ -32,14 +32,15 @@ class ElevationModel {
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
   // Paths name files; a program lists the files of a folder itself and sets DemFile::skip_if_no_raster.
   // Errors name the file, the fault and the remedy. kNotFound: there is no such file, all files were skipped, or a
-  // raster has no height. kInvalidArgument: an option, a reference system, a raster or an edit that cannot be used.
+  // raster has no height (with skip_if_no_raster: none has one). kInvalidArgument: an option, a reference system, a
+  // raster or an edit that cannot be used, also if the edit's file or raster cannot be read.
   // kUnavailable: a file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. If the cache lacks the statistics of
-  // a raster: kCancelled, after the faults of all files were reported to DemOptions::fault. Without that function, the
-  // first fault is returned instead.
+  // are opened as by Open, which may take long. Errors: those of Open. kCancelled if statistics
+  // are missing; if files have other errors, the first one is returned instead, or, with DemOptions::fault, each is
+  // reported to it before.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -132,7 +133,7 @@ class ElevationModel {
   std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
-  // Samples read since Open, by all threads. For metrics.
+  // Samples read since Open for nodes and pixels, not for points and rays, by all threads. For metrics.
   SampleCounts CountSamples() const;
   // Blocks that the process keeps now, of all models. For metrics.
   static KeptBlocks CountKeptBlocks();

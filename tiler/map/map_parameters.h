@@ -11,7 +11,7 @@ enum class SlopeStyle : std::uint8_t { kColors, kDegrees };
 
 // Members that a format does not use have their defaults.
 struct MapParameters {
-  proto::PictureFormat picture = proto::PictureFormat::kPng;
+  proto::PictureFormat picture = proto::PictureFormat::kPng;  // hillshades and slopes: not kJpeg
   std::uint16_t azimuth_deg = 315;          // where the light comes from, clockwise from north, 0 .. 359
   std::uint8_t altitude_deg = 45;           // of the light above the horizon, 0 .. 90
   std::uint16_t z_factor_hundredths = 100;  // heights are multiplied by it, 1 .. 10000

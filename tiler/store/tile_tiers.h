@@ -32,7 +32,7 @@ class TileTiers {
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
             HeaderWriter write_header_lines = nullptr);
 
-  // The tier in memory: the only one that is asked without blocking.
+  // The tier in memory: the only one that is asked without blocking. Its hits and misses are 0.
   TileCache& memory() { return memory_; }
   const TileCache& memory() const { return memory_; }
 

@@ -9,8 +9,8 @@
 
 namespace terrace::tiler {
 
-// Heights of a dataset at points; NaN: the sources have none, or an edit has cut a hole in the drawn surface. Elsewhere
-// a drawn surface without data shows the floor.
+// Heights of a dataset at points. NaN in holes that edits cut, and for heights of the sources where these have none; a
+// drawn surface shows the floor there.
 struct PointHeights {
   std::vector<float> heights;
   std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty: of a drawn surface

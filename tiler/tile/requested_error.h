@@ -22,7 +22,7 @@ struct ErrorScale {
   // The deepest level of the sources; edits may add deeper ones. RequestedError::at_least has no effect on this level
   // and deeper ones, whose tiles have all detail of the sources.
   int max_source_level = geo::kMaxLevel;
-  std::span<const int> default_steps = {};  // by level, if no error is requested; 0 beyond; Dataset::baked owns them
+  std::span<const int> default_steps = {};  // by level, if no error is requested; deeper: 0; a view
 };
 
 // Returns the step of the level's ladder for a requested error.

@@ -42,12 +42,14 @@ struct TileRequest {
   int error_step = 0;  // on the ladder of the key's level (engine/geo/error_ladder.h)
   TileFormat format = TileFormat::kQuantizedMesh;
   proto::GlbCompression compression = proto::GlbCompression::kDraco;  // kGlb only
-  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only
+  proto::TextureFormat texture = proto::TextureFormat::kNone;         // kGlb only: if there is an image
   Coding coding = Coding::kIdentity;
   proto::TileExtensions extensions;  // kQuantizedMesh only: included if the tile has them
   proto::HeightEncoding height_encoding = proto::HeightEncoding::kMapbox;  // kHeightPng only
-  int side_px = kSidesPx[0];  // pixels along an edge: kHeightPng, and map layers except kContours
-  MapParameters map;          // IsMapLayer(format)
+  // Pixels along an edge: kHeightPng, and map layers except kContours. The depth of the tile's pixels is its level,
+  // plus 1 with 512.
+  int side_px = kSidesPx[0];
+  MapParameters map;  // IsMapLayer(format)
 
   friend bool operator==(const TileRequest&, const TileRequest&) = default;
 };
