@@ -148,6 +148,8 @@ Result<std::string> ElevationModel::Impl::OpenReplacement(Edit& edit, const DemO
   if (is_new) {
     DemOptions of_replacement;
     of_replacement.source = options.source;
+    of_replacement.voids = HoleFill::kFloor;  // its voids show what is below, also narrow ones
+    of_replacement.max_void_gap = 0;
     if (!edit.source_vertical.empty()) of_replacement.source.vertical = edit.source_vertical;
     of_replacement.cache = options.cache;
     of_replacement.stop = options.stop;

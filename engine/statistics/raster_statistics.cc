@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "engine/core/plain_number.h"
 #include "engine/statistics/kept_factors.h"
 
 namespace terrace::dem {

@@ -53,8 +53,8 @@ const TileFormatRow* FormatWith(tiler::TileFormat format, proto::PictureFormat p
 // outside what the dataset has. Errors of TileFormatRow::read. Precondition: the route has a format.
 Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::span<const DatasetView> datasets);
 
-// kNotFound: the dataset is an archive alone without tiles of this format, or, for
-// formats in Web Mercator, lies beyond its latitudes.
+// kNotFound: the dataset is an archive alone without tiles of this format, or, for formats in Web Mercator, lies beyond
+// its latitudes.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
 
 // Whether a document may have `query` in its templates of tiles of this format. kNotFound, for a dataset without

@@ -357,6 +357,13 @@ TEST_F(Edits, AreCertifiedBesideHolesAndOverReplacements) {
   notched.nodata = -1;
   notched.value = [](int column, int row) { return column > 115 && column < 185 && row < 100 ? -1.0 : 900.0; };
   const std::string notched_path = dem::WriteRaster(dir, notched, "notched.tif");
+  dem::RasterSpec pierced = rough;  // with voids that have data all around them
+  pierced.nodata = -1;
+  pierced.value = [&rough](int column, int row) {
+    const bool is_void = (column > 140 && column < 230 && row > 30 && row < 110) || (column % 40 < 3 && row % 25 < 3);
+    return is_void ? -1.0 : rough.value(column, row);
+  };
+  const std::string pierced_path = dem::WriteRaster(dir, pierced, "pierced.tif");
   const auto replace = [](const std::string& source, int blend_m) {
     return Feature(fmt::format(R"({{"op":"replace","source":"{}","blend_m":{}}})", source, blend_m), Polygon());
   };
@@ -367,7 +374,8 @@ TEST_F(Edits, AreCertifiedBesideHolesAndOverReplacements) {
       {"rough without blend", {replace(path, 0), path}},
       {"ends inside", {replace(half_path, 150), half_path}},
       {"ends inside, flat", {replace(plate_path, 3000), ""}},
-      {"has a void", {replace(notched_path, 3000), ""}}};
+      {"has a void", {replace(notched_path, 3000), ""}},
+      {"has enclosed voids", {replace(pierced_path, 150), pierced_path}}};
   for (const auto& [kind, feature] : kinds) {
     const TilePipeline pipeline = Open({feature.first});
     std::vector<Sample> samples = SamplesOf(Jacksboro());

@@ -120,11 +120,18 @@ TEST_F(TerrainEdits, AreNeverLeftOutOfALineOfSight) {
 
 TEST_F(TerrainEdits, ReplaceTakesTheHeightsOfAnotherFile) {
   RasterSpec other = FlatSquare(10.1, 50.3, 200, 0.001, 42);
+  other.nodata = -1;
+  other.value = [](int column, int row) {
+    const bool is_wide_void = column >= 55 && column <= 85 && row >= 55 && row <= 85;
+    return is_wide_void || (std::abs(column - 120) <= 2 && std::abs(row - 120) <= 2) ? -1.0 : 42.0;
+  };
   WriteRaster(dir_, other, "other.tif");
   const auto source = Open(Middle(R"({"op":"replace","source":"other.tif"})"));
   ASSERT_NE(source, nullptr);
   EXPECT_EQ(At(*source, 10.2, 50.2), 42);
   EXPECT_NEAR(At(*source, 10.3, 50.2), 399.5, 0.01);
+  EXPECT_NEAR(At(*source, 10.1705, 50.2295), 270, 0.01) << "in the wide void";
+  EXPECT_NEAR(At(*source, 10.2205, 50.1795), 320, 0.01) << "in the narrow one";
 }
 
 // A raster that is replaced by itself stays as it is.
