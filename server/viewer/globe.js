@@ -314,7 +314,8 @@ export class Globe {
 
   // Moves a camera from below the ground, whose height is known only when it is drawn, to above it.
   lift() {
-    const { camera } = this.scene;
+    const { camera, globe } = this.scene;
+    if (globe.getHeight(camera.positionCartographic) === undefined) return;
     const { clearance } = this;
     if (clearance < 0) camera.move(Cartesian3.normalize(camera.positionWC, new Cartesian3()), kNearest - clearance);
   }
