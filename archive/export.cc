@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -22,9 +23,12 @@
 namespace terrace::archive {
 namespace {
 
-dem::GeoBounds HeaderBounds(const Manifest& manifest) {
+// Headers of PMTiles cannot state bounds across the antimeridian; their centre can be there.
+void SetBounds(const Manifest& manifest, PmtilesOptions& options) {
   const bool is_mercator = tiler::IsMercator(manifest.kind.format);
   dem::GeoBounds bounds = is_mercator ? HeightTileBounds(manifest) : manifest.dataset.bounds;
+  const double width = bounds.east - bounds.west + (bounds.west > bounds.east ? 360 : 0);
+  options.center_longitude = std::remainder(bounds.west + width / 2, 360);
   if (bounds.west > bounds.east || bounds.east > 180 || bounds.west < -180) {
     bounds.west = -180;
     bounds.east = 180;
@@ -32,7 +36,7 @@ dem::GeoBounds HeaderBounds(const Manifest& manifest) {
   const double max_latitude = is_mercator ? geo::kMercatorLatitude : 90;
   bounds.south = std::clamp(bounds.south, -max_latitude, max_latitude);
   bounds.north = std::clamp(bounds.north, -max_latitude, max_latitude);
-  return bounds;
+  options.bounds = bounds;
 }
 
 Result<void> WriteText(const std::string& path, std::string_view text) {
@@ -86,7 +90,7 @@ Result<void> WriteSingle(const Archive& archive, const std::string& out, const s
   const Manifest& manifest = archive.manifest();
   Result<PmtilesOptions> file_options = PmtilesOptionsOf(manifest.kind, std::nullopt);
   if (!file_options) return tl::unexpected(std::move(file_options.error()));
-  file_options->bounds = HeaderBounds(manifest);
+  SetBounds(manifest, *file_options);
   Result<PmtilesWriter> writer = PmtilesWriter::Create(out, *file_options);
   if (!writer) return tl::unexpected(std::move(writer.error()));
   const bool is_mercator = tiler::IsMercator(manifest.kind.format);

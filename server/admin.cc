@@ -157,9 +157,9 @@ class AdminApplication::Handler final : public ConnectionHandler {
       spdlog::info("purge: {}", Trim(text, "\n"));
       return text;
     };
-    const auto deadline = JobClock::now() + parts_.deadline.load(std::memory_order_relaxed);
-    Result<std::string> text = co_await parts_.workers.Run(std::move(work), LongTerms(deadline, /*client=*/0));
-    if (!text) co_return co_await BackendFailure(text.error(), request.id);
+    const JobTerms terms = LongTerms(request.deadline, /*client=*/0);
+    Result<std::string> text = co_await parts_.workers.Run(std::move(work), terms);
+    if (!text) co_return co_await DelayedBackendError(text.error(), request.id);
     co_return StateResponse(200, "application/json", std::make_shared<const std::string>(*std::move(text)));
   }
 

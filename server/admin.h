@@ -2,8 +2,6 @@
 // GET /version.
 #pragma once
 
-#include <atomic>
-#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -39,7 +37,6 @@ struct AdminParts {
   MetricsPage& metrics_page;
   AccessLog& access_log;
   std::function<CatalogPtr()> catalog;  // the current one; never null
-  const std::atomic<std::chrono::milliseconds>& deadline;
 };
 
 // Requests with an Origin header are refused: web pages can reach addresses of their user's machine, also loopback

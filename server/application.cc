@@ -60,7 +60,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
     const RouteRow& row = *context_.route.row;
     admission.depends_on_token = admission_control.DependsOnToken(context_);
     if (row.takes_post()) {
-      admission.max_body_bytes = row.max_body_bytes(application_.started_.max_locations);
+      admission.max_body_bytes = row.max_body_bytes(application_.config_at_start_.max_locations);
       admission.body_remedy = "the limit follows from max_locations of this server: send fewer at once";
     }
     return admission;
@@ -125,7 +125,7 @@ class TerrainApplication::Handler final : public ConnectionHandler {
 };
 
 asio::awaitable<Response> TerrainApplication::Handler::AfterOpening() {
-  if (!co_await application_.FirstCatalog()) {
+  if (!co_await application_.FirstCatalog(context_.request->deadline)) {
     Response response = ProblemResponse(503, "the sources are being opened", context_.request->id);
     response.headers.emplace_back("Retry-After", "5");
     response.labels.route = context_.route.row->label;
@@ -165,15 +165,18 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
 }
 
 TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
-    : parts_(std::move(parts)), started_(config), deadline_(config.request_deadline), opening_(catalog == nullptr) {
+    : parts_(std::move(parts)),
+      config_at_start_(config),
+      request_time_(config.request_deadline),
+      opening_(catalog == nullptr) {
   state_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
 
 // Admission keeps the limit of locations and the proxies that were configured at the start. Replies must agree with it.
 TerrainApplication::HandlerStatePtr TerrainApplication::Make(CatalogPtr catalog, config::Config config) const {
-  config.max_locations = started_.max_locations;
-  config.trusted_proxies = started_.trusted_proxies;
-  config.forwarded_header = started_.forwarded_header;
+  config.max_locations = config_at_start_.max_locations;
+  config.trusted_proxies = config_at_start_.trusted_proxies;
+  config.forwarded_header = config_at_start_.forwarded_header;
   return std::make_shared<const HandlerState>(std::move(catalog), parts_.workers, parts_.tiles, parts_.document_flights,
                                               parts_.viewer, config, *this);
 }
@@ -189,7 +192,7 @@ std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {
   HandlerStatePtr state = Make(std::move(catalog), config);  // the old one is destroyed after the lock is released
-  deadline_.store(config.request_deadline, std::memory_order_relaxed);
+  request_time_.store(config.request_deadline, std::memory_order_relaxed);
   const std::lock_guard lock(mutex_);
   state_.swap(state);
   const bool is_first = opening_.exchange(false);
@@ -246,8 +249,7 @@ bool TerrainApplication::HasLastingProblem(const std::string& dataset) const {
 }
 
 // Returns false if there is none in time, or if the server stops.
-asio::awaitable<bool> TerrainApplication::FirstCatalog() const {
-  const auto give_up = Clock::now() + deadline_.load(std::memory_order_relaxed);
+asio::awaitable<bool> TerrainApplication::FirstCatalog(Clock::time_point give_up) const {
   while (opening()) {
     if (draining() || Clock::now() >= give_up) co_return false;
     co_await Pause();

@@ -43,7 +43,7 @@ struct ApplicationParts {
   std::function<double(const std::string&)> progress_of;  // of a pending dataset, 0 to 1; may be empty
 };
 
-class TerrainApplication final : public Application, public ProcessState {
+class TerrainApplication final : public Application, public ServerStatus {
  public:
   // Without a catalog (null) requests wait for the first Replace, except those of rows with needs_no_catalog.
   TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config);
@@ -57,7 +57,8 @@ class TerrainApplication final : public Application, public ProcessState {
   // Problems by dataset; "" is the configuration.
   void SetProblems(std::map<std::string, std::string> problems);
 
-  const std::atomic<std::chrono::milliseconds>& deadline() const { return deadline_; }  // of a request
+  // How long after its head the deadline of a request is.
+  const std::atomic<std::chrono::milliseconds>& request_time() const { return request_time_; }
   // Never null; without datasets until the first catalog has come.
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
@@ -76,7 +77,7 @@ class TerrainApplication final : public Application, public ProcessState {
   HandlerStatePtr Current() const;
   bool HasLastingProblem(const std::string& dataset) const;
 
-  asio::awaitable<bool> FirstCatalog() const;
+  asio::awaitable<bool> FirstCatalog(JobClock::time_point give_up) const;
   asio::awaitable<bool> NextCatalog(HandlerStatePtr now, std::string dataset, JobClock::time_point give_up) const;
 
   const ApplicationParts parts_;
@@ -85,8 +86,8 @@ class TerrainApplication final : public Application, public ProcessState {
   std::uint64_t replaced_ = 0;
   std::map<std::string, std::string> problems_;
   std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets
-  const config::Config started_;                                                // the configuration at the start
-  std::atomic<std::chrono::milliseconds> deadline_;
+  const config::Config config_at_start_;
+  std::atomic<std::chrono::milliseconds> request_time_;
   std::atomic<bool> opening_;  // the first catalog has not come
 };
 

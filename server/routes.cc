@@ -32,7 +32,7 @@ std::optional<std::string_view> OriginForm(std::string_view target) {
   return (*rest)[path] == '/' ? rest->substr(path) : std::optional<std::string_view>();
 }
 
-// One tile has one URL.
+// Without sign and leading zeros, so that a tile has one URL.
 std::optional<std::int64_t> TileNumber(std::string_view text) { return PlainDecimal(text, /*max_digits=*/9); }
 
 std::optional<geo::TileKey> ParseTileKey(std::string_view z, std::string_view x, std::string_view y, bool is_mercator) {

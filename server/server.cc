@@ -79,7 +79,7 @@ class RunningServer final : public Server {
                       options_.cache_problem, options_.progress_of},
                      std::move(catalog), options_.config),
         admin_({workers_, tiles_, options_.refinements.get(), metrics_, metrics_page_, access_log_,
-                [this] { return application_.catalog(); }, application_.deadline()}),
+                [this] { return application_.catalog(); }}),
         io_(options_.config.io_threads),
         signals_(io_.first()) {}
 
@@ -286,7 +286,7 @@ class RunningServer final : public Server {
     context->application = &application_;
     context->connections = &limits_->connections;
     context->transfers = &limits_->transfers;
-    context->deadline = &application_.deadline();
+    context->request_time = &application_.request_time();
     context->cors = limits_->cors;
     context->tls = limits_->tls.get();
     return context;

@@ -59,8 +59,8 @@ struct Dataset {
   ImageryOptions imagery;
   int metadata_availability = 0;  // tiles at multiples of this level have availability metadata; 0: none
   // Identifies the dataset and its contents in caches: GenerationOf with ElevationModel::fingerprint. 0: TilePipeline
-  // sets the dataset's number in its copy, datasets(). That suffices if no other pipeline uses its RefinementCache, its
-  // TileTiers or a store of theirs, at the same time or later.
+  // uses the dataset's position instead, counted from 1 (datasets() has that number). It is not unique: no other
+  // pipeline may then use the same RefinementCache, TileTiers or TileStore, neither at the same time nor later.
   std::uint64_t generation = 0;
   // The same with ElevationModel::unedited_fingerprint; 0: there are no edits. Caches are keyed by cache_generation()
   // and by a hash of the edits, so that tiles that no edit touches stay: TileEditsHash for tiles,

@@ -11,8 +11,8 @@
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
+#include "tiler/mesh/bound_less_rounding.h"
 #include "tiler/mesh/refine_options.h"
-#include "tiler/mesh/sample_error_bound.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/refinement_cache.h"
 #include "tiler/surface/drawn_mesh_cache.h"
@@ -102,12 +102,11 @@ Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& datas
                                           : tin::GreedyTriangulation(field, std::move(options));
   tin::GreedyGoal goal;
   goal.max_error = error_m;
-  goal.max_points = proto::kMaxTileVertices + 1;
+  goal.max_points = proto::kMaxTileVertices + 1;  // so that a refinement that this limit ends has too many
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = MicrosecondsSince(start);
-  // A refinement that ended at the format's limit of vertices does not reach the error. Another build may have stored a
-  // longer one meanwhile.
+  // One with too many vertices has not reached the error. Another build may have stored a longer one meanwhile.
   const RefinedTilePtr other = refinements.FindInMemory(cache_key);
   if (refined->refinement.vertex_count() <= proto::kMaxTileVertices && !(other && other->error_m <= error_m)) {
     refinements.Insert(cache_key, refined);
@@ -124,7 +123,7 @@ Result<DrawnTriangles> TrianglesOf(RefinementCache& refinements, const Dataset& 
     return DecodeTriangles(baked->bytes, request.key);
   }
   const double error_m =
-      SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+      BoundLessRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(refinements, dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
@@ -196,7 +195,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = SampleErrorBound(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = BoundLessRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(*refinements_, dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);

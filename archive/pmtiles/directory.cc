@@ -93,7 +93,7 @@ std::string EncodeHeader(const PmtilesHeader& header) {
   for (const double degrees : {bounds.west, bounds.south, bounds.east, bounds.north})
     writer.Put(TenMillionths(degrees));
   writer.Put(static_cast<std::uint8_t>(header.min_zoom));
-  writer.Put(TenMillionths((bounds.west + bounds.east) / 2));
+  writer.Put(TenMillionths(header.center_longitude));
   writer.Put(TenMillionths((bounds.south + bounds.north) / 2));
   return writer.Take();
 }
@@ -128,6 +128,8 @@ Result<PmtilesHeader> DecodeHeader(std::string_view bytes, std::uint64_t file_by
   for (double* degrees : {&header.bounds.west, &header.bounds.south, &header.bounds.east, &header.bounds.north}) {
     *degrees = reader.Get<std::int32_t>() / 1e7;
   }
+  reader.Get<std::uint8_t>();  // the zoom of the first view
+  header.center_longitude = reader.Get<std::int32_t>() / 1e7;
   return header;
 }
 

@@ -31,7 +31,8 @@ struct PmtilesHeader {
   PmtilesCompression tile_compression = PmtilesCompression::kNone;
   PmtilesType type = PmtilesType::kOther;
   int min_zoom = 0, max_zoom = 0;
-  dem::GeoBounds bounds;  // west < east
+  dem::GeoBounds bounds;        // west < east
+  double center_longitude = 0;  // not always halfway: bounds across the antimeridian are those of the whole globe
 };
 
 std::string EncodeHeader(const PmtilesHeader& header);

@@ -346,7 +346,10 @@ const std::vector<Option<Config>>& ServerOptionTable() {
       {.key = "request_deadline_s",
        .value = "SECONDS",
        .section = "limits",
-       .help = "Longest time for a request; after it the reply is 503",
+       .help = "Longest time from the head of a request to its reply; after it the reply is 503",
+       .details =
+           "It includes the wait for the client's turn (`requests_per_second`), for a worker and for memory, but "
+           "not the time in which a body arrives or the reply is sent",
        .codec = Seconds(&Config::request_deadline, 0.1, 3600),
        .other_words = "request_timeout",
        .is_live = true},

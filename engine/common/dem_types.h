@@ -42,8 +42,8 @@ enum class HeightDatum : std::uint8_t {
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
   kSource,       // the source's own; the floor has that of the last source that refers to a geoid
 };
-// In kOrthometric and kSource, heights that an edit states are returned as stated if all sources within its reach have
-// the datum that they are stated in and, for kSource, the floor has it too. Otherwise they are converted to the
+// An edit states its heights in some datum. kOrthometric and kSource return them unchanged if all sources within reach
+// of the edit have that datum and, for kSource, the floor has it too. Otherwise the heights are converted to the
 // ellipsoid and back, which may change them by millimetres.
 
 class AveragesBudget;

@@ -38,9 +38,9 @@ class ElevationModel {
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
   static Result<std::unique_ptr<ElevationModel>> Open(const std::string& path, const DemOptions& options = {});
   // Open, with the statistics of all files from the cache. Reads samples only for edits; the rasters of `replace` edits
-  // are opened as by Open, which may take long. Errors: those of Open. kCancelled if statistics
-  // are missing; if files have other errors, the first one is returned instead, or, with DemOptions::fault, each is
-  // reported to it before.
+  // are opened as by Open, which may take long. Errors: those of Open. kCancelled: statistics
+  // are missing, and no file has another error. Otherwise the first other error is returned; if DemOptions::fault is
+  // set, it has been called with each of them.
   static Result<std::unique_ptr<ElevationModel>> OpenFromCache(std::vector<DemFile> files, const DemOptions& options);
   ~ElevationModel();
 
@@ -120,8 +120,9 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The same for the tile edges that end at a corner of this tile and are not its own. By corner (south-west,
-  // south-east, north-east, north-west); one element for each such edge, without its two end nodes.
+  // The requirements for edges of other tiles: for each corner of this tile (south-west, south-east, north-east,
+  // north-west) those of the edges that end there and are not its own. An element has the nodes of one edge without
+  // its two ends.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.

@@ -1,4 +1,4 @@
-// Hashes of the bytes of files that have no statistics: masks, images, PROJ grids.
+// Hashes of the bytes of masks, images and PROJ grids. Elevation rasters are hashed together with their statistics.
 #pragma once
 
 #include <stop_token>

@@ -199,7 +199,7 @@ Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format
                    row->folder.empty() ? row->suffix : row->folder);
 }
 
-Result<void> CheckHasKind(const DatasetView& dataset, tiler::TileFormat format, std::string_view query) {
+Result<void> CheckHasQueriedTiles(const DatasetView& dataset, tiler::TileFormat format, std::string_view query) {
   if (!dataset.only_archive || query.empty()) return {};
   const tiler::BakedTiles& baked = *dataset.only_archive;
   const auto check = [&](const TileRequest& tile) {

@@ -57,9 +57,9 @@ Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::spa
 // its latitudes.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
 
-// Whether a document may have `query` in its templates of tiles of this format. kNotFound, for a dataset without
-// sources: its archive has no such tiles on some level. Errors of TileFormatRow::read.
-Result<void> CheckHasKind(const DatasetView& dataset, tiler::TileFormat format, std::string_view query);
+// For documents that append `query` to their URLs of tiles of this format. kNotFound, for a dataset without sources:
+// its archive lacks such tiles on some level. Errors of TileFormatRow::read.
+Result<void> CheckHasQueriedTiles(const DatasetView& dataset, tiler::TileFormat format, std::string_view query);
 
 // The dataset's index, or kNotFound.
 Result<std::uint32_t> FindDataset(std::string_view name, std::span<const DatasetView> datasets);

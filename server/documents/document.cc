@@ -73,8 +73,8 @@ Response Serve(const RenderedDocument& made, const DocumentPlan& plan, const Req
   return Conditional(std::move(response), request);
 }
 
-DocumentMaker::DocumentMaker(CatalogPtr catalog, DocumentFlights& flights, std::chrono::milliseconds deadline)
-    : catalog_(std::move(catalog)), flights_(flights), deadline_(deadline) {}
+DocumentMaker::DocumentMaker(CatalogPtr catalog, DocumentFlights& flights)
+    : catalog_(std::move(catalog)), flights_(flights) {}
 
 Answer DocumentMaker::Make(DocumentAnswer described, const RequestContext& context) const {
   auto* plan = std::get_if<DocumentPlan>(&described);
@@ -96,10 +96,10 @@ asio::awaitable<Response> DocumentMaker::MakeOnWorker(DocumentPlan plan, tiler::
   };
   // The work holds the catalog, so no other one has its address meanwhile.
   std::string key = fmt::format("{} {} {}", fmt::ptr(catalog_.get()), tiler::NameOf(coding), plan.key);
-  const JobTerms terms = ShortTerms(JobClock::now() + deadline_, context.request->client);
+  const JobTerms terms = ShortTerms(context.request->deadline, context.request->client);
   const Result<DocumentPtr> made =
       (co_await flights_.Join(std::move(key), "the document", std::move(work), terms)).value;
-  if (!made) co_return co_await BackendFailure(made.error(), context.request->id);
+  if (!made) co_return co_await DelayedBackendError(made.error(), context.request->id);
   if ((*made)->is_final) kept_.Insert(Key{plan.key, coding}, *made);
   co_return Serve(**made, plan, *context.request);
 }

@@ -4,7 +4,6 @@
 // a while.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -92,8 +91,8 @@ class DocumentMaker {
   // Size of the cache. The least recently used documents are evicted first.
   static constexpr std::size_t kKeptBytes = std::size_t{8} << 20;
 
-  // `flights` must outlive this object. All plans refer to `catalog`. `deadline`: of making a document.
-  DocumentMaker(CatalogPtr catalog, DocumentFlights& flights, std::chrono::milliseconds deadline);
+  // `flights` must outlive this object. All plans refer to `catalog`.
+  DocumentMaker(CatalogPtr catalog, DocumentFlights& flights);
 
   // Returns cached documents at once. This object and `context` must outlive the answer.
   Answer Make(DocumentAnswer described, const RequestContext& context) const;
@@ -116,7 +115,6 @@ class DocumentMaker {
 
   const CatalogPtr catalog_;
   DocumentFlights& flights_;
-  const std::chrono::milliseconds deadline_;
   mutable tiler::ByteCache<Key, KeyHash, RenderedDocument> kept_{kKeptBytes};
 };
 

@@ -50,7 +50,7 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the mesh any more");
     return mesh;
   };
-  const auto deadline = state.Deadline();
+  const auto deadline = context.request->deadline;
   Result<tiler::EncodedTile> mesh =
       co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
   if (!mesh) co_return co_await RefuseQuery(mesh.error(), state.catalog->datasets[dataset], context.request->id);

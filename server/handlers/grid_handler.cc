@@ -171,7 +171,7 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "nobody waits for the grid any more");
     return made;
   };
-  const auto deadline = state.Deadline();
+  const auto deadline = context.request->deadline;
   Result<MadeGrid> made = co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
   if (!made) co_return co_await RefuseQuery(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));

@@ -23,7 +23,7 @@ std::vector<HandlerState::DatasetDocuments> MakeDatasetDocuments(const std::vect
 }  // namespace
 
 HandlerState::HandlerState(CatalogPtr c, WorkerPool& w, TileService& t, DocumentFlights& document_flights,
-                           std::shared_ptr<const StaticFiles> v, const config::Config& config, const ProcessState& p)
+                           std::shared_ptr<const StaticFiles> v, const config::Config& config, const ServerStatus& p)
     : catalog(std::move(c)),
       workers(w),
       tiles(t),
@@ -31,12 +31,11 @@ HandlerState::HandlerState(CatalogPtr c, WorkerPool& w, TileService& t, Document
       viewer(std::move(v)),
       cache_control(config.cache_control),
       origin_headers(OriginHeaders(config)),
-      deadline(config.request_deadline),
       max_locations(config.max_locations),
       max_mesh_samples(config.max_mesh_samples),
       dataset_documents(MakeDatasetDocuments(catalog->datasets)),
       list(Document::Make(DatasetsJson(catalog->datasets), "application/json")),
       index(Document::Make(IndexHtml(catalog->datasets), "text/html; charset=utf-8")),
-      documents(catalog, document_flights, deadline) {}
+      documents(catalog, document_flights) {}
 
 }  // namespace terrace::server

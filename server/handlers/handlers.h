@@ -1,7 +1,6 @@
 // The handlers, one function for each kind of URL (server/routes.cc), and HandlerState, which they share.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -44,9 +43,9 @@ struct PendingDataset {
 };
 
 // The current state of the process. Thread-safe.
-class ProcessState {
+class ServerStatus {
  public:
-  virtual ~ProcessState() = default;
+  virtual ~ServerStatus() = default;
   virtual bool draining() const = 0;
   virtual bool opening() const = 0;  // the first catalog has not been opened yet
   // Problems by dataset; "" is the configuration, kCacheProblem the cache folder.
@@ -60,23 +59,18 @@ class ProcessState {
 struct HandlerState {
   // `workers` run all work that may block. What is passed by reference must outlive this object, except `config`.
   HandlerState(CatalogPtr catalog, WorkerPool& workers, TileService& tiles, DocumentFlights& document_flights,
-               std::shared_ptr<const StaticFiles> viewer, const config::Config& config, const ProcessState& process);
-
-  // The deadline of work that begins now. Before and after this work a request may also wait for memory, until the
-  // session's deadline (http/session.h).
-  JobClock::time_point Deadline() const { return JobClock::now() + deadline; }
+               std::shared_ptr<const StaticFiles> viewer, const config::Config& config, const ServerStatus& process);
 
   const CatalogPtr catalog;
   WorkerPool& workers;
   TileService& tiles;
-  const ProcessState& process;
+  const ServerStatus& process;
   const std::shared_ptr<const StaticFiles> viewer;
 
   // From the configuration.
   const std::string cache_control;  // for requests without a version
   // A literal: the headers in which a trusted proxy reports the origin; empty: no proxy is trusted.
   const std::string_view origin_headers;
-  const std::chrono::milliseconds deadline;  // of an answer that has to be made
   const std::size_t max_locations, max_mesh_samples;
 
   // Documents for requests without parameters.

@@ -82,7 +82,7 @@ Result<tiler::PointHeights> ReadSurface(const tiler::TilePipeline& pipeline, std
 asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
   const DatasetView& view = state.catalog->datasets[dataset];
-  const auto deadline = state.Deadline();
+  const auto deadline = context.request->deadline;
   // A path of two corners may have thousands of points.
   const bool is_quick =
       context.route.query.size() <= kQuickQuery && context.route.query.find("path") == std::string::npos;

@@ -60,8 +60,8 @@ DocumentAnswer DescribeLayer(const HandlerState& state, const RequestContext& co
   }
   const Result<TileParameters> parameters = ParseTileParameters(context.route.query, /*allow_at_least=*/false);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
-  const auto has_kind = CheckHasKind(state.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh,
-                                     TileQuery(parameters->requested));
+  const auto has_kind = CheckHasQueriedTiles(state.catalog->datasets[*dataset], tiler::TileFormat::kQuantizedMesh,
+                                             TileQuery(parameters->requested));
   if (!has_kind) return ClientErrorResponse(has_kind.error(), context.request->id);
   std::string tile_query = WithToken(TileQuery(parameters->requested), context);
   if (tile_query.empty()) return Serve(state.dataset_documents[*dataset].layer, *context.request, kRevalidate);

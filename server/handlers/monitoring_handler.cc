@@ -26,7 +26,7 @@ Response PlainState(int status, std::string text) {
   return StateResponse(status, "text/plain; charset=utf-8", std::make_shared<const std::string>(std::move(text)));
 }
 
-asio::awaitable<Response> WriteMetrics(const ProcessState& process) {
+asio::awaitable<Response> WriteMetrics(const ServerStatus& process) {
   std::shared_ptr<const std::string> text = co_await process.MetricsText();
   co_return StateResponse(200, kMetricsType, std::move(text));
 }

@@ -43,7 +43,7 @@ PointReply StartPointReply(const Request& request, bool is_binary) {
 asio::awaitable<Response> RefuseQuery(Error error, const DatasetView& view, RequestId request_id) {
   const bool is_absent = error.code == ErrorCode::kNotFound && view.only_archive;
   if (is_absent || error.code == ErrorCode::kInvalidArgument) co_return ClientErrorResponse(error, request_id);
-  co_return co_await BackendFailure(std::move(error), request_id);
+  co_return co_await DelayedBackendError(std::move(error), request_id);
 }
 
 asio::awaitable<Response> FinishPointReply(Response response, Result<MadeReply> made, const DatasetView& view,

@@ -114,7 +114,7 @@ std::string SightJson(const SightQuery& query, const std::vector<dem::SightAnswe
 asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestContext& context, std::uint32_t dataset) {
   const Request& request = *context.request;
   const DatasetView& view = state.catalog->datasets[dataset];
-  const auto deadline = state.Deadline();
+  const auto deadline = context.request->deadline;
   const bool is_quick = context.route.query.size() <= kQuickQuery;
   Result<SightQuery> parsed = co_await ParsePoints(state, context, ParseSight, is_quick, deadline);
   if (!parsed) co_return co_await RefuseQuery(parsed.error(), view, request.id);

@@ -36,7 +36,7 @@ Response Reply(const HandlerState& state, const tiler::TileRequest& tile, const 
       CacheControlOf(context.route.query, state.catalog->datasets[tile.dataset], state.cache_control);
   response.vary = context.route.format->vary(tile);
   if (served.cache == CacheStatus::kHit) {
-    response.more_lines = "Server-Timing: cache;desc=hit\r\n";
+    response.literal_lines = "Server-Timing: cache;desc=hit\r\n";
   } else {
     response.headers.emplace_back("Server-Timing", FormatServerTiming(Name(served), served.tile->times));
   }
@@ -51,12 +51,12 @@ Response Reply(const HandlerState& state, const tiler::TileRequest& tile, const 
 
 asio::awaitable<Response> BuildTile(const HandlerState& state, const RequestContext& context, tiler::TileRequest tile) {
   const Result<ServedTile> served =
-      co_await state.tiles.Build(state.catalog, tile, state.Deadline(), context.request->client);
+      co_await state.tiles.Build(state.catalog, tile, context.request->deadline, context.request->client);
   if (served) co_return Reply(state, tile, *served, context);
   const bool is_absent =
       served.error().code == ErrorCode::kNotFound && state.catalog->datasets[tile.dataset].only_archive;
   if (is_absent) co_return ClientErrorResponse(served.error(), context.request->id);
-  co_return co_await BackendFailure(served.error(), context.request->id);
+  co_return co_await DelayedBackendError(served.error(), context.request->id);
 }
 
 }  // namespace

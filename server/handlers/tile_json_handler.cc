@@ -54,7 +54,7 @@ Answer AnswerTileJson(const HandlerState& state, const RequestContext& context) 
     return ClientErrorResponse(has.error(), context.request->id);
   }
   const std::string tile_query = HeightTileQuery(dataset, *parameters);
-  const auto has_kind = CheckHasKind(dataset, tiler::TileFormat::kHeightPng, tile_query);
+  const auto has_kind = CheckHasQueriedTiles(dataset, tiler::TileFormat::kHeightPng, tile_query);
   if (!has_kind) return ClientErrorResponse(has_kind.error(), context.request->id);
   proto::TileJsonDescription tiles;
   tiles.name = dataset.name;

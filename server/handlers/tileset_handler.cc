@@ -78,7 +78,8 @@ DocumentAnswer DescribeTileset(const HandlerState& state, const RequestContext& 
       ParseTileParameters(context.route.query, /*allow_at_least=*/false, /*allow_compression=*/true);
   if (!parameters) return ClientErrorResponse(parameters.error(), context.request->id);
   const std::string content_parameters = ContentQuery(parameters->requested, context.route.query);
-  const auto has_kind = CheckHasKind(state.catalog->datasets[*dataset], tiler::TileFormat::kGlb, content_parameters);
+  const auto has_kind =
+      CheckHasQueriedTiles(state.catalog->datasets[*dataset], tiler::TileFormat::kGlb, content_parameters);
   if (!has_kind) return ClientErrorResponse(has_kind.error(), context.request->id);
   std::string content_query = WithToken(content_parameters, context);
   if (content_query.empty()) return Serve(state.dataset_documents[*dataset].tileset, *context.request, kRevalidate);

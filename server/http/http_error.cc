@@ -113,7 +113,7 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id) {
   return response;
 }
 
-asio::awaitable<Response> BackendFailure(Error error, RequestId request_id) {
+asio::awaitable<Response> DelayedBackendError(Error error, RequestId request_id) {
   if (error.code == ErrorCode::kOverloaded) {
     asio::steady_timer delay(co_await asio::this_coro::executor, kRefusalDelay);
     co_await delay.async_wait(asio::use_awaitable);

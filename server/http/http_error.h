@@ -32,6 +32,6 @@ Response BackendErrorResponse(const Error& error, std::string_view request_id);
 inline constexpr std::chrono::milliseconds kRefusalDelay{200};
 
 // BackendErrorResponse; a refusal for overload is delayed.
-asio::awaitable<Response> BackendFailure(Error error, RequestId request_id);
+asio::awaitable<Response> DelayedBackendError(Error error, RequestId request_id);
 
 }  // namespace terrace::server

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -97,7 +98,7 @@ struct Request {
   unsigned version = 11;    // 10 or 11
   bool keep_alive = true;   // what the client wants
   std::string method_name;  // as sent, for the log
-  std::string target;       // as sent, until it is admitted
+  std::string target;       // as sent; ConnectionHandler::Admit removes a token
   SharedFields fields;
   std::size_t content_length = 0;  // of a POST
   bool expects_continue = false;   // the client waits for a 100 before it sends the body
@@ -105,6 +106,8 @@ struct Request {
 
   // Assigned by the server.
   RequestId id;
+  // When all waiting and work for this request ends. The time in which its body arrives does not count.
+  std::chrono::steady_clock::time_point deadline = std::chrono::steady_clock::time_point::max();
   bool is_https = false;     // how the client speaks to this server, or to the proxy before it
   bool is_private = true;    // shared caches must not keep the reply
   std::uint64_t client = 0;  // identifies the client to the fair queue and to memory limits

@@ -91,7 +91,7 @@ std::string SerializeHead(const Response& response, const HeadOptions& options) 
   PutContent(head, response);
   PutCacheControl(head, response, response.depends_on_token || options.is_private);
   PutVary(head, response, cors);
-  head += response.more_lines;
+  head += response.literal_lines;
   for (const Response::Header& header : response.headers) Put(head, header.name, header.value);
   head += cors.HeadersFor(options.origin);
   head += "X-Content-Type-Options: nosniff\r\n";

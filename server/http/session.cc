@@ -89,6 +89,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   void Evict() override { Post(&Session::EvictHere); }
   void Drain() override { Post(&Session::DrainHere); }
   void Abort() override { Post(&Session::AbortHere); }
+  // For another connection that needs the memory of this one's body; Evict is for one that needs its place.
   void Displace() override { Post(&Session::DisplaceHere); }
 
  private:
@@ -115,9 +116,9 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // While a reply is being sent, there is nothing to release.
+  // Releases the memory of a request's body. There is none while a reply is being sent. While a body is being received
+  // there may be some, although has_upload_ is not set yet.
   void DisplaceHere() {
-    // ReceiveBody may have been granted memory and not have set has_upload_ yet.
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
     if (is_receiving_ && has_upload_) stream_.Cancel();
@@ -128,6 +129,7 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<bool> ServeOne();
   asio::awaitable<void> RefuseMessage(BadRequest why);
   asio::awaitable<bool> ReceiveBody();
+  asio::awaitable<tl::expected<void, BadRequest>> ReadBody(std::string& text, std::size_t bytes);
   asio::awaitable<void> RefuseUpload();
   asio::awaitable<void> DelayRefusal();
   asio::awaitable<std::monostate> Sleep(std::chrono::milliseconds time);
@@ -142,7 +144,6 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
   asio::awaitable<std::optional<MaybeRoom>> RoomLater(Response& response);
   TransferBudget::HoldRequest HoldRequestOf(const Response& response) const;
   bool SendsBody(const Response& response) const;
-  Clock::time_point Deadline() const { return exchange_.begun + context_->deadline->load(std::memory_order_relaxed); }
   asio::awaitable<bool> Reply(Response& response, bool can_respond_again = false);
   asio::awaitable<bool> WriteRest(BufferPair left, std::size_t total, TransferBudget::Hold& room);
   asio::awaitable<void> CloseGently();
@@ -183,6 +184,7 @@ asio::awaitable<void> Session::ServeAll() {
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
+    exchange_.request.deadline = exchange_.begun + context_->request_time->load(std::memory_order_relaxed);
     exchange_.has_valid_head = false;
     if (!*head) {
       co_await RefuseMessage(head->error());
@@ -194,7 +196,8 @@ asio::awaitable<void> Session::ServeAll() {
   co_await CloseGently();
 }
 
-// The following bytes may not be a request.
+// Refuses bytes that are no valid request. The connection must be closed then: where the next request begins is
+// unknown.
 asio::awaitable<void> Session::RefuseMessage(BadRequest why) {
   if (exchange_.request.id.empty()) exchange_.request.id = RequestId::Next();
   Response response = ProblemResponse(why.status, why.detail, exchange_.request.id);
@@ -208,7 +211,7 @@ asio::awaitable<bool> Session::ServeOne() {
   request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
   Admission& admission = exchange_.admission;
-  admission = handler_->Admit(request, context_->deadline->load(std::memory_order_relaxed));
+  admission = handler_->Admit(request, context_->request_time->load(std::memory_order_relaxed));
   exchange_.has_valid_head = true;
   if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
   if (admission.delays_refusal) {
@@ -254,14 +257,14 @@ asio::awaitable<bool> Session::ReceiveBody() {
   phase_.store(Phase::kReceives, std::memory_order_relaxed);
   is_receiving_ = true;
   const std::size_t first = std::min(request.content_length, TransferBudget::kFreeBytes);
-  tl::expected<void, BadRequest> read = co_await reader_.ReadBody(request, body->text, first);
+  tl::expected<void, BadRequest> read = co_await ReadBody(body->text, first);
   if (read && request.content_length > first) {
     TransferBudget::HoldRequest upload;
     upload.kind = TransferBudget::Kind::kUpload;
     upload.bytes = request.content_length;
     upload.client = request.client;
     upload.holder = weak_from_this();
-    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(upload), Deadline()));
+    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(upload), request.deadline));
     if (!room) co_return co_await GiveUp();
     if (!*room) {
       co_await RefuseUpload();
@@ -271,7 +274,7 @@ asio::awaitable<bool> Session::ReceiveBody() {
     has_upload_ = true;
     if (!displaced_) {
       body->text.reserve(request.content_length);
-      read = co_await reader_.ReadBody(request, body->text, request.content_length);
+      read = co_await ReadBody(body->text, request.content_length);
     }
   }
   is_receiving_ = false;
@@ -285,6 +288,14 @@ asio::awaitable<bool> Session::ReceiveBody() {
   body->room.EndUpload();
   request.body = RequestBody(std::shared_ptr<const std::string>(body, &body->text));
   co_return true;
+}
+
+// The request's deadline is postponed by the time that this takes: a slow upload has limits of its own (ReadTimeouts).
+asio::awaitable<tl::expected<void, BadRequest>> Session::ReadBody(std::string& text, std::size_t bytes) {
+  const auto begun = Clock::now();
+  auto read = co_await reader_.ReadBody(exchange_.request, text, bytes);
+  exchange_.request.deadline += Clock::now() - begun;
+  co_return read;
 }
 
 // Others get its memory: release the body.
@@ -378,7 +389,8 @@ asio::awaitable<std::optional<Session::MaybeRoom>> Session::RoomLater(Response& 
     Response bare;  // the header lines of `response` would keep its body alive
     bare.labels = std::move(response.labels);
     response = std::move(bare);
-    auto room = co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), Deadline()));
+    auto room =
+        co_await WhileConnected(context_->transfers->HoldWhenRoom(std::move(hold_request), exchange_.request.deadline));
     if (!room || !*room) co_return room;
     Answer again = Handle();
     if (auto* later = std::get_if<asio::awaitable<Response>>(&again)) {

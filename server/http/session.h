@@ -5,7 +5,7 @@
 // TransferBudget::kFreeBytes count against a budget that all sessions share. If it has no memory, they wait until the
 // request's deadline, and are then refused; an upload is refused earlier if others get its memory. A request over its
 // client's rate waits for its turn; if the turn would come after its deadline, it is refused after kRefusalDelay
-// (http_error.h).
+// (http_error.h). All these waits and the answer itself share one deadline.
 #pragma once
 
 #include <atomic>
@@ -39,7 +39,8 @@ struct SessionContext {
   Application* application = nullptr;
   ConnectionSet* connections = nullptr;
   TransferBudget* transfers = nullptr;
-  const std::atomic<std::chrono::milliseconds>* deadline = nullptr;  // of a request, counted from its head
+  // How long after its head the deadline of a request is (Request::deadline).
+  const std::atomic<std::chrono::milliseconds>* request_time = nullptr;
   CorsPolicy cors;
   const TlsContext* tls = nullptr;  // null: plain HTTP
 };

@@ -24,12 +24,11 @@ struct TileParameters {
 };
 
 // Parses the query of tiles, layer.json, tileset.json and subtrees. `allow_at_least`: `atleast` is known.
-// `allow_compression` (GLB tiles, tileset.json and subtrees): `compression` and `texture` are known. `v` and
-// `extensions` may be repeated, because clients append them. With `allow_compression`, error, fraction, compression
-// and texture may be repeated with the same value, because deck.gl appends the query of tileset.json to every URL below
-// it. kInvalidArgument,
-// with a message for the client: an unknown or repeated parameter, error and fraction together, atleast without error,
-// or an invalid value.
+// `allow_compression` (GLB tiles, tileset.json and subtrees): `compression` and `texture` are known. `v` (a
+// dataset's version, ignored here) and `extensions` may be repeated, because clients append them. With
+// `allow_compression`, error, fraction, compression and texture may be repeated with the same value, because deck.gl
+// appends the query of tileset.json to every URL below it. kInvalidArgument, with a message for the client: an unknown
+// or repeated parameter, error and fraction together, atleast without error, or an invalid value.
 Result<TileParameters> ParseTileParameters(std::string_view query, bool allow_at_least, bool allow_compression = false);
 
 struct HeightTileParameters {

@@ -8,6 +8,8 @@
 #include <set>
 #include <vector>
 
+#include "archive/export.h"
+#include "archive/pmtiles/pmtiles_file.h"
 #include "archive/unit_writer.h"
 #include "engine/common/idle_pool.h"
 #include "tests/archive/small_archive.h"
@@ -195,6 +197,31 @@ TEST_F(ArchiveTest, ArchivesOfSeveralFormatsInOnePlace) {
   EXPECT_EQ(archives->size(), 2U);
   EXPECT_EQ(Archive::OpenAll(Place() + "/glb")->size(), 1U);
   EXPECT_FALSE(Archive::OpenAll(scratch_.path().string()));
+}
+
+// Bounds of a header cannot cross the antimeridian. A viewer that goes to the centre must see the data all the same.
+TEST_F(ArchiveTest, SingleFileHasItsCentreWhereItsDataAre) {
+  struct {
+    dem::GeoBounds dataset, header;
+    double center;
+  } const cases[] = {
+      {{10, -33, 11, -32}, {10, -33, 11, -32}, 10.5},
+      {{176, -18, -178, -16}, {-180, -18, 180, -16}, 179},  // as in Fiji
+      {{179, -18, 185, -16}, {-180, -18, 180, -16}, -178},
+  };
+  Manifest manifest = WriteUnits(Place(), InventedKeys());
+  const std::string single = (scratch_.path() / "single.pmtiles").string();
+  for (const auto& [dataset, of_header, center] : cases) {
+    manifest.dataset.bounds = dataset;
+    ASSERT_TRUE(WriteManifest(Place(), manifest));
+    ASSERT_TRUE(WriteSingle(*OpenBaked(), single));
+    const auto file = PmtilesFile::Open(single);
+    ASSERT_TRUE(file) << file.error().message;
+    const PmtilesHeader& header = (*file)->header();
+    EXPECT_NEAR(header.center_longitude, center, 1e-7);
+    EXPECT_NEAR(header.bounds.west, of_header.west, 1e-7);
+    EXPECT_NEAR(header.bounds.east, of_header.east, 1e-7);
+  }
 }
 
 }  // namespace

@@ -32,7 +32,8 @@ class TileTiers {
   TileTiers(std::size_t memory_bytes, std::vector<std::shared_ptr<TileStore>> stores,
             HeaderWriter write_header_lines = nullptr);
 
-  // The tier in memory: the only one that is asked without blocking. Its hits and misses are 0.
+  // The tier in memory: the only one that is asked without blocking. It does not
+  // count: hits and misses of its stats() are 0.
   TileCache& memory() { return memory_; }
   const TileCache& memory() const { return memory_; }
 

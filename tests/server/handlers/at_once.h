@@ -13,7 +13,7 @@
 
 namespace terrace::server {
 
-class TestHandlerState : private ProcessState {
+class TestHandlerState : private ServerStatus {
  public:
   explicit TestHandlerState(CatalogPtr catalog)
       : all(std::move(catalog), workers_, tiles_, document_flights_, std::make_shared<const StaticFiles>(),

@@ -1,4 +1,4 @@
-// Several sessions on one thread take turns.
+// Sessions on one thread: turns, and the deadlines of requests.
 #include "server/http/session.h"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@
 namespace terrace::server {
 namespace {
 
-// Answers immediately, and records the targets in the order of the requests.
+// Lets each request wait, answers it immediately, and records it.
 class Echo : public Application {
  public:
   std::unique_ptr<ConnectionHandler> Connect(const asio::ip::address&) override {
@@ -25,15 +25,24 @@ class Echo : public Application {
   }
   std::string ClientOf(const asio::ip::address&) const override { return ""; }
 
-  std::vector<std::string> targets;
+  std::chrono::milliseconds wait{0};
+  std::vector<std::string> targets;                                            // in the order of the answers
+  std::vector<std::chrono::steady_clock::time_point> at_admission, at_answer;  // deadlines
 
  private:
   class Handler : public ConnectionHandler {
    public:
     explicit Handler(Echo& echo) : echo_(echo) {}
-    Admission Admit(Request&, std::chrono::milliseconds) override { return {}; }
+    Admission Admit(Request& request, std::chrono::milliseconds) override {
+      echo_.at_admission.push_back(request.deadline);
+      Admission admission;
+      admission.wait = echo_.wait;
+      admission.max_body_bytes = 16;
+      return admission;
+    }
     Answer Handle(const Request& request) override {
       echo_.targets.emplace_back(request.target);
+      echo_.at_answer.push_back(request.deadline);
       return Response{};
     }
     void Report(const SentReply&) override {}
@@ -60,35 +69,76 @@ void Ask(Ends& ends, const std::string& name, int requests) {
   asio::write(ends.client, asio::buffer(text));
 }
 
-TEST(Session, RequestsSentAheadTakeTurnsWithOtherConnections) {
-  asio::io_context io{1};
-  Echo echo;
-  ConnectionSet connections(8);
-  TransferBudget transfers(1 << 20);
-  const std::atomic<std::chrono::milliseconds> deadline{std::chrono::seconds(10)};
-  const auto context = std::make_shared<SessionContext>();
-  context->application = &echo;
-  context->connections = &connections;
-  context->transfers = &transfers;
-  context->deadline = &deadline;
+class Sessions : public testing::Test {
+ protected:
+  Sessions() {
+    context_->application = &echo_;
+    context_->connections = &connections_;
+    context_->transfers = &transfers_;
+    context_->request_time = &request_time_;
+  }
+  void RunUntilAnswered(std::size_t requests) {
+    while (echo_.targets.size() < requests && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+    }
+  }
+  void End() {
+    connections_.AbortAll();
+    io_.run_for(std::chrono::seconds(10));
+  }
+
+  asio::io_context io_{1};
+  Echo echo_;
+  ConnectionSet connections_{8};
+  TransferBudget transfers_{1 << 20};
+  const std::atomic<std::chrono::milliseconds> request_time_{std::chrono::seconds(10)};
+  const std::shared_ptr<SessionContext> context_ = std::make_shared<SessionContext>();
+};
+
+TEST_F(Sessions, RequestsSentAheadTakeTurnsWithOtherConnections) {
   constexpr int kAhead = 20;
   {
-    Ends greedy(io), polite(io);
+    Ends greedy(io_), polite(io_);
     Ask(greedy, "greedy", kAhead);
     Ask(polite, "polite", 1);
-    StartSession(std::move(greedy.server), context, "");
-    StartSession(std::move(polite.server), context, "");
-    while (echo.targets.size() < kAhead + 1 && io.run_one_for(std::chrono::seconds(10)) > 0) {
-    }
+    StartSession(std::move(greedy.server), context_, "");
+    StartSession(std::move(polite.server), context_, "");
+    RunUntilAnswered(kAhead + 1);
     greedy.client.close();
     polite.client.close();
-    connections.AbortAll();
-    io.run_for(std::chrono::seconds(10));
+    End();
   }
-  ASSERT_EQ(echo.targets.size(), kAhead + 1U);
-  const auto polite = std::ranges::find(echo.targets, "/polite");
-  ASSERT_NE(polite, echo.targets.end());
-  EXPECT_LE(polite - echo.targets.begin(), 3) << "requests of the greedy one were answered before it";
+  ASSERT_EQ(echo_.targets.size(), kAhead + 1U);
+  const auto polite = std::ranges::find(echo_.targets, "/polite");
+  ASSERT_NE(polite, echo_.targets.end());
+  EXPECT_LE(polite - echo_.targets.begin(), 3) << "requests of the greedy one were answered before it";
+}
+
+TEST_F(Sessions, WaitsAndTheAnswerShareTheDeadlineOfTheHead) {
+  using Clock = std::chrono::steady_clock;
+  echo_.wait = std::chrono::milliseconds(50);
+  {
+    Ends ends(io_);
+    const auto begun = Clock::now();
+    StartSession(std::move(ends.server), context_, "");
+    Ask(ends, "at-once", 1);
+    RunUntilAnswered(1);
+    asio::write(ends.client, asio::buffer(std::string("POST /slow HTTP/1.1\r\nHost: x\r\nContent-Length: 4\r\n\r\n")));
+    while (echo_.at_admission.size() < 2 && io_.run_one_for(std::chrono::seconds(10)) > 0) {
+    }
+    io_.run_for(std::chrono::milliseconds(200));
+    ASSERT_EQ(echo_.at_answer.size(), 1U) << "the body has not been sent";
+    asio::write(ends.client, asio::buffer(std::string("body")));
+    RunUntilAnswered(2);
+    const auto taken = Clock::now() - begun;
+    ends.client.close();
+    End();
+    ASSERT_EQ(echo_.at_answer.size(), 2U);
+    EXPECT_GE(echo_.at_admission[0], begun + request_time_.load());
+    EXPECT_EQ(echo_.at_answer[0], echo_.at_admission[0]);
+    const auto postponed = echo_.at_answer[1] - echo_.at_admission[1];
+    EXPECT_GT(postponed.count(), 0) << "while the body arrived";
+    EXPECT_LE(postponed, taken - 2 * echo_.wait) << "waits were not counted";
+  }
 }
 
 }  // namespace
