@@ -109,7 +109,7 @@ std::uint64_t UnitKey(const tiler::Dataset& dataset, const archive::Manifest& ma
     hasher.Add(model.ContentBelow(*unit.root, last));
     if (manifest.kind.extensions.metadata) {
       // Metadata lists the dataset's tiles below a tile.
-      const int deepest = static_cast<int>(model.AvailabilityBelow(*unit.root).size()) - 1;
+      const int deepest = static_cast<int>(model.AvailabilityToDepthOf(*unit.root).size()) - 1;
       for (int level = unit.root->level; level <= deepest; ++level) {
         const geo::TileRange below = geo::TilesBelow(*unit.root, level);
         std::vector<geo::TileRange> parts;

@@ -52,7 +52,7 @@ std::optional<geo::TileKey> ParseRoot(std::string_view name) {
 
 // Removes ".7.subtree" from the last segment of a subtree's URL and returns 7; nothing if the segment does not end like
 // this.
-std::optional<int> CutSubtreeLevels(std::string_view& row) {
+std::optional<int> TakeSubtreeLevels(std::string_view& row) {
   constexpr std::string_view kSuffix = ".subtree";
   if (!row.ends_with(kSuffix)) return std::nullopt;
   const std::string_view rest = row.substr(0, row.size() - kSuffix.size());
@@ -78,10 +78,10 @@ bool ReadInTree(const Segments& segments, std::string_view row, Route& route) {
 
 // The following functions are RouteRow::read. Of tiles: /{dataset}/{z}/{x}/{y}.terrain, .glb and so on.
 bool ReadTile(const Segments& segments, Route& route) {
-  std::string_view row = segments[3];
-  route.format = CutSuffix(row);
+  std::string_view last = segments[3];
+  route.format = TakeFormat(last);
   if (route.format == nullptr) return false;
-  const auto key = ParseTileKey(segments[1], segments[2], row, route.format->is_mercator());
+  const auto key = ParseTileKey(segments[1], segments[2], last, route.format->is_mercator());
   if (!key) return false;
   route.key = *key;
   return true;
@@ -90,11 +90,11 @@ bool ReadTile(const Segments& segments, Route& route) {
 // Of tiles for maps: /{dataset}/hillshade/{z}/{x}/{y}.png and so on. `kAt`: the segment of the level.
 template <std::size_t kAt>
 bool ReadTileInFolder(const Segments& segments, Route& route) {
-  std::string_view row = segments[kAt + 2];
+  std::string_view last = segments[kAt + 2];
   const std::string folder = kAt == 2 ? std::string(segments[1]) : fmt::format("{}/{}", segments[1], segments[2]);
-  route.format = CutSuffix(row, folder);
+  route.format = TakeFormat(last, folder);
   if (route.format == nullptr) return false;
-  const auto key = ParseTileKey(segments[kAt], segments[kAt + 1], row, route.format->is_mercator());
+  const auto key = ParseTileKey(segments[kAt], segments[kAt + 1], last, route.format->is_mercator());
   if (!key) return false;
   route.key = *key;
   return true;
@@ -107,15 +107,16 @@ bool ReadMapLayer(const Segments& segments, Route& route) {
 
 // Of implicit tiles: /{dataset}/3dtiles/{root}/{level}/{x}/{y}.glb, counted from the root.
 bool ReadImplicitTile(const Segments& segments, Route& route) {
-  std::string_view row = segments[5];
-  route.format = CutSuffix(row);
-  return route.format != nullptr && route.format->format == tiler::TileFormat::kGlb && ReadInTree(segments, row, route);
+  std::string_view last = segments[5];
+  route.format = TakeFormat(last);
+  return route.format != nullptr && route.format->format == tiler::TileFormat::kGlb &&
+         ReadInTree(segments, last, route);
 }
 
 bool ReadSubtree(const Segments& segments, Route& route) {
-  std::string_view row = segments[5];
-  const std::optional<int> levels = CutSubtreeLevels(row);
-  if (!levels || !ReadInTree(segments, row, route)) return false;
+  std::string_view last = segments[5];
+  const std::optional<int> levels = TakeSubtreeLevels(last);
+  if (!levels || !ReadInTree(segments, last, route)) return false;
   route.subtree_levels = *levels;
   return true;
 }

@@ -65,9 +65,9 @@ class TilePipeline {
                                                                 std::stop_token stop) const;
 
   // Heights of the meshes that clients decode, with the tile of each point; NaN in holes that edits cut. Where the
-  // level has no tile, of the deepest available ancestor. `normals`: also normals. Keeps meshes between calls.
-  // kInvalidArgument: the dataset has no such level, or the points lie in more than 64 tiles. Other errors: those of
-  // Build.
+  // level has no tile, the mesh of its deepest available ancestor is read. `normals`: also normals. Keeps meshes
+  // between calls. kInvalidArgument: the dataset has no such level, or the points lie in more than 64 tiles. Other
+  // errors: those of Build.
   virtual Result<PointHeights> ReadDrawnPoints(std::uint32_t dataset, const DrawnSurface& surface,
                                                std::span<const dem::GeoPosition> points, bool normals,
                                                std::stop_token stop) const;
@@ -86,7 +86,7 @@ class TilePipeline {
   virtual Result<EncodedTile> BuildArea(std::uint32_t dataset, const AreaPlan& plan, const AreaRequest& area,
                                         std::stop_token stop) const;
 
-  ByteCacheStats drawn_meshes() const;  // hits and misses are 0
+  ByteCacheStats drawn_meshes() const;  // which does not count hits and misses
   ByteCacheStats refinements() const;
 
  private:

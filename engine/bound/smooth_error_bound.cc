@@ -6,8 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "engine/raster/nan_heights.h"
 #include "engine/raster/node_rows.h"
-#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {

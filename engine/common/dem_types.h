@@ -87,7 +87,8 @@ struct DemFile {
   // Where several sources have a height, the lowest rank wins, then the finer source (spacings are rounded to powers of
   // 2^(1/16)), then the path that sorts first. The order of the files has no effect.
   int rank = 0;
-  bool skip_if_no_raster = false;             // found in a folder: skipped if it is not a raster; may have no heights
+  bool skip_if_no_raster =
+      false;  // found in a folder: neither a file that is no raster nor a raster of voids is an error
   std::optional<SourceOptions> options = {};  // default: DemOptions::source
 };
 

@@ -72,7 +72,7 @@ std::uint64_t ElevationModel::DeeperTilesHash(const geo::TileKey& key) const {
   return hash;
 }
 
-std::span<const std::vector<geo::TileRange>> ElevationModel::AvailabilityBelow(const geo::TileKey& key) const {
+std::span<const std::vector<geo::TileRange>> ElevationModel::AvailabilityToDepthOf(const geo::TileKey& key) const {
   const std::span<const std::vector<geo::TileRange>> all = impl_->available;
   std::size_t levels = all.size();
   const auto least = static_cast<std::size_t>(max_source_level()) + 1;

@@ -90,7 +90,7 @@ class ElevationModel::Impl {
   Result<void> ApplyEdits(const NodeGrid& node_grid, const NodeWindow& window, std::span<const std::size_t> which,
                           const EditedDatum& datum, std::span<float> heights, const std::stop_token& stop,
                           double* error_m = nullptr) const;
-  // ReplacementHeights::void_cells. `readings`: of this model, for the window. void_cells.cc.
+  // ReplacementHeights::void_cells. `readings`: of this model, for the window. dem_replacement_voids.cc.
   std::vector<std::uint8_t> VoidCells(const geo::Lattice& lattice, const NodeWindow& window,
                                       std::span<const PartReading> readings) const;
   // The edits that may reach the nodes of a window.

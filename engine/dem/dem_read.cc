@@ -10,7 +10,7 @@
 #include "engine/core/check.h"
 #include "engine/crs/node_positions.h"
 #include "engine/dem/dem_impl.h"
-#include "engine/raster/void_heights.h"
+#include "engine/raster/nan_heights.h"
 
 namespace terrace::dem {
 namespace {
@@ -99,7 +99,7 @@ Result<void> FillNodesOf(const RasterGrid& grid, const NodeGrid& node_grid, cons
   if (!done) return done;
   copy_back(heights, nodes.heights);
   copy_back(weights, nodes.weights);
-  if (!hole_heights.empty() && nodes.hole_heights->empty()) *nodes.hole_heights = VoidHeights(nodes.heights.size());
+  if (!hole_heights.empty() && nodes.hole_heights->empty()) *nodes.hole_heights = NaNHeights(nodes.heights.size());
   if (!hole_heights.empty()) copy_back(hole_heights, *nodes.hole_heights);
   if (reading_of_part != nullptr) {
     reading_of_part->part = part;
@@ -188,7 +188,7 @@ Result<std::vector<float>> ElevationModel::Impl::ReadGrids(const NodeGrid& node_
                                                            const std::stop_token& stop,
                                                            std::vector<PartReading>* readings) const {
   const std::size_t nodes = Area(window.columns, window.rows);
-  std::vector<float> heights = VoidHeights(nodes), hole_heights;
+  std::vector<float> heights = NaNHeights(nodes), hole_heights;
   const std::vector<std::size_t> order = GridsAt(BoxOf(node_grid, window));
   const bool feathers = has_feather && order.size() > 1;
   Blend blend(feathers ? nodes : 0);

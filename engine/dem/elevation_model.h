@@ -114,7 +114,7 @@ class ElevationModel {
   // Whether a source refers to a geoid, so that ReadInSourceDatum differs from Read.
   bool has_geoid() const;
 
-  // Edits (docs/edits.md). Without edits all of these except AvailabilityBelow are 0 or empty.
+  // Edits (docs/edits.md). Without edits all of these except AvailabilityToDepthOf are 0 or empty.
   //
   // The requirements of edits for the mesh of a tile. Precondition: a valid key.
   MeshDemands DemandsOf(const geo::TileKey& key) const;
@@ -130,8 +130,8 @@ class ElevationModel {
   std::uint64_t MercatorEditsHash(int depth, const NodeWindow& window) const;
   // A hash of all available tiles below a tile if edits added some of them; 0: they added none.
   std::uint64_t DeeperTilesHash(const geo::TileKey& key) const;
-  // Availability() up to the deepest level that has a tile below `key`, and at least up to max_source_level().
-  std::span<const std::vector<geo::TileRange>> AvailabilityBelow(const geo::TileKey& key) const;
+  // Availability() without the levels that are deeper than max_source_level() and than all tiles below `key`.
+  std::span<const std::vector<geo::TileRange>> AvailabilityToDepthOf(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 
   // Samples read since Open for nodes and pixels, not for points and rays, by all threads. For metrics.

@@ -59,8 +59,8 @@ void WidenHoles(const GridWindow& wide, const std::vector<float>& heights, const
 
 }  // namespace
 
-Result<WindowWithHoles> RasterGrid::ReadVoids(int factor, const GridWindow& window, bool is_guess,
-                                              const std::stop_token& stop) const {
+Result<WindowWithHoles> RasterGrid::ReadWithHoles(int factor, const GridWindow& window, bool is_guess,
+                                                  const std::stop_token& stop) const {
   const auto holes_in = [&](const GridWindow& in, const std::vector<float>& heights) {
     return voids_.HolesIn(members_, member_index_, factor, in, Columns(factor).count(), heights);
   };
@@ -122,7 +122,7 @@ Result<std::vector<float>> RasterGrid::ReadSmooth(int factor, const GridWindow& 
   for (int halo = kSweeps + 1;; halo *= 2) {
     if (stop.stop_requested()) return MakeError(ErrorCode::kCancelled, "reading was stopped");
     const GridWindow wide = Grown(window, halo, factor);
-    auto grid = ReadVoids(factor, wide, is_guess, stop);
+    auto grid = ReadWithHoles(factor, wide, is_guess, stop);
     if (!grid) return tl::unexpected(grid.error());
     const OpenSides open{wraps_ || wide.column > 0, wide.row > 0,
                          wraps_ || wide.column + wide.columns < Columns(factor).count(),

@@ -165,7 +165,7 @@ Result<void> RasterGrid::FillPoints(std::span<const GeoPosition> points, HeightD
     }
   }
   // Blocks that are kept are of the file as it was.
-  if (const auto unchanged = CheckUnread(); !unchanged || found.empty()) return unchanged;
+  if (const auto unchanged = CheckUnchanged(); !unchanged || found.empty()) return unchanged;
   found = InBlockOrder(std::move(found));
 
   std::vector<GridCell> cells;

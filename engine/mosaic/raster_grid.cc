@@ -14,8 +14,8 @@
 #include "engine/mosaic/void_fill.h"
 #include "engine/mosaic/window_values.h"
 #include "engine/raster/grid_cells.h"
+#include "engine/raster/nan_heights.h"
 #include "engine/raster/node_rows.h"
-#include "engine/raster/void_heights.h"
 
 namespace terrace::dem {
 namespace {
@@ -210,12 +210,12 @@ void RasterGrid::FindPoleHeights() {
 
 // Checks the files even if nothing is read, so that a tile of floor does not outlive its source. Tiles between many
 // sources depend on none of them.
-Result<void> RasterGrid::CheckUnread() const {
+Result<void> RasterGrid::CheckUnchanged() const {
   return members_.size() == 1 ? members_.front().raster->CheckUnchanged() : Result<void>();
 }
 
 // The same for a window of voids, of all members that it overlaps.
-Result<void> RasterGrid::CheckMembersUnread(int factor, const GridWindow& window) const {
+Result<void> RasterGrid::CheckMembersUnchanged(int factor, const GridWindow& window) const {
   for (const std::size_t i : MembersAt(PixelsOf(window, factor))) {
     if (auto unchanged = members_[i].raster->CheckUnchanged(); !unchanged) return unchanged;
   }
@@ -244,7 +244,7 @@ bool RasterGrid::IsUnfilledVoid(int factor, const GridWindow& window) const {
   if (options_.voids != HoleFill::kSmooth) return true;
   // All of the window is one void, so that any average tells whether it is a hole.
   const GridWindow first{window.column, window.row, 1, 1};
-  return voids_.HolesIn(members_, member_index_, factor, first, Columns(factor).count(), VoidHeights(1)).front() == 0;
+  return voids_.HolesIn(members_, member_index_, factor, first, Columns(factor).count(), NaNHeights(1)).front() == 0;
 }
 
 Result<RasterGrid::Bridged> RasterGrid::ReadBridged(int factor, const GridWindow& window, const std::stop_token& stop,
@@ -334,16 +334,16 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
   NodeCells cells(std::move(positions), Axes(factor));
   const auto leave_unfilled = [&](const Result<void>& unchanged) {
     if (reading != nullptr) {
-      reading->heights = VoidHeights(inside.size());
+      reading->heights = NaNHeights(inside.size());
       reading->cells = std::move(cells);
     }
     return unchanged;
   };
-  if (!is_any_wanted) return leave_unfilled(CheckUnread());
+  if (!is_any_wanted) return leave_unfilled(CheckUnchanged());
   GridWindow window = cells.MoveIntoWindow(wanted, are_all);
   if (IsUnfilledVoid(factor, window)) {
     counts_->voids += static_cast<std::uint64_t>(window.columns * window.rows);
-    return leave_unfilled(CheckMembersUnread(factor, window));
+    return leave_unfilled(CheckMembersUnchanged(factor, window));
   }
   // At the rim of a raster, the certified error compares averages between the outermost nodes and the rim, too
   // (CellErrorBound). Where they are missing, it is looser.
@@ -377,7 +377,7 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
     const float rounded = RoundHeight(undulations.empty() ? *height : *height + undulations[node]);
     if (has_holes && !HasSample(bridged->heights, window, cell)) {  // in a hole: another raster grid may have a height
       if (nodes.hole_heights == nullptr) return;
-      if (nodes.hole_heights->empty()) *nodes.hole_heights = VoidHeights(heights.size());
+      if (nodes.hole_heights->empty()) *nodes.hole_heights = NaNHeights(heights.size());
       if (float& height_there = (*nodes.hole_heights)[node]; std::isnan(height_there)) height_there = rounded;
       return;
     }
@@ -398,7 +398,7 @@ Result<void> RasterGrid::FillNodesAt(NodePositions positions, std::span<const st
     }
     if (reading != nullptr) TraceWanted(heights, wanted, are_all, *reading);
   } else {
-    if (reading != nullptr) reading->heights = VoidHeights(inside.size());
+    if (reading != nullptr) reading->heights = NaNHeights(inside.size());
     const auto stride = static_cast<std::size_t>(cells.window().columns);
     std::size_t node = 0;
     for (std::size_t j = 0; node < wanted.size(); ++j) {

@@ -160,7 +160,7 @@ class RasterGrid {
   // positions.
   void AddTo(ContentHasher& hasher) const;
   // Returns, ascending, the indices of all members that may affect RangeOf or the heights of `top`, or the heights of
-  // the tiles below it down to level `deepest`, and perhaps of others. `lattices`: by level.
+  // the tiles below it down to level `deepest`; perhaps further members. `lattices`: by level.
   std::vector<std::size_t> MembersBelow(const geo::TileKey& top, const std::vector<geo::Lattice>& lattices,
                                         int deepest) const;
   // Which voids of a member are holes, by region.
@@ -200,10 +200,11 @@ class RasterGrid {
   // none. Precondition: `bridged` is what ReadBridged gives.
   Result<std::vector<float>> FillHoles(int factor, const GridWindow& window, const Bridged& bridged,
                                        const std::stop_token& stop) const;
+  // `is_guess`: for the first guess of a finer factor; averages beside a hole then count as part of it.
   Result<std::vector<float>> ReadSmooth(int factor, const GridWindow& window, bool is_guess,
                                         const std::stop_token& stop) const;
-  Result<WindowWithHoles> ReadVoids(int factor, const GridWindow& window, bool is_guess,
-                                    const std::stop_token& stop) const;
+  Result<WindowWithHoles> ReadWithHoles(int factor, const GridWindow& window, bool is_guess,
+                                        const std::stop_token& stop) const;
   Result<void> GuessLarge(int factor, const GridWindow& window, const std::vector<VoidRegion>& regions,
                           WindowWithHoles& grid, const std::stop_token& stop) const;
   GridWindow Grown(const GridWindow& window, int halo, int factor) const;
@@ -230,8 +231,8 @@ class RasterGrid {
   // Feather width in metres, at most 256 samples by `factor`.
   double Feather(int factor) const;
   // For calls that read no sample: checks that the file is unchanged if the raster grid has a single member.
-  Result<void> CheckUnread() const;
-  Result<void> CheckMembersUnread(int factor, const GridWindow& window) const;
+  Result<void> CheckUnchanged() const;
+  Result<void> CheckMembersUnchanged(int factor, const GridWindow& window) const;
 
   struct Counts {
     std::atomic<std::uint64_t> measured{0}, filled{0}, voids{0};

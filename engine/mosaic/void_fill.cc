@@ -7,7 +7,7 @@
 #include <optional>
 #include <span>
 
-#include "engine/raster/void_heights.h"
+#include "engine/raster/nan_heights.h"
 
 namespace terrace::dem {
 namespace {
@@ -124,11 +124,11 @@ std::vector<float> FillVoids(const std::vector<float>& heights, const GridWindow
     rows.push_back(row);
     voids += std::ranges::count_if(of_row, [](float height) { return std::isnan(height); });
   }
-  // Marking costs about as much as bridging this share of the samples.
-  constexpr std::int64_t kShare = 16;
+  // Marking costs about as much as bridging a 16th of the samples.
+  constexpr std::int64_t kMarkingDivisor = 16;
   std::optional<NearValid> near;
   // The nearer one of a pair of samples is at most half a gap away.
-  if (voids > wide.columns * wide.rows / kShare) near.emplace(heights, wide, max_gap / 2);
+  if (voids > wide.columns * wide.rows / kMarkingDivisor) near.emplace(heights, wide, max_gap / 2);
   for (const std::int64_t row : rows) {
     float* const to = filled.data() + (row - core.row) * core.columns;
     for (std::int64_t i = 0; i < core.columns; ++i) {

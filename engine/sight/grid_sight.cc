@@ -179,11 +179,11 @@ Result<void> GridSight::Probe(Scan& scan) {
     const auto at = static_cast<std::size_t>((row - window.row) * window.columns + column - window.column);
     const auto south = static_cast<std::size_t>(window.columns);
     const float* const heights = (*block)->heights().data() + at;
-    const float* const unfilled = (*block)->unfilled().data() + at;
+    const float* const bridged = (*block)->bridged().data() + at;
     const double east_of = x - static_cast<double>(column), south_of = y - static_cast<double>(row);
     double ground =
         Lerp(Lerp(heights[0], heights[1], east_of), Lerp(heights[south], heights[south + 1], east_of), south_of);
-    if (std::isnan(ground + unfilled[0] + unfilled[1] + unfilled[south] + unfilled[south + 1])) continue;
+    if (std::isnan(ground + bridged[0] + bridged[1] + bridged[south] + bridged[south + 1])) continue;
     if (!blocks_.includes_undulations()) {
       ground += blocks_.Undulation({scan.piece.longitude.At(s), scan.piece.latitude.At(s)});
     }
@@ -379,10 +379,10 @@ Result<void> GridSight::MeasureInCell(Scan& scan, double first, double last) {
   const std::size_t south = window.rows > 1 ? static_cast<std::size_t>(window.columns) : 0;
   const float* const heights = block.heights().data() + at;
   const double nw = heights[0], ne = heights[east], sw = heights[south], se = heights[south + east];
-  const float* const unfilled = block.unfilled().data() + at;
+  const float* const bridged = block.bridged().data() + at;
   const double all = nw + ne + sw + se +
                      (scan.surface == SightSurface::kNotHoles
-                          ? 0.0 * (unfilled[0] + unfilled[east] + unfilled[south] + unfilled[south + east])
+                          ? 0.0 * (bridged[0] + bridged[east] + bridged[south] + bridged[south + east])
                           : 0.0);
   // The lowest place of a ray in a cell may lie below both ends of its part. None of the surface lies above the largest
   // corner.
@@ -436,7 +436,7 @@ void GridSight::MeasureRim(Scan& scan, const SightBlock& block, std::int64_t col
     const GridCell cell{column, row, std::clamp(scan.on_grid.x.At(s) - shift - static_cast<double>(column), 0.0, 1.0),
                         std::clamp(scan.on_grid.y.At(s) - static_cast<double>(row), 0.0, 1.0)};
     const bool is_owned =
-        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.unfilled(), block.window(), cell));
+        IsInside(scan, s) && (scan.surface == SightSurface::kAll || HasSample(block.bridged(), block.window(), cell));
     const auto height = is_owned ? Interpolate(block.heights(), block.window(), cell) : std::nullopt;
     if (!height) return std::nullopt;
     const double undulation_m = blocks_.includes_undulations()

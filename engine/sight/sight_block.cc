@@ -38,7 +38,7 @@ std::vector<float> LargestOfThree(const std::vector<float>& heights, std::int64_
 SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undulations)
     : window_(source.window),
       heights_(source.Samples()),
-      unfilled_(source.smooth.empty() ? std::vector<float>() : source.Bridged()) {
+      bridged_(source.smooth.empty() ? std::vector<float>() : source.Bridged()) {
   for (std::size_t i = 0; i < undulations.size(); ++i) heights_[i] += undulations[i];
   // A cell's samples are those of its corners; a raster of one column has cells without width.
   const std::int64_t width = window().columns, height = window().rows;
@@ -55,7 +55,7 @@ SightBlock::SightBlock(const PointBlock& source, const std::vector<float>& undul
     for (const float h : heights) has |= std::isnan(h);
     return has;
   };
-  for (const std::vector<float>* const heights : {&heights_, &unfilled_}) {
+  for (const std::vector<float>* const heights : {&heights_, &bridged_}) {
     if (!has_voids(*heights)) continue;
     for (std::int64_t y = 0; y < height; ++y) {
       for (std::int64_t x = 0; x < width; ++x) {

@@ -32,9 +32,9 @@ class SightBlock {
 
   const GridWindow& window() const { return window_; }
   const std::vector<float>& heights() const { return heights_; }  // metres; NaN: void
-  // The samples before holes were filled; narrow voids are filled. Use it only to test for NaN: the values may lack the
+  // The samples with narrow voids filled and holes as NaN. Use it only to test for NaN: the values may lack the
   // undulations that heights() includes.
-  const std::vector<float>& unfilled() const { return unfilled_.empty() ? heights_ : unfilled_; }
+  const std::vector<float>& bridged() const { return bridged_.empty() ? heights_ : bridged_; }
 
   // A bound over the cells between two cells of the block, inclusive; possibly over more cells.
   CellsBound Over(std::int64_t west, std::int64_t north, std::int64_t east, std::int64_t south) const;
@@ -65,8 +65,8 @@ class SightBlock {
   };
 
   GridWindow window_;
-  std::vector<float> heights_, unfilled_, largest_;  // unfilled_: empty if its voids are those of heights_
-  std::vector<Level> levels_;                        // cells of 2, 4, 8 .. cells a side
+  std::vector<float> heights_, bridged_, largest_;  // bridged_: empty if its voids are those of heights_
+  std::vector<Level> levels_;                       // cells of 2, 4, 8 .. cells a side
   Squares squares_of_4_, squares_of_8_;
 
   Squares SquaresOf(int shift) const;

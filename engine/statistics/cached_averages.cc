@@ -15,7 +15,7 @@
 #include "engine/common/dem_types.h"
 #include "engine/common/lru_block_cache.h"
 #include "engine/core/errno_text.h"
-#include "engine/raster/void_heights.h"
+#include "engine/raster/nan_heights.h"
 
 namespace terrace::dem {
 namespace {
@@ -149,7 +149,7 @@ Result<void> CachedAverages::CopyChunk(const OpenFile& file, int factor, int ind
 Result<std::vector<float>> CachedAverages::Read(int factor, const GridWindow& window) const {
   const Result<OpenFile> file = Open();
   if (!file) return tl::unexpected(file.error());
-  std::vector<float> heights = VoidHeights(static_cast<std::size_t>(window.columns * window.rows));
+  std::vector<float> heights = NaNHeights(static_cast<std::size_t>(window.columns * window.rows));
   const std::int64_t count = DivideUp(layout_.columns, factor), side = ChunkGrid::kSide / factor;
   const auto turn = [&](std::int64_t column) { return column >= 0 ? column / count : -((count - 1 - column) / count); };
   for (std::int64_t t = turn(window.column); t <= turn(window.column + window.columns - 1); ++t) {

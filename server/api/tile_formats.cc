@@ -235,7 +235,7 @@ Result<std::uint32_t> FindDataset(std::string_view name, std::span<const Dataset
 
 std::span<const TileFormatRow> TileFormatRows() { return kFormats; }
 
-const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder) {
+const TileFormatRow* TakeFormat(std::string_view& name, std::string_view folder) {
   for (const TileFormatRow& row : kFormats) {
     if (row.folder != folder || !name.ends_with(row.suffix)) continue;
     name.remove_suffix(row.suffix.size());
@@ -283,7 +283,7 @@ tiler::HeaderLines MakeTileHeaders(const TileRequest& request, const tiler::Enco
   put("Content-Type", row->media_type(request));
   if (request.coding != tiler::Coding::kIdentity) put("Content-Encoding", tiler::NameOf(request.coding));
   put("Content-Length", tile.bytes.size());
-  head.body_line_bytes = head.text.size();
+  head.bytes_about_body = head.text.size();
   if (!tile.etag.empty()) put("ETag", tile.etag);
   if (!tiler::IsMapLayer(request.format)) put("Terrain-Max-Error", proto::FormatErrorUp(tile.max_error_m));
   if (tile.certified_error_m && std::isfinite(*tile.certified_error_m)) {

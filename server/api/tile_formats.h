@@ -42,7 +42,7 @@ std::span<const TileFormatRow> TileFormatRows();
 
 // Removes the suffix of a tile's URL from its last segment, and returns the row of the format in a folder; null if no
 // suffix matches.
-const TileFormatRow* CutSuffix(std::string_view& name, std::string_view folder = {});
+const TileFormatRow* TakeFormat(std::string_view& name, std::string_view folder = {});
 
 // The first row of a format in a folder; null if there is none. TileJSON documents use its suffix by default.
 const TileFormatRow* FirstFormatIn(std::string_view folder);

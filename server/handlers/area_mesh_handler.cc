@@ -53,7 +53,7 @@ asio::awaitable<Response> BuildArea(const HandlerState& state, const RequestCont
   const auto deadline = context.request->deadline;
   Result<tiler::EncodedTile> mesh =
       co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
-  if (!mesh) co_return co_await RefuseQuery(mesh.error(), state.catalog->datasets[dataset], context.request->id);
+  if (!mesh) co_return co_await FailedPointReply(mesh.error(), state.catalog->datasets[dataset], context.request->id);
   response.headers.emplace_back("Terrain-Max-Error", proto::FormatErrorUp(mesh->max_error_m));
   if (area.coordinates == tiler::AreaCoordinates::kEnu) {
     response.headers.emplace_back("Terrain-Origin", FormatOrigin(plan.centre));

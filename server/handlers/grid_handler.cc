@@ -173,7 +173,7 @@ asio::awaitable<Response> MakeGrid(const HandlerState& state, const RequestConte
   };
   const auto deadline = context.request->deadline;
   Result<MadeGrid> made = co_await state.workers.Run(std::move(work), LongTerms(deadline, context.request->client));
-  if (!made) co_return co_await RefuseQuery(made.error(), view, context.request->id);
+  if (!made) co_return co_await FailedPointReply(made.error(), view, context.request->id);
   response.headers.emplace_back("Terrain-Grid", std::move(made->description));
   Response reply = co_await FinishPointReply(std::move(response), std::move(made->reply), view, context.request->id);
   co_return Conditional(std::move(reply), *context.request);

@@ -32,7 +32,7 @@
 
 namespace terrace::server {
 
-// The key of the statistics cache's folder among the problems. No dataset has such a name.
+// The key in ServerStatus::problems of the folder of the statistics cache. No dataset has such a name.
 inline constexpr const char* kCacheProblem = "/cache_dir";
 
 // A dataset that is configured and not open yet.

@@ -87,7 +87,7 @@ asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestCo
   const bool is_quick =
       context.route.query.size() <= kQuickQuery && context.route.query.find("path") == std::string::npos;
   Result<HeightsQuery> parsed = co_await ParsePoints(state, context, ParseHeights, is_quick, deadline);
-  if (!parsed) co_return co_await RefuseQuery(parsed.error(), view, request.id);
+  if (!parsed) co_return co_await FailedPointReply(parsed.error(), view, request.id);
   if (const Result<void> datum = CheckDatum(parsed->datum, view); !datum) {
     co_return ClientErrorResponse(datum.error(), request.id);
   }
@@ -109,7 +109,7 @@ asio::awaitable<Response> ReadHeights(const HandlerState& state, const RequestCo
   std::shared_ptr<const CertifiedPoints> certified;
   if (parsed->certify_level) {
     Result<CertifiedPoints> known = co_await Certify(state, dataset, *parsed, deadline, request.client);
-    if (!known) co_return co_await RefuseQuery(known.error(), view, request.id);
+    if (!known) co_return co_await FailedPointReply(known.error(), view, request.id);
     certified = std::make_shared<const CertifiedPoints>(*std::move(known));
   }
   const bool is_long = parsed->points.size() > kShortList || (parsed->drawn && parsed->points.size() > 1);

@@ -40,7 +40,7 @@ PointReply StartPointReply(const Request& request, bool is_binary) {
   return reply;
 }
 
-asio::awaitable<Response> RefuseQuery(Error error, const DatasetView& view, RequestId request_id) {
+asio::awaitable<Response> FailedPointReply(Error error, const DatasetView& view, RequestId request_id) {
   const bool is_absent = error.code == ErrorCode::kNotFound && view.only_archive;
   if (is_absent || error.code == ErrorCode::kInvalidArgument) co_return ClientErrorResponse(error, request_id);
   co_return co_await DelayedBackendError(std::move(error), request_id);
@@ -48,7 +48,7 @@ asio::awaitable<Response> RefuseQuery(Error error, const DatasetView& view, Requ
 
 asio::awaitable<Response> FinishPointReply(Response response, Result<MadeReply> made, const DatasetView& view,
                                            RequestId request_id) {
-  if (!made) co_return co_await RefuseQuery(std::move(made).error(), view, request_id);
+  if (!made) co_return co_await FailedPointReply(std::move(made).error(), view, request_id);
   response.body = std::make_shared<const std::string>(std::move(made->bytes));
   response.headers.emplace_back("Server-Timing", FormatServerTiming("miss", made->times));
   co_return response;

@@ -60,8 +60,8 @@ struct PointReply {
 PointReply StartPointReply(const Request& request, bool is_binary);
 
 // The reply to a request that failed: 400, 404 (an archive has no heights), or the status of a failure of the server.
-asio::awaitable<Response> RefuseQuery(Error error, const DatasetView& view, RequestId request_id);
-// The reply with what a worker made, or RefuseQuery.
+asio::awaitable<Response> FailedPointReply(Error error, const DatasetView& view, RequestId request_id);
+// The reply with what a worker made, or FailedPointReply.
 asio::awaitable<Response> FinishPointReply(Response response, Result<MadeReply> made, const DatasetView& view,
                                            RequestId request_id);
 

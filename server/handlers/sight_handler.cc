@@ -117,7 +117,7 @@ asio::awaitable<Response> LookAlong(const HandlerState& state, const RequestCont
   const auto deadline = context.request->deadline;
   const bool is_quick = context.route.query.size() <= kQuickQuery;
   Result<SightQuery> parsed = co_await ParsePoints(state, context, ParseSight, is_quick, deadline);
-  if (!parsed) co_return co_await RefuseQuery(parsed.error(), view, request.id);
+  if (!parsed) co_return co_await FailedPointReply(parsed.error(), view, request.id);
   // Archives have only the heights of their meshes.
   if (view.only_archive && !parsed->drawn && !parsed->names_source) parsed->drawn.emplace();
   PointReply reply = StartPointReply(request, parsed->is_binary);

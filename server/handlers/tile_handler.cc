@@ -31,7 +31,7 @@ Response Reply(const HandlerState& state, const tiler::TileRequest& tile, const 
                const RequestContext& context) {
   Response response;
   response.lines = std::shared_ptr<const std::string>(served.tile, &served.tile->header_lines.text);
-  response.body_line_bytes = served.tile->header_lines.body_line_bytes;
+  response.bytes_about_body = served.tile->header_lines.bytes_about_body;
   response.cache_control =
       CacheControlOf(context.route.query, state.catalog->datasets[tile.dataset], state.cache_control);
   response.vary = context.route.format->vary(tile);

@@ -40,7 +40,7 @@ bool HasBody(int status) { return status != 204 && status != 304; }
 // The header lines that describe the body.
 void PutContent(std::string& head, const Response& response) {
   if (response.lines) {
-    head += std::string_view(*response.lines).substr(HasBody(response.status) ? 0 : response.body_line_bytes);
+    head += std::string_view(*response.lines).substr(HasBody(response.status) ? 0 : response.bytes_about_body);
     return;
   }
   if (HasBody(response.status)) {

@@ -79,9 +79,9 @@ class FairQueue {
   PoolJobPtr RemoveNewestOfLargest();
 
   // Expected wait of a new job: (own + the sum, over all other clients, of min(theirs, own + job)) / the number of
-  // threads that may run it. `own` and `theirs`: how long the waiting jobs of its client before it, and those of
-  // another client, will run; `job`: how long it will run itself. Only jobs of the same length (is_long) count, each
-  // with the mean time of its kind. Running jobs, and kinds that have never run, are not counted.
+  // threads that may run it. `own`: the time of its client's waiting jobs that come before it; `theirs`: the
+  // time of another client's waiting jobs; `job`: the time of the new job. Only jobs of the same length (is_long)
+  // count, each with the mean time of its kind. Running jobs, and kinds that have never run, are not counted.
   std::chrono::duration<double> ExpectedWait(const JobTerms& terms, JobClock::time_point now) const;
 
   std::size_t size() const { return size_; }

@@ -6,9 +6,9 @@
 // Each client that waits for a flight has a job for it in the pool's queue. The first of these jobs whose turn comes
 // does the build: no request waits longer because another client asked before.
 //
-// A flight is stopped when its last waiter leaves, which is at its deadline at the latest; its jobs are then removed
-// from the queue. It is also stopped when the pool is cancelled; its jobs then run and end at once. A stopped flight
-// accepts no further waiters; the next request starts a new one.
+// Waiters leave at their deadlines at the latest. When the last one leaves, the flight is stopped, and its jobs are
+// removed from the queue. It is also stopped when the pool is cancelled; its jobs then run and end at once. A stopped
+// flight accepts no further waiters; the next request starts a new one.
 //
 // Thread-safe, with one condition: a coroutine that waits in Join runs on a single thread (or a strand).
 #pragma once

@@ -63,7 +63,7 @@ class HeightsParameters final : public ParameterSink {
   const std::size_t max_locations_, text_bytes_;
   std::string name_;
   Target target_ = Target::kNone;  // of the current value
-  Text text_ = kStep;              // which, of a kText
+  Text text_ = kStep;              // the parameter, if target_ is kText
   std::string item_;               // of the current value: a point, or a whole short text
   const char* points_of_ = nullptr;
   bool is_path_ = false;

@@ -1,4 +1,5 @@
-// Readers of named parameters: a URL's query or a form (application/x-www-form-urlencoded), and a flat JSON object.
+// Readers of long lists of points and rays as named parameters: a URL's query or a form
+// (application/x-www-form-urlencoded), and a flat JSON object. Other queries are read by ReadParameters (http/text.h).
 // They parse the text once, part by part, and store nothing. The sink interprets names and values and limits their
 // length; an error of the sink ends parsing at once.
 #pragma once

@@ -33,7 +33,7 @@ TEST(DeeperKeys, AreOfTheEditsAndOfTheTilesBelow) {
   ASSERT_NE(offset->EditsHash(kKey), 0u);
   ASSERT_EQ(both->EditsHash(kKey), offset->EditsHash(kKey));
   ASSERT_EQ(precise->EditsHash(kKey), 0u);
-  ASSERT_NE(both->AvailabilityBelow(kKey).size(), offset->AvailabilityBelow(kKey).size());
+  ASSERT_NE(both->AvailabilityToDepthOf(kKey).size(), offset->AvailabilityToDepthOf(kKey).size());
   TileRequest request;
   request.key = kKey;
   EXPECT_EQ(TileEditsHash(*offset, request), TileEditsHash(*both, request));

@@ -53,7 +53,7 @@ Result<proto::TileExtensions> AddExtensions(const Dataset& dataset, const TileRe
     tile.water_mask = *std::move(mask);
   }
   if (extensions.metadata) {
-    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.model->AvailabilityBelow(request.key),
+    tile.metadata = proto::EncodeTileMetadata(request.key, dataset.model->AvailabilityToDepthOf(request.key),
                                               dataset.metadata_availability);
   }
   return extensions;

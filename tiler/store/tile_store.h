@@ -76,8 +76,9 @@ class StoreBase {
 template <typename Key, typename Value>
 class Store : public StoreBase {
  public:
-  // Returns a copy, or nothing if the key is absent. Of a tile, stores keep `bytes`, `etag`, both errors and both
-  // counts; TileTiers sets `found_in` and `header_lines`, and the rest has its defaults.
+  // Returns a copy, or nothing if the key is absent. A store keeps these members of a tile: `bytes`, `etag`,
+  // `max_error_m`, `certified_error_m`, `vertices` and `triangles`. Find leaves the others at their defaults; TileTiers
+  // then sets `found_in` and `header_lines`.
   virtual std::optional<Value> Find(const Key& key) = 0;
 
   // Replaces the value of an existing key.

@@ -21,7 +21,8 @@
 
 namespace terrace::tiler {
 
-// Writes the header lines of replies that describe the tile. The `dataset` of the request is 0.
+// Writes the header lines of replies that describe the tile. The request is that of its CacheKey, so its `dataset` is
+// always 0.
 using HeaderWriter = HeaderLines (*)(const TileRequest&, const EncodedTile&);
 
 class TileTiers {

@@ -10,7 +10,7 @@
 
 namespace terrace::tiler {
 
-// The surface to read. The error and the rest are those of a tile's URL.
+// The surface to read. `requested`, `format` and `compression` mean what they mean in the URL of a tile.
 struct DrawnSurface {
   // Nothing: the first level whose default error is at most requested.error_m; the deepest if there is none, or if
   // error_m is not set.

@@ -9,8 +9,8 @@
 
 namespace terrace::tiler {
 
-// Heights of a dataset at points. NaN in holes that edits cut, and for heights of the sources where these have none; a
-// drawn surface shows the floor there.
+// Heights of a dataset at points. NaN in holes that edits cut. Where the sources have no height: NaN in heights of the
+// sources, the floor in heights of a drawn surface.
 struct PointHeights {
   std::vector<float> heights;
   std::vector<std::uint8_t> filled = {};           // by point: 1 where a void was filled; empty: of a drawn surface

@@ -28,8 +28,8 @@ enum class RefinementUse : std::uint8_t {
 // on the configuration. Each ends with CR LF.
 struct HeaderLines {
   std::string text;
-  // The first bytes of `text`, which describe the body; responses without a body omit them.
-  std::size_t body_line_bytes = 0;
+  // How many bytes at the beginning of `text` describe the body; responses without a body omit them.
+  std::size_t bytes_about_body = 0;
 };
 
 struct EncodedTile {

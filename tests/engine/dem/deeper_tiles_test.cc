@@ -69,8 +69,8 @@ TEST_F(TerrainEdits, GoDeeperWherePrecisionAsksForIt) {
   const geo::TileKey there{finest, here.x - 4, here.y};
   EXPECT_NE(edited->DeeperTilesHash(here), 0u);
   EXPECT_EQ(edited->DeeperTilesHash(there), 0u);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(here).size()), edited->max_level() + 1);
-  EXPECT_EQ(static_cast<int>(edited->AvailabilityBelow(there).size()), finest + 1);
+  EXPECT_EQ(static_cast<int>(edited->AvailabilityToDepthOf(here).size()), edited->max_level() + 1);
+  EXPECT_EQ(static_cast<int>(edited->AvailabilityToDepthOf(there).size()), finest + 1);
   EXPECT_EQ(plain->ContentBelow(there, finest), edited->ContentBelow(there, finest));
 }
 

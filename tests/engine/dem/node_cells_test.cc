@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "engine/raster/grid_cells.h"
+#include "engine/raster/nan_heights.h"
 #include "engine/raster/node_rows.h"
-#include "engine/raster/void_heights.h"
 #include "tests/engine/tin/instruction_sets.h"
 
 namespace terrace::dem {

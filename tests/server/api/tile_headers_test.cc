@@ -42,7 +42,7 @@ TEST(TileHead, NamesTheFormatWithItsExtensions) {
 
 TEST(TileHead, PutsWhatDescribesTheBodyFirst) {
   const tiler::HeaderLines head = MakeTileHeaders({}, HeadTile());
-  EXPECT_EQ(head.text.substr(head.body_line_bytes), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
+  EXPECT_EQ(head.text.substr(head.bytes_about_body), "ETag: \"e\"\r\nTerrain-Max-Error: 3.87\r\n");
 }
 
 // A tile has such an error if the error of a source is unknown.

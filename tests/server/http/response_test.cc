@@ -52,7 +52,7 @@ TEST(Response, HasNoBodyHeadersWithoutABody) {
 TEST(Response, SendsLinesThatWereMadeBeforehand) {
   Response response;
   response.lines = std::make_shared<const std::string>("Content-Length: 5\r\nETag: \"e\"\r\n");
-  response.body_line_bytes = 19;
+  response.bytes_about_body = 19;
   EXPECT_NE(SerializeHead(response, {}).find("\r\nContent-Length: 5\r\nETag: \"e\"\r\n"), std::string::npos);
   response.status = 304;
   const std::string head = SerializeHead(response, {});

@@ -126,7 +126,7 @@ TEST_F(TileTiersTest, WritesTheHeadOfBuiltAndOfFoundTiles) {
     TileTiers tiers(1 << 20, {disk}, write_header_lines);
     const Result<TilePtr> tile = tiers.FindOrBuild(KeyAt(7), BuildOf("body"));
     EXPECT_EQ((*tile)->header_lines.text, "7: body") << round;
-    EXPECT_EQ(tiers.memory().Find(KeyAt(7))->header_lines.body_line_bytes, 1u) << round;
+    EXPECT_EQ(tiers.memory().Find(KeyAt(7))->header_lines.bytes_about_body, 1u) << round;
   }
   EXPECT_EQ(std::ranges::count(calls, "build"), 1);
 }

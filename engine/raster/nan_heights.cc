@@ -1,10 +1,10 @@
-#include "engine/raster/void_heights.h"
+#include "engine/raster/nan_heights.h"
 
 #include <algorithm>
 #include <limits>
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "engine/raster/void_heights.cc"
+#define HWY_TARGET_INCLUDE "engine/raster/nan_heights.cc"
 #include <hwy/foreach_target.h>  // includes this file once for each set of instructions
 #include <hwy/highway.h>
 
@@ -87,7 +87,7 @@ HWY_EXPORT(MarkVoids);
 }  // namespace
 
 // Copies are several times as fast as loops that store one height at a time.
-std::vector<float> VoidHeights(std::size_t count) {
+std::vector<float> NaNHeights(std::size_t count) {
   static const std::vector<float> row(1024, std::numeric_limits<float>::quiet_NaN());
   std::vector<float> heights;
   heights.reserve(count);

@@ -1,4 +1,4 @@
-// Voids in arrays of heights, which are NaN there, with SIMD.
+// Arrays of heights in which voids are NaN: finding, counting and replacing the NaNs, with SIMD.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 namespace terrace::dem {
 
 // Returns `count` NaNs.
-std::vector<float> VoidHeights(std::size_t count);
+std::vector<float> NaNHeights(std::size_t count);
 
 // Makes all heights equal to one.
 void FillWith(float height, std::span<float> heights);
