@@ -167,7 +167,7 @@ void TerrainApplication::Handler::Report(const SentReply& reply) {
 TerrainApplication::TerrainApplication(ApplicationParts parts, CatalogPtr catalog, const config::Config& config)
     : parts_(std::move(parts)),
       config_at_start_(config),
-      request_time_(config.request_deadline),
+      request_time_limit_(config.request_deadline),
       opening_(catalog == nullptr) {
   state_ = Make(catalog ? std::move(catalog) : std::make_shared<const Catalog>(), config);
 }
@@ -192,7 +192,7 @@ std::string TerrainApplication::ClientOf(const asio::ip::address& peer) const {
 
 bool TerrainApplication::Replace(CatalogPtr catalog, const config::Config& config) {
   HandlerStatePtr state = Make(std::move(catalog), config);  // the old one is destroyed after the lock is released
-  request_time_.store(config.request_deadline, std::memory_order_relaxed);
+  request_time_limit_.store(config.request_deadline, std::memory_order_relaxed);
   const std::lock_guard lock(mutex_);
   state_.swap(state);
   const bool is_first = opening_.exchange(false);

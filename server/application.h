@@ -57,8 +57,8 @@ class TerrainApplication final : public Application, public ServerStatus {
   // Problems by dataset; "" is the configuration.
   void SetProblems(std::map<std::string, std::string> problems);
 
-  // How long after its head the deadline of a request is.
-  const std::atomic<std::chrono::milliseconds>& request_time() const { return request_time_; }
+  // From the end of a request's head to its deadline: option request_deadline_s.
+  const std::atomic<std::chrono::milliseconds>& request_time_limit() const { return request_time_limit_; }
   // Never null; without datasets until the first catalog has come.
   CatalogPtr catalog() const { return Current()->catalog; }
   bool opening() const override { return opening_.load(std::memory_order_acquire); }
@@ -87,7 +87,7 @@ class TerrainApplication final : public Application, public ServerStatus {
   std::map<std::string, std::string> problems_;
   std::map<std::string, std::chrono::steady_clock::time_point> problem_since_;  // of the same datasets
   const config::Config config_at_start_;
-  std::atomic<std::chrono::milliseconds> request_time_;
+  std::atomic<std::chrono::milliseconds> request_time_limit_;
   std::atomic<bool> opening_;  // the first catalog has not come
 };
 

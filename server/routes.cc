@@ -127,8 +127,8 @@ bool ReadViewerFile(const Segments& segments, Route& route) {
   return true;
 }
 
-// No parameter's name needs percent-encoding, and readers that do not decode it do not recognize the parameter: with
-// token%3D or %74oken=, logs and caches would store the token.
+// Logs and caches that do not decode names would not recognize `%74oken=` or `token%3D` as the token, and would store
+// it. No parameter's name needs percent-encoding.
 bool HasEncodedName(std::string_view query) {
   if (query.find('%') == std::string_view::npos) return false;
   while (!query.empty()) {
@@ -144,7 +144,7 @@ std::string_view LiteralOf(std::string_view segment) {
 }
 
 // Limit of a body with a list of locations: a fixed number of bytes, and 64 for each location. These are enough for two
-// numbers with all digits and three bytes per separator in a form.
+// numbers with all digits and the separators, which forms percent-encode.
 std::size_t MaxLocationsBytes(std::size_t max_locations) { return 4096 + 64 * max_locations; }
 
 // The same for rays of six numbers.

@@ -286,7 +286,7 @@ class RunningServer final : public Server {
     context->application = &application_;
     context->connections = &limits_->connections;
     context->transfers = &limits_->transfers;
-    context->request_time = &application_.request_time();
+    context->request_time_limit = &application_.request_time_limit();
     context->cors = limits_->cors;
     context->tls = limits_->tls.get();
     return context;

@@ -29,7 +29,7 @@ struct WaterOptions {
 // The image of textures of GLB tiles and of map tiles. `texture` and `side` are of GLB tiles alone.
 struct ImageryOptions {
   std::shared_ptr<const dem::Imagery> image;  // null: none
-  // TileRequest::texture of clients that name none, and of bakes. TilePipeline uses the request's.
+  // For whoever makes requests: the server if a client names none, and bakes. TilePipeline uses TileRequest::texture.
   proto::TextureFormat texture = proto::TextureFormat::kJpeg;
   int side = 512;    // pixels along a tile's edge, at most: a power of two from 64 to 1024
   int quality = 80;  // of JPEG and lossy WebP: 1 .. 100
@@ -49,8 +49,8 @@ struct Dataset {
   std::string attribution;
   double error_fraction = 0.5;  // that of the model's DemOptions: finite, > 0
   MeshOptions mesh_options;
-  // Of GLB tiles. `compression`: TileRequest::compression of clients that name none, and of bakes; TilePipeline uses
-  // the request's. It sets the copyright, the texture, `draco.uv` and both errors itself.
+  // Of GLB tiles. `compression` is for whoever makes requests, as ImageryOptions::texture; TilePipeline uses
+  // TileRequest::compression. It sets the copyright, the texture, `draco.uv` and both errors itself.
   proto::GlbOptions glb;
   std::shared_ptr<const dem::ElevationModel> model;  // null: there are no sources, and `baked` is not null
   std::shared_ptr<const BakedTiles> baked;           // of this generation; null: none
@@ -71,7 +71,7 @@ struct Dataset {
   std::uint64_t options_hash = 0;  // GenerationOf with 0; bakes use it
 };
 
-// A hash of `heights`, which is a fingerprint of the model, of all options of the dataset that change bytes, and of the
+// A hash of three things: `heights` (a fingerprint of the model), all options of the dataset that change bytes, and the
 // encoders with their libraries. Equal for copies of the files.
 std::uint64_t GenerationOf(const Dataset& dataset, std::uint64_t heights);
 

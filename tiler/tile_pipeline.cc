@@ -11,7 +11,7 @@
 #include "engine/geo/tile_cover.h"
 #include "engine/tin/greedy.h"
 #include "tiler/encoders.h"
-#include "tiler/mesh/bound_less_rounding.h"
+#include "tiler/mesh/bound_minus_rounding.h"
 #include "tiler/mesh/refine_options.h"
 #include "tiler/mesh/tile_mesher.h"
 #include "tiler/store/refinement_cache.h"
@@ -102,7 +102,8 @@ Result<RefinedTilePtr> Refine(RefinementCache& refinements, const Dataset& datas
                                           : tin::GreedyTriangulation(field, std::move(options));
   tin::GreedyGoal goal;
   goal.max_error = error_m;
-  goal.max_points = proto::kMaxTileVertices + 1;  // so that a refinement that this limit ends has too many
+  // One more than a tile may have, so that a refinement that this limit ended is recognized below.
+  goal.max_points = proto::kMaxTileVertices + 1;
   if (!greedy.Run(goal, stop)) return Cancelled();
   auto refined = std::make_shared<RefinedTile>(RefinedTile{std::move(heights), greedy.MakeRefinement(), error_m});
   encoded.times.refine = MicrosecondsSince(start);
@@ -123,7 +124,7 @@ Result<DrawnTriangles> TrianglesOf(RefinementCache& refinements, const Dataset& 
     return DecodeTriangles(baked->bytes, request.key);
   }
   const double error_m =
-      BoundLessRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+      BoundMinusRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
   EncodedTile encoded;
   Result<RefinedTilePtr> refined = Refine(refinements, dataset, request.key, error_m, encoded, stop);
   if (!refined) return tl::unexpected(std::move(refined).error());
@@ -195,7 +196,7 @@ Result<EncodedTile> TilePipeline::Build(const TileRequest& request, std::stop_to
     if (!dataset.model->IsAvailable(request.key)) {
       return MakeError(ErrorCode::kNotFound, "{}/{}: no such tile", dataset.name, geo::ToString(request.key));
     }
-    error_m = BoundLessRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
+    error_m = BoundMinusRounding(geo::LadderError(request.key.level, request.error_step, dataset.error_fraction));
     Result<RefinedTilePtr> made = Refine(*refinements_, dataset, request.key, error_m, encoded, stop);
     if (!made) return tl::unexpected(std::move(made).error());
     refined = *std::move(made);

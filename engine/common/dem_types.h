@@ -36,15 +36,14 @@ enum class HoleFill : std::uint8_t {
   kFloor,
 };
 
-// The vertical datum of heights.
+// The vertical datum of heights. Heights that an edit sets are stated in a datum too: reads in kOrthometric or kSource
+// give them unchanged if all sources within reach of the edit have that datum and, for kSource, the floor has it too.
+// Otherwise they are converted to the ellipsoid and back, which may change them by millimetres.
 enum class HeightDatum : std::uint8_t {
   kEllipsoid,    // the WGS 84 ellipsoid, as in tiles
   kOrthometric,  // the source's geoid; EGM96 where the source refers to the ellipsoid
   kSource,       // the source's own; the floor has that of the last source that refers to a geoid
 };
-// An edit states its heights in some datum. kOrthometric and kSource return them unchanged if all sources within reach
-// of the edit have that datum and, for kSource, the floor has it too. Otherwise the heights are converted to the
-// ellipsoid and back, which may change them by millimetres.
 
 class AveragesBudget;
 class CacheFolder;
@@ -155,9 +154,10 @@ struct RasterInfo {
   std::vector<int> overview_factors;
   std::vector<std::string> warnings;  // what else people should know, each with the remedy
   std::string overviews_unused;       // why overviews are ignored, with the remedy; empty: none are
-  std::string wide_blocks;            // why preparing it decodes blocks many times, with the remedy; empty: it does not
-  std::string transform;              // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
-  // The finest stored averages are each of a square of this many samples a side; 0: none are stored.
+  std::string
+      wide_blocks;  // why the pass over all samples decodes blocks many times, with the remedy; empty: it does not
+  std::string transform;  // PROJ operation from EPSG:4326 to the source, for the log; empty: none needed
+  // Each of the finest stored averages covers N x N samples; this is N. 0: none are stored.
   int min_kept_factor = 0;
   bool has_averages_in_cache_folder = false;  // false: in memory
   double seconds_to_open = 0;

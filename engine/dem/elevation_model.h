@@ -32,7 +32,7 @@ class ElevationModel {
   // the working directory must not change. The first call sets up GDAL for the whole process (docs/embedding.md).
   // Paths name files; a program lists the files of a folder itself and sets DemFile::skip_if_no_raster.
   // Errors name the file, the fault and the remedy. kNotFound: there is no such file, all files were skipped, or a
-  // raster has no height (with skip_if_no_raster: none has one). kInvalidArgument: an option, a reference system, a
+  // raster has no height; with skip_if_no_raster, no raster has one. kInvalidArgument: an option, a reference system, a
   // raster or an edit that cannot be used, also if the edit's file or raster cannot be read.
   // kUnavailable: a file cannot be read. kChanged: it was replaced meanwhile. kCancelled: DemOptions::stop.
   static Result<std::unique_ptr<ElevationModel>> Open(std::vector<DemFile> files, const DemOptions& options = {});
@@ -49,7 +49,7 @@ class ElevationModel {
   // The deepest level served: the first whose default error is at most `finest_error`; without that option, at most a
   // tenth of the finest source's spacing. Deeper, if an edit asks for more precision.
   int max_level() const;
-  // The deepest level without edits. Levels below it have tiles only around edits.
+  // What max_level() would be if there were no edits. Deeper levels have tiles only around edits.
   int max_source_level() const;
   // Precondition: 0 .. geo::kMaxLevel.
   geo::Lattice LatticeOf(int level) const;
@@ -120,9 +120,8 @@ class ElevationModel {
   MeshDemands DemandsOf(const geo::TileKey& key) const;
   // The same for nodes of a level's lattice. Columns wrap at 360 degrees.
   MeshDemands DemandsOf(int level, const NodeWindow& window) const;
-  // The requirements for edges of other tiles: for each corner of this tile (south-west, south-east, north-east,
-  // north-west) those of the edges that end there and are not its own. An element has the nodes of one edge without
-  // its two ends.
+  // Edges of other tiles also end at this tile's corners. Returns, for each corner (south-west, south-east, north-east,
+  // north-west), one MeshDemands per such edge: the requirements at its nodes, without its two end nodes.
   std::array<std::vector<MeshDemands>, 4> DemandsBeyondCorners(const geo::TileKey& key) const;
   // A hash of the edits that a tile's bytes depend on; 0: edits do not change its bytes. `MercatorEditsHash`: for
   // pixels as ReadMercator has them. Cheap after the first call for a tile.
@@ -130,7 +129,8 @@ class ElevationModel {
   std::uint64_t MercatorEditsHash(int depth, const NodeWindow& window) const;
   // A hash of all available tiles below a tile if edits added some of them; 0: they added none.
   std::uint64_t DeeperTilesHash(const geo::TileKey& key) const;
-  // Availability() without the levels that are deeper than max_source_level() and than all tiles below `key`.
+  // The levels of Availability() from 0 to the deepest one that has a tile below `key`, or to max_source_level() if
+  // that is deeper.
   std::span<const std::vector<geo::TileRange>> AvailabilityToDepthOf(const geo::TileKey& key) const;
   std::vector<EditOutline> Edits() const;
 

@@ -116,8 +116,8 @@ class Session : public Connection, public std::enable_shared_from_this<Session> 
     stream_.Reset();
   }
 
-  // Releases the memory of a request's body. There is none while a reply is being sent. While a body is being received
-  // there may be some, although has_upload_ is not set yet.
+  // Gives up the request's body for others. While a reply is being sent, there is no body. While a body is being
+  // received, it may already hold memory of the budget although has_upload_ is not set yet.
   void DisplaceHere() {
     if (!has_upload_ && !is_receiving_) return;
     displaced_ = true;
@@ -184,7 +184,7 @@ asio::awaitable<void> Session::ServeAll() {
     if (!head) break;
     phase_.store(Phase::kServes, std::memory_order_relaxed);
     exchange_.begun = Clock::now();
-    exchange_.request.deadline = exchange_.begun + context_->request_time->load(std::memory_order_relaxed);
+    exchange_.request.deadline = exchange_.begun + context_->request_time_limit->load(std::memory_order_relaxed);
     exchange_.has_valid_head = false;
     if (!*head) {
       co_await RefuseMessage(head->error());
@@ -211,7 +211,7 @@ asio::awaitable<bool> Session::ServeOne() {
   request.id = RequestId::Next();
   request.is_https = stream_.is_tls();
   Admission& admission = exchange_.admission;
-  admission = handler_->Admit(request, context_->request_time->load(std::memory_order_relaxed));
+  admission = handler_->Admit(request, context_->request_time_limit->load(std::memory_order_relaxed));
   exchange_.has_valid_head = true;
   if (!admission.refusal) admission.refusal = RefuseBody(request, admission);
   if (admission.delays_refusal) {

@@ -39,8 +39,8 @@ struct SessionContext {
   Application* application = nullptr;
   ConnectionSet* connections = nullptr;
   TransferBudget* transfers = nullptr;
-  // How long after its head the deadline of a request is (Request::deadline).
-  const std::atomic<std::chrono::milliseconds>* request_time = nullptr;
+  // From the end of a request's head to Request::deadline: option request_deadline_s.
+  const std::atomic<std::chrono::milliseconds>* request_time_limit = nullptr;
   CorsPolicy cors;
   const TlsContext* tls = nullptr;  // null: plain HTTP
 };

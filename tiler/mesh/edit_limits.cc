@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "engine/tin/scan/triangle_rows.h"
-#include "tiler/mesh/bound_less_rounding.h"
+#include "tiler/mesh/bound_minus_rounding.h"
 
 namespace terrace::tiler {
 
@@ -17,7 +17,7 @@ tin::SampleLimits LimitsOf(const dem::ElevationModel& model, const geo::TileKey&
 
 tin::SampleLimits LimitsOf(dem::MeshDemands demands) {
   tin::SampleLimits limits;
-  for (float& cap : demands.caps) cap = static_cast<float>(BoundLessRounding(static_cast<double>(cap)));
+  for (float& cap : demands.caps) cap = static_cast<float>(BoundMinusRounding(static_cast<double>(cap)));
   limits.weights = std::move(demands.weights);
   limits.caps = std::move(demands.caps);
   limits.forced = std::move(demands.forced);

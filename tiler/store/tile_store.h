@@ -24,7 +24,8 @@ namespace terrace::tiler {
 struct CacheKey {
   TileRequest request;           // its `dataset` is 0
   std::uint64_t generation = 0;  // Dataset::cache_generation of TilePipeline::datasets()
-  // TileEditsHash (tiler/dataset.h), 0 without a model: tiles that an edit does not touch stay valid when it changes.
+  // TileEditsHash (tiler/dataset.h); 0 for a dataset that has only baked tiles. So tiles that an edit does not touch
+  // stay valid when it changes.
   std::uint64_t edits = 0;
 
   friend bool operator==(const CacheKey&, const CacheKey&) = default;

@@ -22,7 +22,8 @@ struct ErrorScale {
   // The deepest level of the sources; edits may add deeper ones. RequestedError::at_least has no effect on this level
   // and deeper ones, whose tiles have all detail of the sources.
   int max_source_level = geo::kMaxLevel;
-  std::span<const int> default_steps = {};  // by level, if no error is requested; deeper: 0; a view
+  // The step of each level if no error is requested; 0 for levels beyond its end. A view.
+  std::span<const int> default_steps = {};
 };
 
 // Returns the step of the level's ladder for a requested error.

@@ -75,7 +75,7 @@ class Sessions : public testing::Test {
     context_->application = &echo_;
     context_->connections = &connections_;
     context_->transfers = &transfers_;
-    context_->request_time = &request_time_;
+    context_->request_time_limit = &request_time_limit_;
   }
   void RunUntilAnswered(std::size_t requests) {
     while (echo_.targets.size() < requests && io_.run_one_for(std::chrono::seconds(10)) > 0) {
@@ -90,7 +90,7 @@ class Sessions : public testing::Test {
   Echo echo_;
   ConnectionSet connections_{8};
   TransferBudget transfers_{1 << 20};
-  const std::atomic<std::chrono::milliseconds> request_time_{std::chrono::seconds(10)};
+  const std::atomic<std::chrono::milliseconds> request_time_limit_{std::chrono::seconds(10)};
   const std::shared_ptr<SessionContext> context_ = std::make_shared<SessionContext>();
 };
 
@@ -133,7 +133,7 @@ TEST_F(Sessions, WaitsAndTheAnswerShareTheDeadlineOfTheHead) {
     ends.client.close();
     End();
     ASSERT_EQ(echo_.at_answer.size(), 2U);
-    EXPECT_GE(echo_.at_admission[0], begun + request_time_.load());
+    EXPECT_GE(echo_.at_admission[0], begun + request_time_limit_.load());
     EXPECT_EQ(echo_.at_answer[0], echo_.at_admission[0]);
     const auto postponed = echo_.at_answer[1] - echo_.at_admission[1];
     EXPECT_GT(postponed.count(), 0) << "while the body arrived";
