@@ -57,8 +57,9 @@ Result<tiler::TileRequest> NegotiateTile(const RequestContext& context, std::spa
 // its latitudes.
 Result<void> CheckHasFormat(const DatasetView& dataset, tiler::TileFormat format);
 
-// For documents that append `query` to their URLs of tiles of this format. kNotFound, for a dataset without sources:
-// its archive lacks such tiles on some level. Errors of TileFormatRow::read.
+// Checks that an archive has the tiles of this format that `query` asks for: a document that appends `query` to its URLs
+// must not link to absent tiles. Datasets with sources have them all. kNotFound: some level lacks them. Errors of
+// TileFormatRow::read.
 Result<void> CheckHasQueriedTiles(const DatasetView& dataset, tiler::TileFormat format, std::string_view query);
 
 // The dataset's index, or kNotFound.

@@ -65,8 +65,7 @@ class FairQueue {
   void Push(PoolJobPtr job, JobClock::time_point now);
 
   // Takes the next job, which counts as running from now on. Returns null if there is none, or only long jobs that must
-  // wait for others to end. `all_may_be_long`: long jobs need
-  // not wait for others.
+  // wait for others to end. `all_may_be_long`: they need not wait.
   PoolJobPtr Take(JobClock::time_point now, bool all_may_be_long = false);
   bool HasNext(bool all_may_be_long = false) const;
 
